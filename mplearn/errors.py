@@ -1,0 +1,49 @@
+"""The errors of mplearn: one base, one class a kind; a message names the wrong value and the allowed ones."""
+
+
+class MPLearnError(Exception):
+    """Base of every error that mplearn raises on purpose."""
+
+
+class InvalidValueError(MPLearnError, ValueError):
+    """An argument or a configuration value lies outside what is allowed."""
+
+
+class RecordingError(MPLearnError):
+    """A recording cannot be read, or does not hold what its format promises."""
+
+
+class FrameError(MPLearnError, ValueError):
+    """A frame of a stream has the wrong width, type, rate or content."""
+
+
+class BodyError(MPLearnError):
+    """A body, a marker set or a calibration does not fit what is asked of it."""
+
+
+class ModelError(MPLearnError):
+    """A model cannot be fitted to, or used with, the data at hand."""
+
+
+class UnknownPrimitiveError(MPLearnError, KeyError):
+    """A primitive is named that the tree, graph or library does not hold."""
+
+    def __str__(self) -> str:
+        """Return the message itself; ``KeyError`` would quote it."""
+        return str(self.args[0]) if self.args else ""
+
+
+class NoPathError(MPLearnError):
+    """The graph holds no walk or path of the kind that was asked for."""
+
+
+class LibraryError(MPLearnError):
+    """A library file is damaged, of another version, or not written by mplearn."""
+
+
+class RobotError(MPLearnError):
+    """A robot description is incomplete, or a motion does not fit the robot."""
+
+
+class MissingDependencyError(MPLearnError, ImportError):
+    """A feature needs a package of an extra that is not installed."""

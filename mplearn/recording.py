@@ -1,0 +1,166 @@
+"""Recordings of human motion, and the segments that are cut from them.
+
+One index convention holds everywhere: a segment is ``[start, end)`` in frames.
+A missing measurement is NaN. Lengths are metres, angles radians, the vertical axis is z.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InvalidValueError, RecordingError
+
+FloatArray: TypeAlias = NDArray[np.float64]
+IntArray: TypeAlias = NDArray[np.int64]
+BoolArray: TypeAlias = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A piece of a stream, cut by a segmenter.
+
+    Attributes:
+        start: First frame of the segment, counted from the start of the stream.
+        end: One past its last frame.
+        confidence: How sure the segmenter is of the boundary at ``end``, in [0, 1].
+        decided_at: The frame at which the boundary was decided; ``decided_at - end`` is its delay.
+        still: True where nothing moved: a pause, which no tree should learn as a motion.
+    """
+
+    start: int
+    end: int
+    confidence: float = 1.0
+    decided_at: int = -1
+    still: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.start < self.end:
+            raise InvalidValueError(
+                f"a segment needs 0 <= start < end, not [{self.start}, {self.end})"
+            )
+
+    @property
+    def length_frames(self) -> int:
+        """Number of frames."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True)
+class LabelledSegment:
+    """A piece of a recording, named by a person or by a generator.
+
+    Attributes:
+        start: First frame.
+        end: One past the last frame.
+        label: Class of the motion.
+        person: Who performs it; empty where unknown.
+    """
+
+    start: int
+    end: int
+    label: str
+    person: str = ""
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.start < self.end:
+            raise InvalidValueError(
+                f"a segment needs 0 <= start < end, not [{self.start}, {self.end})"
+            )
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A stretch of measured motion.
+
+    Attributes:
+        frames: Measurements, shape (T, D); NaN where one is missing. Lengths [m], angles [rad].
+        rate_hz: Frames per second [1/s].
+        channels: Name of each column, length D. Marker recordings name theirs
+            ``"LSHO.x", "LSHO.y", "LSHO.z", ...``: three columns a marker, in this order.
+        name: What the recording is called (a file's stem, a take's id).
+        person: Who moves; empty where unknown.
+        labels: What is known about its segments, in order of their start.
+    """
+
+    frames: FloatArray
+    rate_hz: float
+    channels: tuple[str, ...]
+    name: str = ""
+    person: str = ""
+    labels: tuple[LabelledSegment, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        frames = np.asarray(self.frames, dtype=np.float64)
+        if frames.ndim != 2:
+            raise RecordingError(f"frames must have shape (T, D), not {frames.shape}")
+        if frames.shape[1] != len(self.channels):
+            raise RecordingError(
+                f"{frames.shape[1]} columns need as many channel names, not {len(self.channels)}"
+            )
+        if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
+            raise RecordingError(f"rate_hz must be positive and finite, not {self.rate_hz}")
+        if np.isinf(frames).any():
+            raise RecordingError("frames hold infinite values; a missing measurement is NaN")
+        object.__setattr__(self, "frames", frames)
+        object.__setattr__(self, "channels", tuple(self.channels))
+        object.__setattr__(self, "labels", tuple(self.labels))
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return int(self.frames.shape[0])
+
+    @property
+    def duration_s(self) -> float:
+        """Length in seconds."""
+        return len(self) / self.rate_hz
+
+    @property
+    def is_markers(self) -> bool:
+        """Whether the columns are markers, three a marker (``name.x``, ``name.y``, ``name.z``)."""
+        names = self.channels
+        return (
+            bool(names)
+            and len(names) % 3 == 0
+            and all(name.endswith(f".{'xyz'[i % 3]}") for i, name in enumerate(names))
+        )
+
+    @property
+    def marker_names(self) -> tuple[str, ...]:
+        """Names of the markers, length M.
+
+        Raises:
+            RecordingError: The columns are not markers.
+        """
+        if not self.is_markers:
+            raise RecordingError(
+                f"recording {self.name!r} holds no markers (columns named 'NAME.x', 'NAME.y', "
+                f"'NAME.z'); its first columns are {self.channels[:3]}"
+            )
+        return tuple(name[:-2] for name in self.channels[::3])
+
+    @property
+    def markers(self) -> FloatArray:
+        """Marker positions, shape (T, M, 3) [m], a view of the frames."""
+        return self.frames.reshape(len(self), len(self.marker_names), 3)
+
+    def sliced(self, start: int, end: int) -> Recording:
+        """Return the frames [start, end), with the labels that lie wholly inside, shifted."""
+        if not 0 <= start < end <= len(self):
+            raise InvalidValueError(
+                f"[{start}, {end}) is not inside the recording's [0, {len(self)})"
+            )
+        labels = tuple(
+            replace(s, start=s.start - start, end=s.end - start)
+            for s in self.labels
+            if s.start >= start and s.end <= end
+        )
+        return replace(self, frames=self.frames[start:end], labels=labels)
+
+
+def marker_channels(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the column names of markers: ``("A",)`` -> ``("A.x", "A.y", "A.z")``."""
+    return tuple(f"{name}.{axis}" for name in names for axis in "xyz")
