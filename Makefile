@@ -1,0 +1,61 @@
+# The commands of mplearn. `make demo` and `make test` set up what they need.
+.PHONY: demo test setup check format bench evaluate build clean
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+DATA   ?= ../shared/data
+OUT    ?= out
+PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
+export MPLEARN_DATA ?= $(abspath $(DATA))
+
+demo: $(VENV)/.demo                 ## learn from the demonstrator, perform a walk, write out/demo/report.html
+	$(BIN)/mplearn demo --out $(OUT)/demo
+
+test: setup                         ## all tests
+	$(BIN)/python -m pytest
+
+setup: $(VENV)/.dev                 ## .venv with everything that tests, checks and benchmarks need
+
+check: setup                        ## format, lint, docstrings, types, floors
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: setup                       ## format and mend what can be mended
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: setup                        ## timings, as ratios against named peers, interleaved in one run
+	$(BIN)/python -m benchmarks
+
+evaluate: setup                     ## the paper's experiments: tables on synthetic and real motion
+	$(BIN)/mplearn evaluate paper-session --out $(OUT)/evaluate
+	@if [ -d "$(MPLEARN_DATA)" ]; then \
+	    $(BIN)/mplearn evaluate "$(MPLEARN_DATA)" --out $(OUT)/evaluate; \
+	else \
+	    echo "no recordings at $(MPLEARN_DATA): the tables on real motion are left out (set MPLEARN_DATA)"; \
+	fi
+
+build: setup                        ## wheel and sdist, each installed in isolation and smoke-tested
+	rm -rf dist
+	$(BIN)/python -m build --outdir dist .
+	$(BIN)/python benchmarks/smoke_build.py dist
+
+clean:                              ## remove what the other commands made
+	rm -rf $(VENV) $(OUT) dist
+
+# One environment, two depths: the demo needs no torch.
+$(VENV)/.venv:
+	$(PYTHON) -m venv $(VENV)
+	@sh scripts/system_packages.sh
+	@touch $@
+
+$(VENV)/.demo: $(VENV)/.venv pyproject.toml constraints.txt
+	$(PIP) --editable ".[report]"
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/.venv pyproject.toml constraints.txt
+	$(PIP) --editable ".[report,rl,dev]"
+	@touch $@ $(VENV)/.demo
