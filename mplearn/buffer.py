@@ -1,0 +1,75 @@
+"""A window on the newest frames of a stream, in memory that does not grow with the stream."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .errors import InvalidValueError
+from .recording import FloatArray
+
+
+class FrameBuffer:
+    """Holds the frames from ``first`` on; older ones are dropped on request.
+
+    Args:
+        n_channels: Width of a frame.
+    """
+
+    def __init__(self, n_channels: int) -> None:
+        self.n_channels = n_channels
+        self.first = 0
+        self._frames = np.empty((256, n_channels))
+        self._offset = 0
+        self._count = 0
+
+    def __len__(self) -> int:
+        """Number of frames held."""
+        return self._count
+
+    @property
+    def end(self) -> int:
+        """Index of the frame that comes next."""
+        return self.first + self._count
+
+    def append(self, frame: FloatArray) -> None:
+        """Add one frame, shape (D,)."""
+        if self._offset + self._count == len(self._frames):
+            self._make_room()
+        self._frames[self._offset + self._count] = frame
+        self._count += 1
+
+    def take(self, start: int, end: int) -> FloatArray:
+        """Return a copy of the frames [start, end), shape (end - start, D)."""
+        if not self.first <= start < end <= self.end:
+            raise InvalidValueError(
+                f"[{start}, {end}) is not inside the buffer's [{self.first}, {self.end})"
+            )
+        at = self._offset + start - self.first
+        return self._frames[at : at + end - start].copy()
+
+    def drop_before(self, frame: int) -> None:
+        """Forget the frames before ``frame``."""
+        dropped = min(max(frame - self.first, 0), self._count)
+        self.first += dropped
+        self._offset += dropped
+        self._count -= dropped
+
+    def state(self) -> dict[str, Any]:
+        """Return the content as plain values and arrays."""
+        return {"first": self.first, "frames": self.take(self.first, self.end) if self else None}
+
+    def load_state(self, state: dict[str, Any]) -> None:
+        """Resume from what `state` returned."""
+        frames = state["frames"]
+        self.first, self._offset, self._count = int(state["first"]), 0, 0
+        for frame in () if frames is None else frames:
+            self.append(frame)
+
+    def _make_room(self) -> None:
+        """Move the frames to the front; into a larger array only where they fill half of this one."""
+        room = len(self._frames) * (2 if self._count > len(self._frames) // 2 else 1)
+        frames = np.empty((room, self.n_channels))
+        frames[: self._count] = self._frames[self._offset : self._offset + self._count]
+        self._frames, self._offset = frames, 0

@@ -1,0 +1,126 @@
+"""What a learner says: every event is a value, returned by `MotionLearner.learn_one`.
+
+Times are frames since the learner's first frame; a stream that ends and starts again goes on counting.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from .recording import Segment
+
+
+@dataclass(frozen=True)
+class SegmentClosed:
+    """The segmenter closed a segment.
+
+    Attributes:
+        segment: Where it lies, and how sure its end is.
+    """
+
+    segment: Segment
+
+
+@dataclass(frozen=True)
+class Recognised:
+    """A segment was placed in a primitive that is already known.
+
+    Attributes:
+        segment: The segment.
+        primitive: Id of the primitive.
+        distance: Symmetric likelihood distance to it [nats a frame] ([Kulic2012] eq. 5).
+    """
+
+    segment: Segment
+    primitive: int
+    distance: float
+
+
+@dataclass(frozen=True)
+class PrimitiveBorn:
+    """The tree formed a new primitive.
+
+    Attributes:
+        segment: The segment whose arrival formed it.
+        primitive: Its id, for life.
+        exemplars: How many demonstrations it was formed from.
+    """
+
+    segment: Segment
+    primitive: int
+    exemplars: int
+
+
+@dataclass(frozen=True)
+class PrimitiveMerged:
+    """Two primitives turned out to be one.
+
+    Attributes:
+        segment: The segment whose arrival showed it.
+        primitive: Id that stays.
+        absorbed: Id that is gone; its counts went to ``primitive``.
+    """
+
+    segment: Segment
+    primitive: int
+    absorbed: int
+
+
+@dataclass(frozen=True)
+class PrimitiveSplit:
+    """A primitive turned out to be several.
+
+    Attributes:
+        segment: The segment whose arrival showed it.
+        primitive: Id of the node that was split; it stays in the tree as a more general motion.
+        into: Ids of the new primitives.
+    """
+
+    segment: Segment
+    primitive: int
+    into: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class TransitionSeen:
+    """Two recognised primitives followed each other.
+
+    Attributes:
+        segment: The later segment.
+        previous: Id of the earlier primitive.
+        primitive: Id of the later one.
+        count: How often this pair has been seen by now.
+    """
+
+    segment: Segment
+    previous: int
+    primitive: int
+    count: int
+
+
+@dataclass(frozen=True)
+class Anomaly:
+    """Something out of the ordinary.
+
+    Attributes:
+        segment: Where.
+        kind: ``"motion"``: unlike every known primitive; ``"order"``: known motions in an unusual order.
+        score: How far out: the distance to the nearest primitive over that primitive's radius,
+            or the surprise of the transition [nats].
+    """
+
+    segment: Segment
+    kind: Literal["motion", "order"]
+    score: float
+
+
+Event: TypeAlias = (
+    SegmentClosed
+    | Recognised
+    | PrimitiveBorn
+    | PrimitiveMerged
+    | PrimitiveSplit
+    | TransitionSeen
+    | Anomaly
+)
