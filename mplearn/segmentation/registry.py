@@ -1,0 +1,29 @@
+"""Segmenters by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..errors import InvalidValueError
+from .base import Segmenter
+from .zero_velocity import ZeroVelocity
+
+SEGMENTERS: dict[str, Callable[[int, float], Segmenter]] = {
+    "zero-velocity": ZeroVelocity,
+}
+
+
+def make_segmenter(name: str, n_channels: int, rate_hz: float) -> Segmenter:
+    """Build a segmenter with its default settings.
+
+    Args:
+        name: One of `SEGMENTERS`.
+        n_channels: Width D of a frame.
+        rate_hz: Frames per second [1/s].
+
+    Raises:
+        InvalidValueError: There is no such segmenter, or a number is out of range.
+    """
+    if name not in SEGMENTERS:
+        raise InvalidValueError(f"segmenter must be one of {sorted(SEGMENTERS)}, not {name!r}")
+    return SEGMENTERS[name](n_channels, rate_hz)
