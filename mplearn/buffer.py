@@ -68,7 +68,7 @@ class FrameBuffer:
             self.append(frame)
 
     def _make_room(self) -> None:
-        """Move the frames to the front; into a larger array only where they fill half of this one."""
+        """Move the frames to the front, into a larger array only where they fill half of this."""
         room = len(self._frames) * (2 if self._count > len(self._frames) // 2 else 1)
         frames = np.empty((room, self.n_channels))
         frames[: self._count] = self._frames[self._offset : self._offset + self._count]

@@ -1,4 +1,7 @@
-"""The errors of mplearn: one base, one class a kind; a message names the wrong value and the allowed ones."""
+"""The errors of mplearn: one base, one class a kind.
+
+A message names the wrong value and the allowed ones.
+"""
 
 
 class MPLearnError(Exception):

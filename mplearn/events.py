@@ -1,6 +1,7 @@
 """What a learner says: every event is a value, returned by `MotionLearner.learn_one`.
 
-Times are frames since the learner's first frame; a stream that ends and starts again goes on counting.
+Times are frames since the learner's first frame; where a stream ends and another starts, counting
+goes on.
 """
 
 from __future__ import annotations
@@ -105,7 +106,8 @@ class Anomaly:
 
     Attributes:
         segment: Where.
-        kind: ``"motion"``: unlike every known primitive; ``"order"``: known motions in an unusual order.
+        kind: ``"motion"``: unlike every known primitive; ``"order"``: known motions, but in an
+            unusual order.
         score: How far out: the distance to the nearest primitive over that primitive's radius,
             or the surprise of the transition [nats].
     """

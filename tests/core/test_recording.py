@@ -53,7 +53,7 @@ def test_a_recording_refuses_what_is_not_one(
 
 @pytest.mark.parametrize("kind", [Segment, lambda s, e: LabelledSegment(s, e, "x")])
 @pytest.mark.parametrize(("start", "end"), [(-1, 2), (3, 3), (4, 2)])
-def test_a_segment_is_not_empty(kind, start: int, end: int) -> None:  # noqa: ANN001
+def test_a_segment_is_not_empty(kind, start: int, end: int) -> None:
     with pytest.raises(InvalidValueError, match=str(end)):
         kind(start, end)
 
