@@ -1,0 +1,157 @@
+"""The marker sets' tables: marker -> (body, offset in its frame on the human of 1.75 m) [m].
+
+Frames: x forward, y left, z up; origins at the joints (pelvis: midway between the hip centres,
+chest: the thoracic joint, head: base of the neck, foot: ankle). Palms face the body at rest,
+thumbs forward. Landmark heights follow ANSUR (1988) means for men, depths and widths include the
+skin and the marker.
+"""
+
+from __future__ import annotations
+
+from .human_model import FOREARM, HEIGHT_M
+
+Offset = tuple[float, float, float]
+Table = dict[str, tuple[str, Offset]]
+
+# one side's markers are given for the left (name without its L); the right is the mirror image
+_TRUNK: Table = {
+    "C7": ("chest", (-0.065, 0.0, 0.345)),
+    "T10": ("chest", (-0.125, 0.0, 0.120)),
+    "CLAV": ("chest", (0.075, 0.0, 0.270)),
+    "STRN": ("chest", (0.125, 0.0, 0.110)),
+    "RBAK": ("chest", (-0.125, -0.085, 0.225)),
+}
+_HEAD: Table = {"FHD": ("head", (0.105, 0.075, 0.165)), "BHD": ("head", (-0.075, 0.070, 0.175))}
+_ARM: Table = {
+    "SHO": ("clavicle_l", (-0.010, 0.140, 0.030)),
+    "UPA": ("upper_arm_l", (0.0, 0.060, -0.160)),
+    "ELB": ("upper_arm_l", (-0.005, 0.048, -0.318)),
+    "FRM": ("forearm_l", (0.0, 0.042, -0.120)),
+    "WRA": ("forearm_l", (0.040, 0.012, -0.240)),
+    "WRB": ("forearm_l", (-0.038, 0.012, -0.242)),
+    "FIN": ("hand_l", (0.010, 0.026, -0.080)),
+}
+_HIP: Table = {"ASI": ("pelvis", (0.080, 0.125, 0.075)), "PSI": ("pelvis", (-0.110, 0.045, 0.095))}
+_LEG: Table = {
+    "THI": ("thigh_l", (0.010, 0.090, -0.250)),
+    "KNE": ("thigh_l", (0.0, 0.060, -0.420)),
+    "TIB": ("shank_l", (0.010, 0.062, -0.200)),
+    "ANK": ("shank_l", (-0.005, 0.050, -0.425)),
+    "HEE": ("foot_l", (-0.068, 0.0, -0.030)),
+    "TOE": ("foot_l", (0.125, 0.010, -0.025)),
+    "MT5": ("foot_l", (0.095, 0.050, -0.045)),
+}
+
+
+def _mirrored(entry: tuple[str, Offset]) -> tuple[str, Offset]:
+    body, (x, y, z) = entry
+    return (f"{body[:-2]}_r" if body.endswith("_l") else body), (x, -y, z)
+
+
+def _sides(table: Table, left: str = "L{}", right: str = "R{}") -> Table:
+    """Return both sides of a table of left markers, all left ones first."""
+    return {left.format(name): entry for name, entry in table.items()} | {
+        right.format(name): _mirrored(entry) for name, entry in table.items()
+    }
+
+
+def _pairs(table: Table) -> Table:
+    """Return both sides, left and right in turn."""
+    both = _sides(table)
+    return {side + name: both[side + name] for name in table for side in "LR"}
+
+
+def _only(table: Table, *names: str) -> Table:
+    return {name: table[name] for name in names}
+
+
+_LANDMARKS = _only(_TRUNK, "C7", "T10", "CLAV", "STRN")
+_PAPER34 = (
+    _pairs(_HEAD)
+    | _LANDMARKS
+    | _sides(_only(_ARM, "SHO", "UPA", "ELB", "WRA", "WRB", "FIN"))
+    | _pairs(_HIP)
+    | _sides(_only(_LEG, "KNE", "ANK", "HEE", "TOE", "MT5"))
+)
+_PLUG_IN_GAIT = (
+    _pairs(_HEAD)
+    | _TRUNK
+    | _sides(_ARM)
+    | _pairs(_HIP)
+    | _sides(_only(_LEG, "THI", "KNE", "TIB", "ANK", "HEE", "TOE"))
+)
+_WAIST = {
+    f"{side}{cmu}": _PLUG_IN_GAIT[f"{side}{name}"]
+    for cmu, name in (("FWT", "ASI"), ("BWT", "PSI"))
+    for side in "LR"
+}
+_CMU_LEG = {
+    "THI": ("thigh_l", (0.030, 0.085, -0.250)),
+    "KNE": _LEG["KNE"],
+    "SHN": ("shank_l", (0.040, 0.045, -0.200)),
+    **_only(_LEG, "ANK", "HEE", "MT5", "TOE"),
+}
+_CMU41 = (
+    _WAIST
+    | _sides(_CMU_LEG)
+    | _only(_TRUNK, "CLAV", "STRN", "C7", "T10")
+    | {"RBAC": _TRUNK["RBAK"]}
+    | _pairs(_HEAD)
+    | _sides(_ARM)
+)
+
+# joint centres, as skeletal files give them
+_ORIGIN: Offset = (0.0, 0.0, 0.0)
+# a bone of an ASF skeleton ends where its child starts; its marker is that end
+_ASF_SIDE: Table = {
+    "hipjoint": ("thigh_l", _ORIGIN),
+    "femur": ("shank_l", _ORIGIN),
+    "tibia": ("foot_l", _ORIGIN),
+    "foot": ("toes_l", _ORIGIN),
+    "toes": ("toes_l", (0.07, 0.0, -0.01)),
+    "clavicle": ("upper_arm_l", _ORIGIN),
+    "humerus": ("forearm_l", _ORIGIN),
+    "radius": ("forearm_l", (0.0, 0.0, -FOREARM * HEIGHT_M)),
+    "wrist": ("hand_l", (0.0, 0.0, -0.045)),
+    "hand": ("hand_l", (0.0, 0.0, -0.085)),
+    "fingers": ("hand_l", (0.0, 0.0, -0.160)),
+    "thumb": ("hand_l", (0.045, 0.0, -0.080)),
+}
+_ASF = {
+    "root": ("pelvis", (0.0, 0.0, 0.050)),
+    **_sides(_ASF_SIDE, "l{}", "r{}"),
+    "lowerback": ("abdomen", (-0.02, 0.0, 0.080)),
+    "upperback": ("chest", (-0.02, 0.0, 0.040)),
+    "thorax": ("chest", (-0.02, 0.0, 0.200)),
+    "lowerneck": ("chest", (-0.01, 0.0, 0.310)),
+    "upperneck": ("head", (0.0, 0.0, 0.060)),
+    "head": ("head", (0.01, 0.0, 0.170)),
+}
+# a joint of a BVH skeleton is where its segment starts
+_BVH_SIDE: Table = {
+    "Shoulder": ("clavicle_l", _ORIGIN),
+    "Arm": ("upper_arm_l", _ORIGIN),
+    "ForeArm": ("forearm_l", _ORIGIN),
+    "Hand": ("hand_l", _ORIGIN),
+    "UpLeg": ("thigh_l", _ORIGIN),
+    "Leg": ("shank_l", _ORIGIN),
+    "Foot": ("foot_l", _ORIGIN),
+    "ToeBase": ("toes_l", _ORIGIN),
+}
+_BVH = {
+    "Hips": ("pelvis", (0.0, 0.0, 0.050)),
+    "Spine": ("abdomen", (-0.01, 0.0, 0.040)),
+    "Spine1": ("chest", (-0.01, 0.0, 0.080)),
+    "Spine2": ("chest", (-0.01, 0.0, 0.180)),
+    "Neck": ("head", (-0.01, 0.0, 0.0)),
+    "Head": ("head", (0.005, 0.0, 0.090)),
+    **_sides(_BVH_SIDE, "Left{}", "Right{}"),
+}
+
+TABLES: dict[str, Table] = {
+    "paper34": _PAPER34,
+    "plug_in_gait39": _PLUG_IN_GAIT,
+    "cmu41": _CMU41,
+    "asf_joints": _ASF,
+    "bvh_joints": _BVH,
+}

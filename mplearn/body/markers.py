@@ -1,0 +1,147 @@
+"""Marker sets: which markers sit where on a body, and which set a recording's names belong to.
+
+A set is data: marker name -> (body, offset in that body's frame on the reference human of 1.75 m).
+On any other body the offset is stretched with the segment, so that every set works on the human of
+every size and on the robot. Where a body has no such segment (the robot has no clavicles and no
+abdomen), the marker goes to the segment that carries it there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from mplearn.errors import BodyError
+from mplearn.recording import FloatArray, IntArray
+
+from .human import human_body
+from .marker_tables import TABLES
+from .tree import KinematicTree
+
+CARRIER = {"abdomen": "pelvis", "clavicle_l": "chest", "clavicle_r": "chest"}
+LEAST_SHARE = 0.6  # of a recording's markers that a set must know to be taken for it
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerSet:
+    """Where markers sit on a person.
+
+    Attributes:
+        name: Name of the set.
+        names: Names of the M markers.
+        bodies: Name of the body that carries each, length M.
+        offsets: Positions in that body's frame on the reference human, shape (M, 3) [m].
+    """
+
+    name: str
+    names: tuple[str, ...]
+    bodies: tuple[str, ...]
+    offsets: FloatArray
+
+    def select(self, marker_names: Sequence[str]) -> MarkerSet:
+        """Return the set in the order of a recording's own names.
+
+        Raises:
+            BodyError: A name is not in this set.
+        """
+        index = {plain_name(name): i for i, name in enumerate(self.names)}
+        rows = [index.get(plain_name(name), -1) for name in marker_names]
+        missing = [name for name, i in zip(marker_names, rows, strict=True) if i < 0]
+        if missing:
+            raise BodyError(
+                f"marker set {self.name!r} has no markers {missing}; it has {', '.join(self.names)}"
+            )
+        return MarkerSet(
+            name=self.name,
+            names=tuple(marker_names),
+            bodies=tuple(self.bodies[i] for i in rows),
+            offsets=self.offsets[rows],
+        )
+
+    def knows(self, marker_names: Sequence[str]) -> tuple[bool, ...]:
+        """Return, for each name of a recording, whether it is in this set."""
+        known = {plain_name(name) for name in self.names}
+        return tuple(plain_name(name) in known for name in marker_names)
+
+    def attach(self, tree: KinematicTree) -> tuple[IntArray, FloatArray]:
+        """Put the markers on a body: index of each one's body (M,), and offsets there (M, 3) [m]."""
+        reference = human_body().tree
+        factors = segment_factors(tree, reference)
+        bodies, offsets = [], []
+        for carrier, offset in zip(self.bodies, self.offsets, strict=True):
+            name, at = carrier, offset
+            while name not in tree.body_names and name in CARRIER:
+                at = at + reference.offset[reference.body(name)]
+                name = CARRIER[name]
+            bodies.append(tree.body(name))
+            offsets.append(at * factors[bodies[-1]])
+        return np.array(bodies, dtype=np.int64), np.array(offsets)
+
+
+def segment_factors(tree: KinematicTree, reference: KinematicTree) -> FloatArray:
+    """Return how much larger each body is than the reference human's, shape (B, 3).
+
+    Along a limb it is the ratio of the segment lengths, elsewhere the ratio of the hips' heights.
+    """
+    factors = np.full_like(tree.offset, tree.offset[0, 2] / reference.offset[0, 2])
+    for child, name in enumerate(tree.body_names):
+        parent = tree.parent[child]
+        if parent < 0 or name not in reference.body_names:
+            continue
+        same = reference.body(name)
+        if reference.body_names[reference.parent[same]] != tree.body_names[parent]:
+            continue
+        length = abs(reference.offset[same, 2])
+        if length > 0.05:
+            factors[parent, 2] = abs(tree.offset[child, 2]) / length
+    return factors
+
+
+def plain_name(name: str) -> str:
+    """Return a marker's name without its subject's prefix and in capitals: ``Male:lfhd`` -> ``LFHD``."""
+    return name.rsplit(":", 1)[-1].strip().upper()
+
+
+@cache
+def marker_set(name: str) -> MarkerSet:
+    """Return a marker set by name.
+
+    Raises:
+        BodyError: There is none of that name.
+    """
+    if name not in TABLES:
+        raise BodyError(f"no marker set {name!r}; there are {', '.join(TABLES)}")
+    table = TABLES[name]
+    return MarkerSet(
+        name=name,
+        names=tuple(table),
+        bodies=tuple(body for body, _ in table.values()),
+        offsets=np.array([offset for _, offset in table.values()]),
+    )
+
+
+def find_marker_set(marker_names: Sequence[str]) -> MarkerSet:
+    """Return the set that a recording's markers belong to, found by their names.
+
+    Prefixes up to a colon and case do not matter. The set that knows the most of the names wins,
+    the smaller one in a tie; names that it does not know are the caller's to drop
+    (`MarkerSet.knows`).
+
+    Raises:
+        BodyError: A name occurs twice, or no set knows enough of the names.
+    """
+    plain = [plain_name(name) for name in marker_names]
+    twice = sorted({name for name in plain if plain.count(name) > 1})
+    if twice:
+        raise BodyError(f"the markers {twice} occur more than once")
+    known = {name: sum(marker_set(name).knows(plain)) for name in TABLES}
+    best = max(TABLES, key=lambda name: (known[name], -len(TABLES[name])))
+    if known[best] < max(LEAST_SHARE * len(plain), 6):
+        raise BodyError(
+            f"no marker set knows the markers {list(marker_names)[:6]}...: {best!r} comes closest with "
+            f"{known[best]} of {len(plain)}; there are {', '.join(TABLES)}"
+        )
+    return marker_set(best)
