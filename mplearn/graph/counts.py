@@ -1,0 +1,247 @@
+"""What has been observed of the order of primitives: nodes, edges, longer histories."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
+
+import numpy as np
+
+from ..errors import InvalidValueError, UnknownPrimitiveError
+from ..recording import FloatArray, IntArray
+from .edges import EdgeTable
+from .history import HistoryTable
+
+
+class TransitionCounts:
+    """The counts behind a `TransitionGraph`: they only add, so they do not depend on order.
+
+    Ids are listed in the order in which they were added; arrays over nodes follow that order.
+
+    Attributes:
+        order: Longest history that prediction looks at; 1 is a first-order Markov chain.
+        concentration: Weight of what a shorter history predicts, in observations: the mass of a
+            Dirichlet prior whose mean is the prediction of the next lower order.
+        history_capacity: Largest number of entries kept about histories longer than one.
+    """
+
+    def __init__(
+        self, *, order: int = 2, concentration: float = 1.0, history_capacity: int = 20_000
+    ) -> None:
+        if not 1 <= order <= 8:
+            raise InvalidValueError(f"order must lie in [1, 8], not {order}")
+        if not (concentration > 0 and math.isfinite(concentration)):
+            raise InvalidValueError(f"concentration must be positive, not {concentration}")
+        if history_capacity < 4:
+            raise InvalidValueError(f"history_capacity must be at least 4, not {history_capacity}")
+        self.order = order
+        self.concentration = concentration
+        self.history_capacity = history_capacity
+        self._index: dict[int, int] = {}
+        self._edges = EdgeTable()
+        self._histories = HistoryTable(order, history_capacity)
+        self._changed()
+
+    # ---- growing
+
+    def add_node(self, id: int) -> None:
+        """Add a primitive; one that is there already stays as it is."""
+        if id not in self._index:
+            self._index[id] = len(self._index)
+            self._changed()
+
+    def observe(
+        self, previous: int, next: int, duration_s: float, *, before: Sequence[int] = ()
+    ) -> None:
+        """Count a transition between two segments recognised one right after the other.
+
+        Args:
+            previous: The first primitive.
+            next: The one that followed it.
+            duration_s: Time from the start of ``previous`` to the start of ``next`` [s].
+            before: The primitives recognised before ``previous`` without a break, oldest first:
+                what prediction by longer histories learns from.
+
+        Raises:
+            UnknownPrimitiveError: One of them is not a node.
+            InvalidValueError: The duration is negative, not finite or beyond a day.
+        """
+        self._require(previous, next, *before)
+        self._edges.observe(previous, next, duration_s)
+        if self.order > 1 and before:
+            self._histories.observe((*before[-(self.order - 1) :], previous), next)
+        self._changed()
+
+    def remove_node(self, id: int) -> None:
+        """Remove a primitive and every transition that names it."""
+        self._require(id)
+        gone = (self._edges.sources == id) | (self._edges.targets == id)
+        self._edges = self._edges.without(gone)
+        self._histories = self._histories.without(id)
+        self._index = {i: k for k, i in enumerate(i for i in self._index if i != id)}
+        self._changed()
+
+    def merge_nodes(self, keep: int, merged: int) -> None:
+        """Make two nodes one: what was counted for ``merged`` is added to ``keep``."""
+        self._require(keep, merged)
+        if keep != merged:
+            self._rename({merged: keep})
+
+    def absorb(self, other: TransitionCounts, new_id: Mapping[int, int] | None = None) -> None:
+        """Add the nodes and counts of another graph, its ids replaced where ``new_id`` names them.
+
+        Counts do not depend on the order in which graphs are absorbed.
+        """
+        added = other.copy()
+        if new_id is not None:
+            added._require(*new_id)
+            added._rename(dict(new_id))
+        for node in added.ids:
+            self.add_node(node)
+        self._edges.add(added._edges.rows)
+        self._histories.add(added._histories)
+        self._changed()
+
+    # ---- looking
+
+    def __len__(self) -> int:
+        """Number of primitives."""
+        return len(self._index)
+
+    def __contains__(self, id: object) -> bool:
+        """Whether a primitive is a node."""
+        return id in self._index
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """The primitives, in the order in which they were added."""
+        return tuple(self._index)
+
+    @property
+    def n_edges(self) -> int:
+        """Number of different transitions that have been seen."""
+        return len(self._edges)
+
+    @property
+    def n_transitions(self) -> int:
+        """Number of transitions that have been seen."""
+        return int(self._edges.counts.sum())
+
+    def count(self, previous: int, next: int) -> int:
+        """How often a transition has been seen."""
+        self._require(previous, next)
+        return self._edges.count(previous, next)
+
+    def duration_s(self, previous: int, next: int) -> float:
+        """Mean duration of a transition [s]; NaN where it has never been seen."""
+        self._require(previous, next)
+        return self._edges.duration_s(previous, next)
+
+    def successors(self, id: int) -> tuple[int, ...]:
+        """The primitives that have been seen to follow one, in the order of first sight."""
+        self._require(id)
+        return tuple(self._edges.targets[self._edges.sources == id].tolist())
+
+    # ---- keeping
+
+    def state(self) -> dict[str, Any]:
+        """Return the whole state as plain values and arrays of whole numbers."""
+        return {
+            "order": self.order,
+            "concentration": self.concentration,
+            "history_capacity": self.history_capacity,
+            "ids": np.array(self.ids, dtype=np.int64),
+            "edges": self._edges.rows,
+            "histories": self._histories.to_array(),
+        }
+
+    def load_state(self, state: Mapping[str, Any]) -> None:
+        """Resume from what `state` returned.
+
+        Raises:
+            InvalidValueError: The arrays do not describe a graph.
+        """
+        fresh = type(self)(
+            order=int(state["order"]),
+            concentration=float(state["concentration"]),
+            history_capacity=int(state["history_capacity"]),
+        )
+        ids, edges, histories = _checked_arrays(state, fresh.order)
+        fresh._index = {id: k for k, id in enumerate(ids.tolist())}
+        fresh._edges.add(edges)
+        fresh._histories = HistoryTable.from_array(fresh.order, fresh.history_capacity, histories)
+        vars(self).update(vars(fresh))
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, Any]) -> Self:
+        """Build the graph whose `state` this is."""
+        graph = cls()
+        graph.load_state(state)
+        return graph
+
+    def copy(self) -> Self:
+        """Return an independent copy."""
+        return type(self).from_state(self.state())
+
+    # ---- inside
+
+    def _changed(self) -> None:
+        """Note that whatever was derived from the counts is out of date."""
+
+    def _require(self, *ids: int) -> None:
+        for id in ids:
+            if id not in self._index:
+                raise UnknownPrimitiveError(
+                    f"primitive {id} is not in the graph; it holds {_shortened(self.ids)}"
+                )
+
+    def _indices(self, ids: IntArray) -> IntArray:
+        index = self._index
+        return np.array([index[id] for id in ids.tolist()], dtype=np.int64)
+
+    def followers(self, context: tuple[int, ...]) -> FloatArray:
+        """How often each primitive followed a context (the empty one too), shape (n,)."""
+        row = np.zeros(len(self))
+        edges = self._edges
+        if len(context) < 2:
+            counted = edges.sources == context[0] if context else np.full(len(edges), True)
+            np.add.at(row, self._indices(edges.targets[counted]), edges.counts[counted])
+        else:
+            for next_id, n in self._histories.followers(context).items():
+                row[self._index[next_id]] = n
+        return row
+
+    def _rename(self, new_id: dict[int, int]) -> None:
+        self._edges = self._edges.renamed(new_id)
+        self._histories = self._histories.renamed(new_id)
+        ids = dict.fromkeys(new_id.get(id, id) for id in self._index)
+        self._index = {id: k for k, id in enumerate(ids)}
+        self._changed()
+
+
+def _shortened(ids: tuple[int, ...]) -> str:
+    shown = ", ".join(map(str, ids[:20]))
+    return f"{len(ids)} primitives: {shown}" + (", ..." if len(ids) > 20 else "")
+
+
+def _checked_arrays(state: Mapping[str, Any], order: int) -> tuple[IntArray, IntArray, IntArray]:
+    ids, edges, histories = (np.asarray(state[key]) for key in ("ids", "edges", "histories"))
+    shapes_fit = ids.ndim == 1 and edges.ndim == histories.ndim == 2
+    if not (shapes_fit and edges.shape[1] == 5 and histories.shape[1] == order + 3):
+        raise InvalidValueError(
+            "a graph's state needs ids (n,), edges (E, 5) and histories (H, order + 3), not "
+            f"{ids.shape}, {edges.shape} and {histories.shape}"
+        )
+    if any(array.dtype.kind not in "iu" for array in (ids, edges, histories)):
+        raise InvalidValueError("a graph's state holds whole numbers only")
+    lengths = histories[:, 0]
+    if not ((lengths >= 2) & (lengths <= order)).all():
+        raise InvalidValueError(f"histories must have lengths in [2, {order}]")
+    used = np.arange(order) < lengths[:, None]
+    named = (edges[:, :2].ravel(), histories[:, 1:-2][used], histories[:, -2])
+    if len(set(ids.tolist())) != len(ids) or not np.isin(np.concatenate(named), ids).all():
+        raise InvalidValueError("a graph's ids must differ, and its transitions name only them")
+    if (edges[:, 2] < 1).any() or (edges[:, 3:] < 0).any() or (histories[:, -1] < 1).any():
+        raise InvalidValueError("a graph's counts must be at least 1, its durations at least 0")
+    return ids, edges, histories

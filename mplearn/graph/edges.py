@@ -1,0 +1,117 @@
+"""The table of observed edges: a row of whole numbers each, so that sums do not depend on order."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InvalidValueError
+from ..recording import BoolArray, FloatArray, IntArray
+
+_SOURCE, _TARGET, _COUNT, _TOTAL_MS, _SQUARES_MS2 = range(5)
+_LONGEST_S = 86_400.0
+
+
+class EdgeTable:
+    """Counts and durations of directed edges between ids.
+
+    Rows are ``[source, target, count, sum of durations [ms], sum of their squares [ms^2]]``. Whole
+    milliseconds make addition exact: two tables added in either order are the same bit for bit.
+    """
+
+    def __init__(self) -> None:
+        self._rows = np.zeros((16, 5), dtype=np.int64)
+        self._row_of: dict[tuple[int, int], int] = {}
+
+    def __len__(self) -> int:
+        """Number of edges."""
+        return len(self._row_of)
+
+    def __contains__(self, edge: tuple[int, int]) -> bool:
+        """Whether the edge has been observed."""
+        return edge in self._row_of
+
+    @property
+    def rows(self) -> IntArray:
+        """A copy of the rows, shape (E, 5), in the order in which the edges were first seen."""
+        return self._rows[: len(self)].copy()
+
+    @property
+    def sources(self) -> IntArray:
+        """Where each edge starts, shape (E,)."""
+        return self._rows[: len(self), _SOURCE]
+
+    @property
+    def targets(self) -> IntArray:
+        """Where each edge ends, shape (E,)."""
+        return self._rows[: len(self), _TARGET]
+
+    @property
+    def counts(self) -> IntArray:
+        """How often each edge was taken, shape (E,)."""
+        return self._rows[: len(self), _COUNT]
+
+    @property
+    def mean_s(self) -> FloatArray:
+        """Mean duration of each edge, shape (E,) [s]."""
+        return self._rows[: len(self), _TOTAL_MS] / self.counts / 1e3
+
+    @property
+    def std_s(self) -> FloatArray:
+        """Standard deviation of each edge's duration, shape (E,) [s]."""
+        squares = self._rows[: len(self), _SQUARES_MS2] / self.counts / 1e6
+        return np.sqrt(np.maximum(squares - self.mean_s**2, 0.0))
+
+    def count(self, source: int, target: int) -> int:
+        """How often an edge was taken; 0 where never."""
+        row = self._row_of.get((source, target))
+        return 0 if row is None else int(self._rows[row, _COUNT])
+
+    def duration_s(self, source: int, target: int) -> float:
+        """Mean duration of an edge [s]; NaN where it was never taken."""
+        row = self._row_of.get((source, target))
+        if row is None:
+            return float("nan")
+        return float(self._rows[row, _TOTAL_MS] / self._rows[row, _COUNT] / 1e3)
+
+    def observe(self, source: int, target: int, duration_s: float) -> None:
+        """Count an edge once.
+
+        Raises:
+            InvalidValueError: The duration is not in [0, 86400] s.
+        """
+        if not 0.0 <= duration_s <= _LONGEST_S:  # NaN fails too
+            raise InvalidValueError(
+                f"a transition's duration_s must lie in [0, {_LONGEST_S:g}], not {duration_s}"
+            )
+        milliseconds = round(duration_s * 1e3)
+        self._add((source, target), np.array([1, milliseconds, milliseconds**2]))
+
+    def add(self, rows: IntArray) -> None:
+        """Add rows, shape (E, 5), as `rows` returns them."""
+        for row in rows:
+            self._add((int(row[_SOURCE]), int(row[_TARGET])), row[_COUNT:])
+
+    def without(self, gone: BoolArray) -> EdgeTable:
+        """Return the table less the edges marked in ``gone``, shape (E,)."""
+        rest = EdgeTable()
+        rest.add(self.rows[~gone])
+        return rest
+
+    def renamed(self, new_id: dict[int, int]) -> EdgeTable:
+        """Return the table with ids replaced as ``new_id`` says; rows that meet are added."""
+        rows = self.rows
+        for column in (_SOURCE, _TARGET):
+            rows[:, column] = [new_id.get(int(old), int(old)) for old in rows[:, column]]
+        table = EdgeTable()
+        table.add(rows)
+        return table
+
+    def _add(self, edge: tuple[int, int], amounts: IntArray) -> None:
+        row = self._row_of.get(edge)
+        if row is None:
+            row = len(self._row_of)
+            if row == len(self._rows):
+                self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
+            self._rows[row, : _TARGET + 1] = edge
+            self._row_of[edge] = row
+        self._rows[row, _COUNT:] += amounts

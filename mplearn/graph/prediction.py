@@ -1,0 +1,65 @@
+"""What comes next: counts of every order, each smoothed by what the next lower one predicts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from ..recording import FloatArray
+from .counts import TransitionCounts
+
+History: TypeAlias = Sequence[int | None]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A primitive that may come next.
+
+    Attributes:
+        id: The primitive.
+        probability: How likely it is, in [0, 1].
+        duration_s: Mean time from the start of the last primitive of the history until this one
+            starts [s]; NaN where that transition has never been seen.
+    """
+
+    id: int
+    probability: float
+    duration_s: float
+
+
+def usable_context(history: History, order: int) -> tuple[int, ...]:
+    """Return the latest primitives, at most ``order``, that no unrecognised segment breaks off."""
+    latest = tuple(history[max(len(history) - order, 0) :])
+    after_gap = max((t + 1 for t, id in enumerate(latest) if id is None), default=0)
+    return tuple(id for id in latest[after_gap:] if id is not None)
+
+
+def backed_off(counts: TransitionCounts, context: tuple[int, ...], mass: float) -> FloatArray:
+    """Return p(next | context), shape (n,), by a hierarchy of Dirichlet priors [MacKay1995].
+
+    ``p_k(x) = (c(h_k, x) + m p_{k-1}(x)) / (c(h_k) + m)`` from equal shares upwards, where h_0 is
+    the empty history. With m = 0 the longest history that has been seen decides alone.
+    """
+    n = len(counts)
+    p = np.full(n, 1.0 / n) if n else np.zeros(0)
+    for length in range(len(context) + 1):
+        seen = counts.followers(context[len(context) - length :])
+        if seen.any():
+            p = (seen + mass * p) / (seen.sum() + mass)
+    return p
+
+
+def surprise(counts: TransitionCounts, sequence: History) -> FloatArray:
+    """Return log p(x_t | x_1..x_{t-1}), shape (len(sequence) - 1,); NaN where x_t is None."""
+    scores = np.full(max(len(sequence) - 1, 0), np.nan)
+    known = {context: i for i, context in enumerate(counts.ids)}
+    for t, next_id in enumerate(sequence[1:], start=1):
+        if next_id is not None:
+            context = usable_context(sequence[:t], counts.order)
+            p = backed_off(counts, context, counts.concentration)
+            scores[t - 1] = math.log(p[known[next_id]])
+    return scores
