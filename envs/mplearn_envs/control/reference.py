@@ -1,0 +1,168 @@
+"""The kinematic reference robot: a robot's arrays, its stance, and where it is in its motion."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mplearn.errors import RobotError
+from mplearn.recording import FloatArray, IntArray
+
+from ..robot import Robot
+from .kinematics import MassTree, forward, mass_tree
+from .velocity_ik import Stance, settle
+
+N_BASE = 3  # base height, roll, pitch
+
+
+class ReferenceRobot(NamedTuple):
+    """A robot as the kernels need it: U tracked coordinates are base height, roll, pitch, then joints.
+
+    Attributes:
+        tree: Kinematics and masses.
+        stance: Both feet on the floor, symmetric about the origin.
+        upper: Hinges that are tracked, shape (U - 3,).
+        limits: Smallest and largest value of the tracked coordinates, shape (U, 2) [m, rad].
+        velocity: Their velocity limits, shape (U,) [m/s, rad/s].
+        standing_height: Base height with straight legs, to which features refer [m].
+        stance_height: Base height in the standing posture (knees a little bent) [m].
+        rest: Standing posture, arms hanging, shape (7 + n,).
+    """
+
+    tree: MassTree
+    stance: Stance
+    upper: IntArray
+    limits: FloatArray
+    velocity: FloatArray
+    standing_height: float
+    stance_height: float
+    rest: FloatArray
+
+
+class Reference(NamedTuple):
+    """Where the reference robot is, from which the next motion starts.
+
+    Attributes:
+        target: Tracked coordinates, shape (U,) [m, rad]; the height as the features have it.
+        velocity: Their velocities, shape (U,) [m/s, rad/s].
+        q: The whole posture, shape (7 + n,).
+    """
+
+    target: FloatArray
+    velocity: FloatArray
+    q: FloatArray
+
+
+@njit(cache=True)
+def base_rotation(roll: float, pitch: float) -> FloatArray:
+    """Return the base's orientation without heading, R_y(pitch) R_x(roll), shape (3, 3)."""
+    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
+    return np.array([[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]])
+
+
+@lru_cache(maxsize=8)
+def reference_robot(robot: Robot) -> ReferenceRobot:
+    """Return the arrays of a robot, standing with its knees bent by ``stance_knee_rad``.
+
+    Raises:
+        RobotError: The robot cannot stand so that its COG is over its feet.
+    """
+    model = robot.model()
+    tree = mass_tree(model)
+    names = robot.joint_names
+    body = {model.body(i).name: i - 1 for i in range(1, model.nbody)}
+    feet = np.array([body[n] for n in robot.feet])
+    thighs = np.array([body[n] for n in robot.thighs])
+    knees = [names.index(n) for n in robot.knees]
+
+    straight = np.zeros(7 + len(names))
+    straight[3] = 1.0
+    sole = lowest_sole(robot, straight)
+    straight[2] = -sole
+    pose = forward(tree, straight)
+    centre = 0.5 * (pose.position[feet[0]] + pose.position[feet[1]])
+    straight[:2] -= centre[:2]
+    pose = forward(tree, straight)
+
+    reach, crouch = np.empty(2), np.empty(2)
+    for angle, out in ((robot.guard_knee_rad, reach), (robot.stance_knee_rad, crouch)):
+        bent = straight.copy()
+        bent[[7 + k for k in knees]] = angle
+        moved = forward(tree, bent).position
+        out[:] = np.linalg.norm(moved[thighs] - moved[feet], axis=1)
+    limits = robot.position_limits
+    stance = Stance(
+        robot.leg_joints,
+        np.repeat(np.arange(2), [len(leg) for leg in robot.legs]),
+        limits[robot.leg_joints].copy(),
+        feet,
+        thighs,
+        pose.position[feet],
+        pose.rotation[feet],
+        reach,
+        sole_centre(robot, straight),
+    )
+    length = np.linalg.norm(pose.position[thighs] - pose.position[feet], axis=1)
+    stance_height = float(straight[2] - np.max(length - crouch))
+    guess = straight.copy()
+    guess[2] = stance_height
+    guess[[7 + k for k in knees]] = robot.stance_knee_rad
+    rest, worst = settle(tree, stance, guess, stance_height, np.eye(3), 1e-10, 50)
+    if worst > 1e-6:
+        raise RobotError(f"robot {robot.name!r} cannot stand: its feet or COG miss by {worst:.3g} m")
+    upper = robot.upper_joints
+    lowest = 0.45 * straight[2]
+    base_limits = np.array([[lowest, straight[2]], [-0.6, 0.6], [-0.6, 1.6]])
+    return ReferenceRobot(
+        tree,
+        stance,
+        upper,
+        np.vstack((base_limits, limits[upper])),
+        np.concatenate((robot.base_velocity, robot.per_joint("velocity")[upper])),
+        float(straight[2]),
+        stance_height,
+        rest,
+    )
+
+
+def rest_reference(robot: Robot) -> Reference:
+    """Return the reference of a robot that stands still, arms hanging."""
+    ref = reference_robot(robot)
+    target = np.zeros(len(ref.limits))
+    target[0] = ref.standing_height
+    return Reference(target, np.zeros_like(target), ref.rest)
+
+
+def sole_corners(robot: Robot) -> FloatArray:
+    """Return the lower corners of both soles in their feet's frames, shape (2, 4, 3) [m]."""
+    model = robot.model()
+    out = np.empty((2, 4, 3))
+    for side, geom in enumerate(("sole_l", "sole_r")):
+        half, centre = model.geom(geom).size, model.geom(geom).pos
+        signs = np.array([[1, 1, -1], [1, -1, -1], [-1, -1, -1], [-1, 1, -1]])
+        out[side] = centre + signs * half
+    return out
+
+
+def soles(robot: Robot, q: FloatArray) -> FloatArray:
+    """Return the lower corners of both soles in posture ``q``, world frame, shape (2, 4, 3) [m]."""
+    model = robot.model()
+    pose = forward(mass_tree(model), q)
+    feet = [model.body(n).id - 1 for n in robot.feet]
+    local = sole_corners(robot)
+    return np.stack(
+        [local[s] @ pose.rotation[f].T + pose.position[f] for s, f in enumerate(feet)]
+    )
+
+
+def lowest_sole(robot: Robot, q: FloatArray) -> float:
+    """Return the height of the lowest corner of the soles [m]."""
+    return float(soles(robot, q)[..., 2].min())
+
+
+def sole_centre(robot: Robot, q: FloatArray) -> FloatArray:
+    """Return the middle of both soles on the floor, shape (2,) [m]."""
+    return soles(robot, q)[..., :2].mean(axis=(0, 1))
