@@ -1,0 +1,15 @@
+"""Left-right hidden Markov models of motions, in log space."""
+
+from .distance import distance as distance
+from .distance import distance_matrix as distance_matrix
+from .fit import fit as fit
+from .interchange import from_hmmlearn as from_hmmlearn
+from .interchange import to_hmmlearn as to_hmmlearn
+from .model import LeftRightHMM as LeftRightHMM
+from .selection import SizeSelection as SizeSelection
+from .selection import select_size as select_size
+from .sequences import SequenceBatch as SequenceBatch
+from .stack import ModelStack as ModelStack
+from .stack import score_batch as score_batch
+from .stack import score_pairs as score_pairs
+from .statistics import Statistics as Statistics

@@ -1,0 +1,107 @@
+"""Many models as one block of arrays, and the scores of all of them on all sequences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..errors import ModelError
+from ..recording import FloatArray, IntArray
+from . import kernels
+from .sequences import SequenceBatch
+
+if TYPE_CHECKING:
+    from .model import LeftRightHMM
+
+# multiply-adds from which on waking the other cores is worth its cost
+_WORTH_THREADS = 20_000_000
+
+
+class ModelStack(NamedTuple):
+    """Models side by side, padded to the largest.
+
+    Attributes:
+        means: Shape (M, N, D).
+        variances: Shape (M, N, D).
+        log_stay: Shape (M, N).
+        log_next: Shape (M, N).
+        n_states: States that are not padding, shape (M,).
+    """
+
+    means: FloatArray
+    variances: FloatArray
+    log_stay: FloatArray
+    log_next: FloatArray
+    n_states: IntArray
+
+    @classmethod
+    def of(cls, models: Sequence[LeftRightHMM]) -> ModelStack:
+        """Stack models of any number of states over the same channels.
+
+        Raises:
+            ModelError: There is none, or their numbers of channels differ.
+        """
+        widths = sorted({model.n_channels for model in models})
+        if len(widths) != 1:
+            raise ModelError(f"models must share one number of channels, not {widths}")
+        n_states = np.array([model.n_states for model in models], dtype=np.int64)
+        shape = (len(models), int(n_states.max()), widths[0])
+        means, variances = np.zeros(shape), np.ones(shape)
+        log_stay, log_next = np.zeros(shape[:2]), np.full(shape[:2], -np.inf)
+        for m, model in enumerate(models):
+            means[m, : model.n_states] = model.means
+            variances[m, : model.n_states] = model.variances
+            log_stay[m, : model.n_states] = model.log_stay
+            log_next[m, : model.n_states] = model.log_next
+        return cls(means, variances, log_stay, log_next, n_states)
+
+    @property
+    def n_models(self) -> int:
+        """Number of models M."""
+        return len(self.n_states)
+
+
+def score_batch(
+    models: Sequence[LeftRightHMM],
+    sequences: Sequence[FloatArray],
+    weights: Sequence[FloatArray] | None = None,
+    *,
+    complete: bool = True,
+) -> FloatArray:
+    """Return log P(O_s | lambda_m) of every model on every sequence, shape (M, S).
+
+    Runs on all cores where the work is large; the result does not depend on it.
+
+    Args:
+        models: M models over the same channels.
+        sequences: S sequences of shape (T_s, D).
+        weights: Weight of each frame, shape (T_s,) each.
+        complete: Whether motions must end in the last state, see `LeftRightHMM`.
+
+    Raises:
+        ModelError: The models' widths differ from each other or from the sequences'.
+    """
+    stack, batch = ModelStack.of(models), SequenceBatch.of(sequences, weights)
+    pairs = np.indices((stack.n_models, batch.n_sequences)).reshape(2, -1).T
+    return score_pairs(stack, batch, pairs, complete=complete).reshape(stack.n_models, -1)
+
+
+def score_pairs(
+    stack: ModelStack, batch: SequenceBatch, pairs: IntArray, *, complete: bool = True
+) -> FloatArray:
+    """Return log P(O_s | lambda_m) of the pairs (m, s), shape (P, 2) -> (P,).
+
+    Raises:
+        ModelError: Models and sequences differ in their channels.
+    """
+    if stack.means.shape[2] != batch.n_channels:
+        raise ModelError(
+            f"models of {stack.means.shape[2]} channels cannot score {batch.n_channels}"
+        )
+    pairs = np.ascontiguousarray(pairs, dtype=np.int64)
+    lengths = np.diff(batch.offsets)
+    work = int(lengths[pairs[:, 1]].sum()) * stack.means[0].size
+    kernel = kernels.score_pairs_parallel if work > _WORTH_THREADS else kernels.score_pairs
+    return np.asarray(kernel(tuple(stack), tuple(batch[1:]), pairs, complete))
