@@ -1,7 +1,9 @@
 """Segmentation of a stream of motion into candidates for primitives, on-line."""
 
 from .base import Segmenter as Segmenter
+from .kohlmorgen_lemm import KohlmorgenLemm as KohlmorgenLemm
+from .kohlmorgen_lemm import KohlmorgenLemmConfig as KohlmorgenLemmConfig
 from .registry import SEGMENTERS as SEGMENTERS
 from .registry import make_segmenter as make_segmenter
+from .speed import ZeroVelocityConfig as ZeroVelocityConfig
 from .zero_velocity import ZeroVelocity as ZeroVelocity
-from .zero_velocity import ZeroVelocityConfig as ZeroVelocityConfig

@@ -1,14 +1,10 @@
-"""What every segmenter is: it takes one frame at a time and returns the segments that just closed."""
+"""What every segmenter is: it takes one frame at a time and returns the segments just closed."""
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from typing import Any
 
-import numpy as np
-
-from ..errors import FrameError, InvalidValueError
 from ..recording import FloatArray, Segment
 
 
@@ -55,93 +51,3 @@ class Segmenter(ABC):
 def frames_of(seconds: float, rate_hz: float) -> int:
     """Return a duration [s] as a number of frames, at least one."""
     return max(1, round(seconds * rate_hz))
-
-
-class KernelSegmenter(Segmenter):
-    """A segmenter whose state is a set of arrays, and whose step is one compiled call.
-
-    A subclass fills `_arrays` in `_reset`, advances them in `_step`, which returns how many rows
-    ``start, end, confidence, decided_at, still`` it wrote to `_out` (-1: the frame is not finite,
-    nothing has changed), and tells what is open in `_open`.
-    """
-
-    _arrays: dict[str, Any]
-
-    def __init__(self, n_channels: int, rate_hz: float) -> None:
-        if n_channels < 1:
-            raise InvalidValueError(f"n_channels must be at least 1, not {n_channels}")
-        if not (math.isfinite(rate_hz) and 10.0 <= rate_hz <= 1000.0):
-            raise InvalidValueError(f"rate_hz must lie in [10, 1000], not {rate_hz}")
-        self.n_channels = n_channels
-        self.rate_hz = rate_hz
-        self._out = np.zeros((4, 5))
-
-    @abstractmethod
-    def _reset(self) -> None: ...
-
-    @abstractmethod
-    def _step(self, frame: FloatArray) -> int: ...
-
-    @abstractmethod
-    def _open(self) -> Segment | None: ...
-
-    def update(self, frame: FloatArray) -> list[Segment]:
-        """Take one frame, shape (D,), and return the segments that are closed by now (often none).
-
-        Raises:
-            FrameError: The frame has the wrong width, or is not finite; nothing has changed then.
-        """
-        try:
-            frame = np.ascontiguousarray(frame, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise FrameError(f"a frame must be {self.n_channels} numbers: {error}") from None
-        if frame.shape != (self.n_channels,):
-            raise FrameError(f"a frame must have shape ({self.n_channels},), not {frame.shape}")
-        n = self._step(frame)
-        if n == 0:
-            return []
-        if n < 0:
-            bad = np.flatnonzero(~np.isfinite(frame))
-            raise FrameError(
-                f"{len(bad)} of {self.n_channels} channels are not finite (the first is channel "
-                f"{bad[0]}: {frame[bad[0]]}); fill gaps before segmenting"
-            )
-        return [
-            Segment(int(row[0]), int(row[1]), float(row[2]), int(row[3]), bool(row[4]))
-            for row in self._out[:n]
-        ]
-
-    def flush(self) -> list[Segment]:
-        """Close what is open, as at the end of a stream, and start afresh at frame 0."""
-        last = self._open()
-        self._reset()
-        return [] if last is None else [last]
-
-    def state(self) -> dict[str, Any]:
-        """Return the whole state as plain values and arrays; `load_state` resumes bit for bit."""
-        arrays = {name: array.copy() for name, array in self._arrays.items()}
-        return {"segmenter": type(self).__name__, "rate_hz": self.rate_hz, **arrays}
-
-    def load_state(self, state: dict[str, Any]) -> None:
-        """Resume from what `state` returned.
-
-        Raises:
-            InvalidValueError: The state belongs to another kind, rate or width of segmenter.
-        """
-        own = {"segmenter": type(self).__name__, "rate_hz": self.rate_hz}
-        for key, value in own.items():
-            if state.get(key) != value:
-                raise InvalidValueError(
-                    f"the state's {key} must be {value!r}, not {state.get(key)!r}"
-                )
-        loaded = {}
-        for name, array in self._arrays.items():
-            if name not in state:
-                raise InvalidValueError(f"the state lacks {name!r}")
-            value = np.array(state[name], dtype=array.dtype)
-            if value.shape != array.shape:
-                raise InvalidValueError(
-                    f"the state's {name!r} must have shape {array.shape}, not {value.shape}"
-                )
-            loaded[name] = value
-        self._arrays = loaded

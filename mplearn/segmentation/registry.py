@@ -6,9 +6,14 @@ from collections.abc import Callable
 
 from ..errors import InvalidValueError
 from .base import Segmenter
+from .kohlmorgen_lemm import KohlmorgenLemm, KohlmorgenLemmConfig
 from .zero_velocity import ZeroVelocity
 
 SEGMENTERS: dict[str, Callable[[int, float], Segmenter]] = {
+    "kohlmorgen-lemm": KohlmorgenLemm,
+    "kohlmorgen-lemm-posture": lambda n_channels, rate_hz: KohlmorgenLemm(
+        n_channels, rate_hz, KohlmorgenLemmConfig.posture()
+    ),
     "zero-velocity": ZeroVelocity,
 }
 

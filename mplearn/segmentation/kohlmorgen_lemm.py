@@ -1,0 +1,197 @@
+"""Kohlmorgen-Lemm segmentation: windows of the stream as states of a hidden Markov model.
+
+The distance between windows is the integrated square error of their densities (`windows`); the
+cheapest sequence of states is found as the windows come in (`viterbi`), and every change of state is
+a candidate for a boundary. [Kulic2012], section 2.1; [KohlmorgenLemm2001]; first in, first out after
+[Janus2006].
+
+What the densities are taken over decides what is found. Over *postures*, as the paper has it, the
+distribution changes most in the middle of a movement. Over the *direction of motion*, a unit vector,
+it changes where people see a boundary: at the turn. There a change of state is taken as evidence,
+and the boundary is set, and confirmed, by the minimum of the speed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from ..errors import InvalidValueError
+from ..recording import FloatArray
+from .base import frames_of
+from .kohlmorgen_lemm_steps import step_direction, step_posture
+from .speed import ZeroVelocityConfig
+from .speed_segmenter import SpeedSegmenter
+from .viterbi import path_arrays
+from .windows import window_arrays
+
+Density = Literal["direction", "posture"]
+
+
+@dataclass(frozen=True)
+class KohlmorgenLemmConfig:
+    """Settings of `KohlmorgenLemm`; times in seconds.
+
+    Attributes:
+        density: What the densities are taken over.
+        embedding: Number m of frames that make up one point.
+        delay_s: Time tau between them [s].
+        window_s: Length W of a window [s].
+        fifo_s: Time over which windows are kept as states [s].
+        switch_cost_s: Cost C of a change of state, times the frame interval: that of being at
+            distance 1 for this long [s].
+        sigma: Width of the kernels. For directions absolute, they have unit length; for postures a
+            multiple of the running mean distance of a point to its nearest neighbours.
+        neighbours_s: The number of those neighbours, as a stretch of frames [s].
+        exact: Whether the path is found by dynamic programming over all states of the FIFO in
+            every frame, instead of by the on-line recursion; the cost grows with its square.
+        still_direction: For directions: motion slower than this share of the running speed loses
+            its direction.
+        hysteresis_turned: For directions: a minimum of the speed where the state changes is a
+            boundary if it lies below this share of both peaks; elsewhere
+            ``zero_velocity.hysteresis`` holds.
+        tolerance_s: How far from the minimum the change of state may lie [s].
+        zero_velocity: How the speed is watched.
+    """
+
+    density: Density = "direction"
+    embedding: int = 1
+    delay_s: float = 0.02
+    window_s: float = 0.06
+    fifo_s: float = 2.0
+    switch_cost_s: float = 0.05
+    sigma: float = 1.2
+    neighbours_s: float = 0.1
+    exact: bool = False
+    still_direction: float = 0.05
+    hysteresis_turned: float = 0.5
+    tolerance_s: float = 0.15
+    zero_velocity: ZeroVelocityConfig = field(default_factory=ZeroVelocityConfig)
+
+    def __post_init__(self) -> None:
+        if self.density not in ("direction", "posture"):
+            raise InvalidValueError(
+                f"density must be 'direction' or 'posture', not {self.density!r}"
+            )
+        if self.embedding < 1:
+            raise InvalidValueError(f"embedding must be at least 1, not {self.embedding}")
+        for name in (
+            "delay_s",
+            "window_s",
+            "switch_cost_s",
+            "sigma",
+            "neighbours_s",
+            "still_direction",
+            "tolerance_s",
+        ):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise InvalidValueError(f"{name} must be positive, not {getattr(self, name)}")
+        if not 0 < self.hysteresis_turned < 1:
+            raise InvalidValueError(
+                f"hysteresis_turned must lie in (0, 1), not {self.hysteresis_turned}"
+            )
+        if not self.fifo_s >= 4 * self.window_s:
+            raise InvalidValueError(
+                f"fifo_s must be at least 4 window_s ({4 * self.window_s}), not {self.fifo_s}"
+            )
+
+    @classmethod
+    def posture(cls) -> KohlmorgenLemmConfig:
+        """Return the settings for the densities of the paper, over embedded postures."""
+        return cls(
+            density="posture",
+            embedding=3,
+            delay_s=0.03,
+            window_s=0.3,
+            fifo_s=5.0,
+            switch_cost_s=0.1,
+            sigma=2.0,
+        )
+
+
+SETTINGS = np.dtype(
+    [
+        ("delay", "i8"),
+        ("window", "i8"),
+        ("cost", "f8"),
+        ("sigma", "f8"),
+        ("neighbours", "i8"),
+        ("exact", "i8"),
+        ("still_direction", "f8"),
+        ("hysteresis", "f8"),
+        ("hysteresis_turned", "f8"),
+        ("tolerance", "i8"),
+        ("forget", "f8"),
+    ]
+)
+
+
+class KohlmorgenLemm(SpeedSegmenter):
+    """Cuts where the density of the motion changes.
+
+    Args:
+        n_channels: Width D of a frame.
+        rate_hz: Frames per second [1/s].
+        config: Settings.
+
+    Raises:
+        InvalidValueError: An argument is out of range.
+    """
+
+    def __init__(
+        self, n_channels: int, rate_hz: float, config: KohlmorgenLemmConfig | None = None
+    ) -> None:
+        self.config = config = config or KohlmorgenLemmConfig()
+        super().__init__(n_channels, rate_hz, config.zero_velocity)
+        self._model = settings = np.zeros(1, dtype=SETTINGS)
+        settings["delay"] = frames_of(config.delay_s, rate_hz)
+        settings["window"] = max(2, frames_of(config.window_s, rate_hz))
+        settings["cost"] = config.switch_cost_s * rate_hz
+        settings["neighbours"] = frames_of(config.neighbours_s, rate_hz)
+        settings["tolerance"] = frames_of(config.tolerance_s, rate_hz)
+        settings["forget"] = 1.0 / frames_of(config.zero_velocity.memory_s, rate_hz)
+        settings["hysteresis"] = config.zero_velocity.hysteresis
+        for name in ("sigma", "exact", "still_direction", "hysteresis_turned"):
+            settings[name] = getattr(config, name)
+        self._step_kernel = step_direction if config.density == "direction" else step_posture
+        self._reset()
+
+    def _reset(self) -> None:
+        super()._reset()
+        length = int(self._model["window"][0])
+        count = max(4 * length, frames_of(self.config.fifo_s, self.rate_hz))
+        size = count + length
+        span = (self.config.embedding - 1) * int(self._model["delay"][0]) + 1
+        speeds = (
+            int(self._settings["longest"][0]) + size if self._step_kernel is step_posture else 1
+        )
+        self._arrays.update(window_arrays(self.config.embedding * self.n_channels, length, count))
+        self._arrays.update(path_arrays(size))
+        self._arrays["history"] = np.zeros((span, self.n_channels))
+        self._arrays["speeds"] = np.zeros(speeds)
+        self._arrays["spread"] = np.zeros(3)  # running mean, mean square; the sigma in use
+        self._arrays["matrix"] = np.zeros((size, size) if self.config.exact else (1, 1))
+
+    def _step(self, frame: FloatArray) -> int:
+        a: dict[str, Any] = self._arrays
+        return int(
+            self._step_kernel(
+                frame,
+                self._filter,
+                self._model,
+                self._settings,
+                a["memory"],
+                a["state"],
+                (a["points"], a["kernel_rows"], a["row_sums"], a["self_sums"], a["squared"]),
+                a["distances"],
+                (a["costs"], a["entered"], a["best_costs"], a["best_entered"]),
+                a["matrix"],
+                a["history"],
+                a["speeds"],
+                a["spread"],
+                self._out,
+            )
+        )
