@@ -1,0 +1,84 @@
+"""Forward kinematics of recorded skeletons, over all frames at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..recording import FloatArray
+
+_IDENTITY = np.eye(3)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint of a skeleton, at the near end of the bone that carries its name.
+
+    Its frame is ``R_parent @ before @ R(axis_1) @ R(axis_2) ... @ after``.
+
+    Attributes:
+        name: Name of the joint.
+        parent: Index of its parent, which stands before it; -1 for the root.
+        offset: Its place in the parent's frame, shape (3,) [m].
+        rotations: Axis (3,) and column of the values [rad] of each rotation, outermost first.
+        translations: Axis 0-2 and column [m] of each moving coordinate; they replace the offset's.
+        before: Rotation from the parent's frame to that of the angles, shape (3, 3).
+        after: Rotation from the frame of the angles to the bone's, shape (3, 3).
+    """
+
+    name: str
+    parent: int
+    offset: FloatArray
+    rotations: tuple[tuple[FloatArray, int], ...] = ()
+    translations: tuple[tuple[int, int], ...] = ()
+    before: FloatArray = field(default_factory=lambda: _IDENTITY)
+    after: FloatArray = field(default_factory=lambda: _IDENTITY)
+
+
+def joint_positions(joints: tuple[Joint, ...], values: FloatArray) -> FloatArray:
+    """Return where all joints are.
+
+    Args:
+        joints: J joints, parents first.
+        values: Angles [rad] and translations [m], shape (T, C).
+
+    Returns:
+        Positions in the root's world, shape (T, J, 3) [m].
+    """
+    positions = np.empty((len(values), len(joints), 3))
+    frames: list[FloatArray] = []
+    for index, joint in enumerate(joints):
+        place = np.broadcast_to(joint.offset, (len(values), 3))
+        if joint.translations:
+            place = place.copy()
+            for axis, column in joint.translations:
+                place[:, axis] = values[:, column]
+        rotation = joint.before
+        for direction, column in joint.rotations:
+            rotation = rotation @ rotation_about(direction, values[:, column])
+        rotation = rotation @ joint.after  # (3, 3) or (T, 3, 3)
+        if joint.parent < 0:
+            positions[:, index] = place
+        else:
+            parent = frames[joint.parent]
+            positions[:, index] = positions[:, joint.parent] + (parent @ place[..., None])[..., 0]
+            rotation = parent @ rotation
+        frames.append(rotation)
+    return positions
+
+
+def rotation_about(axis: FloatArray, angles: FloatArray) -> FloatArray:
+    """Return the rotations about an axis (Rodrigues' formula).
+
+    Args:
+        axis: Unit vector, shape (3,).
+        angles: Shape (T,) [rad].
+
+    Returns:
+        Rotation matrices, shape (T, 3, 3).
+    """
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sine, versine = np.sin(angles)[:, None, None], (1.0 - np.cos(angles))[:, None, None]
+    return _IDENTITY + sine * cross + versine * (cross @ cross)

@@ -1,0 +1,94 @@
+"""What every reader is: it turns one file of its format into a recording."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from ..errors import InvalidValueError, RecordingError
+from ..recording import Recording
+from .files import stem
+
+
+@dataclass(frozen=True)
+class Hints:
+    """What a file does not say about itself, or says wrongly: a value given here wins.
+
+    Attributes:
+        rate_hz: Frames per second at which the file was recorded [1/s].
+        unit_m: Length of the file's unit of length [m].
+        up_axis: The file's vertical axis: ``"x"``, ``"y"`` or ``"z"``.
+        skeleton: The ASF file that belongs to an AMC file.
+    """
+
+    rate_hz: float | None = None
+    unit_m: float | None = None
+    up_axis: str | None = None
+    skeleton: Path | str | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("rate_hz", "unit_m"):
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and value > 0):
+                raise InvalidValueError(f"{name} must be positive and finite, not {value}")
+        if self.up_axis not in (None, "x", "y", "z"):
+            raise InvalidValueError(f"up_axis must be 'x', 'y' or 'z', not {self.up_axis!r}")
+
+
+class Reader(ABC):
+    """Reads one format.
+
+    Attributes:
+        suffixes: The file suffixes of the format, lower case, without ``.gz``.
+    """
+
+    suffixes: ClassVar[tuple[str, ...]]
+
+    @abstractmethod
+    def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
+        """Read one file, plain or gzipped.
+
+        Args:
+            path: The file.
+            hints: What the file does not say about itself.
+            positions: Joint-centre positions instead of joint angles, for skeletal formats.
+
+        Returns:
+            Markers or positions [m], z up, or joint angles [rad], at the file's own rate.
+
+        Raises:
+            RecordingError: The file does not hold what its format promises.
+        """
+
+    def accepts(self, path: Path) -> bool:
+        """Whether a file with the right suffix is named like a recording of the format."""
+        return True
+
+    def takes(self, paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:
+        """Group the accepted files of a folder into takes, by name: one file is one take."""
+        named: dict[str, tuple[Path, ...]] = {}
+        for path in paths:
+            if stem(path) in named:
+                raise RecordingError(
+                    f"{path}: the same take lies beside it as {named[stem(path)][0].name!r}; "
+                    "expected each take once"
+                )
+            named[stem(path)] = (path,)
+        return named
+
+
+def joined(name: str, parts: Sequence[Recording]) -> Recording:
+    """Return the parts of one continuous take, one after another, with their labels."""
+    offsets = np.cumsum([0, *(len(part) for part in parts)])
+    labels = tuple(
+        replace(label, start=label.start + int(offset), end=label.end + int(offset))
+        for part, offset in zip(parts, offsets, strict=False)
+        for label in part.labels
+    )
+    frames = np.concatenate([part.frames for part in parts])
+    return replace(parts[0], frames=frames, name=name, labels=labels)
