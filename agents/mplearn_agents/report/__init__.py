@@ -1,0 +1,1 @@
+"""The self-contained page that shows what was learned and how it is performed."""
