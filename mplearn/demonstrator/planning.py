@@ -1,0 +1,128 @@
+"""How a person executes a primitive this time: a `Movement` drawn around the primitive's data."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..recording import FloatArray
+from .channels import CHANNELS, INDEX, UPPER_JOINTS, as_vector
+from .movement import Movement
+from .person import Person
+from .postures import POSTURES, STAND
+from .primitives import Primitive
+from .variability import Variability
+
+_N_UPPER = len(UPPER_JOINTS)
+# balance decides these, not how large a person moves
+_UNSCALED = np.array([name in ("pelvis_y", "pelvis_roll") for name in CHANNELS])
+_PLACED = np.array([name.startswith(("foot_x", "foot_y_")) for name in CHANNELS])
+_TURNED = np.array([name.startswith("foot_yaw") for name in CHANNELS])
+_MARGIN_RAD = 0.1  # kept to the joint limits, for sway and drift
+_LEAD_S = 1.0  # the person stands still before the first motion
+_HIGHEST_REACH_RAD = -3.0  # an arm that is raised forward ends before the vertical
+_LARGEST_OVERLAP = 0.22  # of the shorter of two motions: a foot has landed before the next is lifted
+
+
+class Planner:
+    """Draws movements one after another.
+
+    Args:
+        person: Who moves.
+        variability: Sizes of the variation.
+        leg_m: Length of the person's legs [m].
+        upper_limits: Limits of the `UPPER_JOINTS`, shape (26, 2) [rad].
+        rng: Source of randomness.
+
+    Attributes:
+        planned: Where the channels are once all movements drawn so far have ended, shape (C,).
+    """
+
+    def __init__(
+        self,
+        person: Person,
+        variability: Variability,
+        leg_m: float,
+        upper_limits: FloatArray,
+        rng: np.random.Generator,
+    ) -> None:
+        self._person, self._variability, self._rng = person, variability, rng
+        self._stand = as_vector(STAND)
+        self._rest = self._stand + as_vector(person.rest)
+        self._joint_reach = np.array([person.joint_reach.get(name, 1.0) for name in CHANNELS])
+        self._scatter = np.where(_PLACED, variability.placement_m / leg_m, 0.0)
+        self._scatter[:_N_UPPER] = variability.scatter_rad
+        self._scatter[_TURNED] = variability.scatter_rad
+        low, high = np.full(len(CHANNELS), -np.inf), np.full(len(CHANNELS), np.inf)
+        low[:_N_UPPER], high[:_N_UPPER] = upper_limits.T + [[_MARGIN_RAD], [-_MARGIN_RAD]]
+        for side in "lr":
+            index = INDEX[f"shoulder_pitch_{side}"]
+            low[index] = max(low[index], _HIGHEST_REACH_RAD)
+        self._low, self._high = low, high
+        self.planned = np.clip(self._rest, low, high)
+
+    def _start_s(self, previous: Movement, duration_s: float) -> float:
+        """Draw when a movement of that duration starts after the previous one [s]."""
+        v = self._variability
+        kind, where = self._rng.random(2)
+
+        def within(bounds: tuple[float, float]) -> float:
+            return float(bounds[0] + where * (bounds[1] - bounds[0]))
+
+        if kind < v.fluid:
+            shorter = min(duration_s, previous.end_s - previous.start_s)
+            return previous.end_s - min(within(v.overlap_s), _LARGEST_OVERLAP * shorter)
+        return previous.end_s + within(v.pause_s if kind >= 1.0 - v.pause else v.dwell_s)
+
+    def plan(self, primitive: Primitive, previous: Movement | None) -> Movement:
+        """Draw the next movement, which follows the previous one, if there is one."""
+        v, rng, person = self._variability, self._rng, self._person
+        duration_s = primitive.duration_s * person.tempo.get(primitive.name, 1.0)
+        duration_s *= 1.0 + v.duration * rng.uniform(-1.0, 1.0)
+        start_s = _LEAD_S if previous is None else self._start_s(previous, duration_s)
+        amplitude = 1.0 + v.amplitude * rng.uniform(-1.0, 1.0)
+        target = self._target(primitive, amplitude)
+        channels = np.array([INDEX[name] for name in primitive.active])
+        begin_s, end_s = self._times(primitive, channels, start_s, start_s + duration_s)
+        step = target[channels] - self.planned[channels]
+        self.planned[channels] = target[channels]
+        return Movement(
+            name=primitive.name,
+            start_s=start_s,
+            end_s=start_s + duration_s,
+            channels=channels,
+            begin_s=begin_s,
+            duration_s=end_s - begin_s,
+            step=step,
+            bump=amplitude * as_vector(primitive.bumps)[channels],
+        )
+
+    def _target(self, primitive: Primitive, amplitude: float) -> FloatArray:
+        """Draw the posture in which the primitive ends this time, shape (C,)."""
+        v, rng, person = self._variability, self._rng, self._person
+        change = as_vector(POSTURES[primitive.end]) - self._stand
+        factor = self._joint_reach * (amplitude * person.reach.get(primitive.end, 1.0))
+        factor[:_N_UPPER] *= 1.0 + v.joint_amplitude * rng.uniform(-1.0, 1.0, _N_UPPER)
+        factor[_UNSCALED] = 1.0
+        scatter = self._scatter * rng.standard_normal(len(CHANNELS))
+        return np.clip(self._rest + change * factor + scatter, self._low, self._high)
+
+    def _times(
+        self, primitive: Primitive, channels: np.ndarray, start_s: float, end_s: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Draw when each channel begins and ends, both shape (K,) [s], within the movement.
+
+        The joints of the upper body vary, those of an arm together and each on its own; pelvis and
+        feet keep to the primitive's windows, on which balance rests.
+        """
+        v, rng = self._variability, self._rng
+        lag = np.zeros(len(CHANNELS))
+        lag[:_N_UPPER] += np.where(
+            [name.endswith("_l") for name in UPPER_JOINTS], 0.5, -0.5
+        ) * rng.normal(0.0, v.side_lag_s)
+        lag[: _N_UPPER] *= [name[-2:] in ("_l", "_r") for name in UPPER_JOINTS]
+        jitter = np.zeros((2, len(CHANNELS)))
+        jitter[:, :_N_UPPER] = rng.normal(0.0, v.timing_s, (2, _N_UPPER))
+        windows = np.array([primitive.windows.get(CHANNELS[i], (0.0, 1.0)) for i in channels])
+        times = start_s + windows.T * (end_s - start_s) + (lag + jitter)[:, channels]
+        begin, end = np.clip(times, start_s, end_s)
+        return begin, end
