@@ -1,0 +1,151 @@
+"""Fitting a body to a person: sizes of the segments, places of the markers, the floor.
+
+Half a second of any motion is enough. Postures (given the sizes) and sizes with marker places (given the
+postures) are estimated in turn; with the bodies' orientations known, the second is linear least squares.
+Priors keep what the markers do not tell at its anthropometric value. The paper scaled the markers'
+heights to the robot's ([Kulic2012], 4.2); here the robot's links take the person's lengths instead, so
+that the angles need no compromise, and the base is scaled by the ratio of the legs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mplearn.errors import BodyError
+from mplearn.recording import FloatArray, IntArray
+
+from .body import Body
+from .first_posture import first_posture, place_trunk, settle
+from .sizes import fit_sizes
+from .tree import KinematicTree
+
+ROUNDS = 6
+FRAMES = 12  # postures that the fit takes from the stretch it is given
+WORST_FIT_M = 0.06  # root mean square distance above which the markers are not this body's
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A body fitted to a person.
+
+    Attributes:
+        factors: Size of each body relative to the given body's, shape (B, 3).
+        offsets: Place of each marker in its body's frame, shape (M, 3) [m].
+        scale: Size of the given body relative to the person: ratio of the hips' heights.
+        floor_m: Height of the floor in the recording [m].
+        height_m: Estimated stature of the person [m].
+        residual_m: Root mean square distance of the markers from their places in the fit [m].
+        posture: Posture in the first frame, in the person's size, shape (7 + n,).
+    """
+
+    factors: FloatArray
+    offsets: FloatArray
+    scale: float
+    floor_m: float
+    height_m: float
+    residual_m: float
+    posture: FloatArray
+
+    def state(self) -> dict[str, Any]:
+        """Return the fit as plain values and arrays."""
+        return {
+            name: value.copy() if isinstance(value, np.ndarray) else value
+            for name, value in vars(self).items()
+        }
+
+    @classmethod
+    def from_state(cls, state: dict[str, Any]) -> Calibration:
+        """Return the fit that `state` described."""
+        return cls(**state)
+
+
+def fit(
+    body: Body,
+    names: Sequence[str],
+    bodies: IntArray,
+    template: FloatArray,
+    frames: FloatArray,
+) -> Calibration:
+    """Fit a body to markers.
+
+    Args:
+        body: The body.
+        names: Names of the markers, length M, for messages.
+        bodies: Body of each marker, shape (M,).
+        template: Expected place of each marker in its body's frame, shape (M, 3) [m].
+        frames: Measured positions, shape (T, M, 3) [m]; NaN where missing.
+
+    Raises:
+        BodyError: The markers do not look like a person in metres, upright, z up.
+    """
+    chosen = _choose(frames, names)
+    size, start = place_trunk(body, bodies, template, chosen[0])
+    factors = np.full_like(body.tree.offset, size)
+    offsets = template * size
+    tree = body.tree.scaled(factors)
+    first = first_posture(body, tree, bodies, offsets, start, chosen[0])
+    postures = np.tile(first, (len(chosen), 1))
+    for _ in range(ROUNDS):
+        settle(body, tree, bodies, offsets, postures, chosen)
+        factors, offsets = fit_sizes(body, size, bodies, template, postures, chosen)
+        tree = body.tree.scaled(factors)
+    residuals = settle(body, tree, bodies, offsets, postures, chosen)
+    rms = float(np.sqrt(np.nanmean(residuals**2)))
+    if rms > WORST_FIT_M:
+        worst = np.argsort(-np.nan_to_num(np.nanmean(residuals, axis=0)))[:4]
+        raise BodyError(
+            f"the markers lie {1000 * rms:.0f} mm from where they belong on {body.name!r} "
+            f"({1000 * WORST_FIT_M:.0f} mm allowed), farthest {[names[i] for i in worst]}: are they "
+            f"mirrored, swapped, or of another set?"
+        )
+    standing = tree.rest
+    return Calibration(
+        factors=factors,
+        offsets=offsets,
+        scale=float(body.tree.offset[0, 2] / standing[2]),
+        floor_m=_floor(tree, postures),
+        height_m=float(tree.site_positions(standing)[tree.site_names.index("head_top"), 2]),
+        residual_m=rms,
+        posture=postures[0],
+    )
+
+
+def _choose(frames: FloatArray, names: Sequence[str]) -> FloatArray:
+    """Return up to `FRAMES` frames, spread over the stretch, in which most markers are seen."""
+    if np.isinf(frames).any():
+        raise BodyError("the markers hold infinite values; a missing marker is NaN")
+    seen = np.isfinite(frames).all(axis=2)
+    if not seen.any():
+        raise BodyError(f"none of the {len(names)} markers is seen in any of {len(frames)} frames")
+    good = np.flatnonzero(seen.sum(axis=1) >= 0.8 * seen.any(axis=0).sum())
+    if seen.any(axis=0).mean() < 0.6 or not len(good):
+        unseen = [name for name, ever in zip(names, seen.any(axis=0), strict=True) if not ever]
+        raise BodyError(
+            f"too few markers to calibrate: in the best of {len(frames)} frames "
+            f"{seen.sum(axis=1).max()} of {len(names)} are seen; never seen: {unseen[:8]}"
+        )
+    extent = float(np.max(np.nanmax(frames[good[0]], axis=0) - np.nanmin(frames[good[0]], axis=0)))
+    if not 0.5 < extent < 3.5:
+        hint = "; are they in millimetres?" if extent > 100 else ""
+        raise BodyError(f"the markers span {extent:.3g} m; a person spans 0.5 to 3.5 m{hint}")
+    picks = np.unique(np.linspace(0, len(good) - 1, FRAMES).round().astype(np.int64))
+    return frames[good[picks]]
+
+
+def _floor(tree: KinematicTree, postures: FloatArray) -> float:
+    """Return the height at which the lower foot's sole usually is [m]."""
+    feet = [
+        [
+            i
+            for i, site in enumerate(tree.site_names)
+            if site.startswith("sole_") and site[-1] == side
+        ]
+        for side in "lr"
+    ]
+    heights = np.array([tree.site_positions(q)[:, 2] for q in postures])
+    lower = np.min([heights[:, foot].mean(axis=1) for foot in feet], axis=0)
+    return float(np.median(lower))

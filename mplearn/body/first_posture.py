@@ -1,0 +1,202 @@
+"""The first posture of all, with nothing to start from: trunk by rigid fit, limbs from several starts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mplearn.errors import BodyError
+from mplearn.recording import FloatArray, IntArray
+
+from .body import Body
+from .gauss_newton import Linkage, solve_frame
+from .tree import KinematicTree
+
+TRUNK = ("pelvis", "abdomen", "chest", "clavicle_l", "clavicle_r", "head")
+LEAST_UPRIGHT = 0.35  # cosine of the trunk's lean
+SMALLEST, LARGEST = 0.35, 1.6  # size relative to the body
+MARKER_SIGMA_M, OUTLIER_M = 0.01, 0.15
+
+# where limbs may be in the first frame [deg], for the left; about x and z the right is mirrored
+ARM_STARTS: tuple[dict[str, float], ...] = (
+    {},
+    {"elbow": -90},
+    {"shoulder_pitch": -85},
+    {"shoulder_pitch": -60, "elbow": -100},
+    {"shoulder_roll": 80},
+    {"shoulder_roll": 80, "elbow": -90},
+    {"shoulder_roll": 80, "elbow": -90, "shoulder_yaw": -80},
+    {"shoulder_pitch": -170},
+    {"shoulder_pitch": -150, "elbow": -90},
+)
+LEG_STARTS: tuple[dict[str, float], ...] = (
+    {},
+    {"hip_pitch": -80, "knee": 85},
+    {"hip_pitch": -110, "knee": 125, "ankle_pitch": -25},
+    {"hip_pitch": -60, "knee": 20},
+    {"hip_roll": 40},
+    {"knee": 80},
+)
+
+
+def place_trunk(
+    body: Body, bodies: IntArray, template: FloatArray, frame: FloatArray
+) -> tuple[float, FloatArray]:
+    """Fit the upright body's trunk to the markers: one size, one rotation, one shift.
+
+    Args:
+        body: The body.
+        bodies: Body of each marker, shape (M,).
+        template: Place of each marker in its body's frame, shape (M, 3) [m].
+        frame: Measured positions, shape (M, 3) [m]; NaN where missing.
+
+    Returns:
+        The person's size relative to the body, and the upright posture there, shape (7 + n,).
+
+    Raises:
+        BodyError: Too few trunk markers, or they are not upright, mirrored, or of a strange size.
+    """
+    trunk = [i for i, name in enumerate(body.tree.body_names) if name in TRUNK]
+    rows = np.flatnonzero(np.isin(bodies, trunk) & np.isfinite(frame).all(axis=1))
+    if len(rows) < 4:
+        raise BodyError(
+            f"calibration needs 4 markers on pelvis, chest and head in sight, not {len(rows)}"
+        )
+    expected = body.tree.points(body.rest, bodies[rows], template[rows])
+    measured = frame[rows]
+    a, b = expected - expected.mean(axis=0), measured - measured.mean(axis=0)
+    u, s, vt = np.linalg.svd(b.T @ a)
+    handed = np.sign(np.linalg.det(u @ vt))
+    signs = np.array([1.0, 1.0, handed])
+    turn = (u * signs) @ vt
+    spread = float((a**2).sum())
+    size = float((s * signs).sum() / spread)
+    if handed < 0 and s[2] > 0.02 * spread:
+        raise BodyError(
+            "the markers are mirrored: left and right names are swapped, or an axis points the "
+            "other way"
+        )
+    if not SMALLEST < size < LARGEST:
+        raise BodyError(
+            f"the trunk is {size:.3g} times as large as {body.name!r}'s; {SMALLEST} to {LARGEST} "
+            f"are people, in metres"
+        )
+    if turn[2, 2] < LEAST_UPRIGHT:
+        lean = np.degrees(np.arccos(np.clip(turn[2, 2], -1, 1)))
+        raise BodyError(
+            f"the trunk leans {lean:.0f} deg from upright in the first frames: calibrate on a "
+            f"standing person, with z up"
+        )
+    q = body.rest
+    q[:3] = measured.mean(axis=0) + size * turn @ (q[:3] - expected.mean(axis=0))
+    q[3:7] = _quaternion(turn)
+    return size, q
+
+
+def first_posture(
+    body: Body,
+    tree: KinematicTree,
+    bodies: IntArray,
+    offsets: FloatArray,
+    start: FloatArray,
+    frame: FloatArray,
+) -> FloatArray:
+    """Find the posture of a single frame from the trunk's place: each limb's best of several starts.
+
+    Args:
+        body: The body.
+        tree: Its kinematics in the person's size.
+        bodies: Body of each marker, shape (M,).
+        offsets: Place of each marker, shape (M, 3) [m].
+        start: The upright posture at the trunk's place, shape (7 + n,).
+        frame: Measured positions, shape (M, 3) [m]; NaN where missing.
+    """
+    limbs = [(_below(tree, f"{part}_{s}"), s) for part in ("upper_arm", "thigh") for s in "lr"]
+    n_starts = max(len(ARM_STARTS), len(LEG_STARTS))
+    postures = np.tile(start, (n_starts, 1))
+    for k, q in enumerate(postures):
+        for side in "lr":
+            for name, angle in (
+                ARM_STARTS[k % len(ARM_STARTS)] | LEG_STARTS[k % len(LEG_STARTS)]
+            ).items():
+                mirrored = side == "r" and name.endswith(("roll", "yaw"))
+                joint = f"{name}_{side}"
+                if joint in body.joint_names:
+                    q[7 + body.joint_names.index(joint)] = np.radians(-angle if mirrored else angle)
+    residuals = settle(body, tree, bodies, offsets, postures, np.tile(frame, (n_starts, 1, 1)))
+    best = postures[np.argmin(np.nanmean(residuals**2, axis=1))].copy()
+    for limb, _ in limbs:
+        markers = np.isin(bodies, limb) & np.isfinite(frame).all(axis=1)
+        hinges = np.flatnonzero(np.isin(tree.joint_body, limb))
+        if markers.any() and len(hinges):
+            errors = (residuals[:, markers] ** 2).sum(axis=1) / MARKER_SIGMA_M**2
+            effort = (postures[:, 7 + hinges] ** 2).sum(axis=1)
+            best[7 + hinges] = postures[np.argmin(errors + effort)][7 + hinges]
+    settle(body, tree, bodies, offsets, best[None], frame[None])
+    return best
+
+
+def settle(
+    body: Body,
+    tree: KinematicTree,
+    bodies: IntArray,
+    offsets: FloatArray,
+    postures: FloatArray,
+    frames: FloatArray,
+) -> FloatArray:
+    """Solve each frame by itself from a posture that may be far away, in place.
+
+    Args:
+        body: The body.
+        tree: Its kinematics in the person's size.
+        bodies: Body of each marker, shape (M,).
+        offsets: Place of each marker, shape (M, 3) [m].
+        postures: Where to start, shape (K, 7 + n); the solutions afterwards.
+        frames: Measured positions, shape (K, M, 3) [m]; NaN where missing.
+
+    Returns:
+        Distance of each marker from its place, shape (K, M) [m].
+    """
+    residuals = np.full(frames.shape[:2], np.nan)
+    free = np.array([True] * 6 + [name not in body.held for name in body.joint_names])
+    limits = np.concatenate((np.tile((-np.inf, np.inf), (6, 1)), tree.limits))
+    linkage = Linkage.of(tree)
+    for q, frame, residual in zip(postures, frames, residuals, strict=True):
+        angles = np.concatenate((np.zeros(6), q[7:]))
+        solve_frame(
+            q,
+            np.full(tree.n_dofs, 1.0),
+            np.ascontiguousarray(frame),
+            bodies,
+            offsets,
+            np.full(len(bodies), MARKER_SIGMA_M**-2),
+            linkage,
+            limits[:, 0] - angles,
+            limits[:, 1] - angles,
+            free,
+            np.full(len(tree.axis), 0.1),
+            OUTLIER_M,
+            10.0,
+            0.5,
+            40,
+            1e-4,
+            residual,
+        )
+    return residuals
+
+
+def _below(tree: KinematicTree, name: str) -> list[int]:
+    """Return a body and all that hangs on it."""
+    found = [tree.body(name)]
+    for b in range(found[0] + 1, len(tree.parent)):
+        if tree.parent[b] in found:
+            found.append(b)
+    return found
+
+
+def _quaternion(mat: FloatArray) -> FloatArray:
+    """Return the quaternion (w, x, y, z) of a rotation matrix."""
+    import mujoco
+
+    q = np.empty(4)
+    mujoco.mju_mat2Quat(q, np.ascontiguousarray(mat).ravel())
+    return q

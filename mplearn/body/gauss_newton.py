@@ -1,0 +1,326 @@
+"""One frame of inverse kinematics: a damped Gauss-Newton step, repeated, on the marker errors.
+
+The frame's cost, over postures q between their bounds, is
+
+    sum_m rho(|m - m(q)|) / sigma^2  +  sum_j (q_j - q_j(before))^2 / var_j  +  rest_j (q_j - q_j(rest))^2
+
+with rho(r) = c^2 log(1 + r^2 / c^2) (Cauchy), so that a swapped or flying marker weighs nearly nothing.
+It is the update step of an iterated extended Kalman filter with a diagonal covariance: `var` is what is
+known about the posture before the frame, and the inverse of the last normal matrix is what is known after.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mplearn.recording import BoolArray, FloatArray, IntArray
+
+from .tree import KinematicTree, first_joints, forward_kinematics, integrate, point_jacobian
+
+
+class Linkage(NamedTuple):
+    """The arrays of a tree that the kernel needs; see `KinematicTree`."""
+
+    parent: IntArray
+    offset: FloatArray
+    rotation: FloatArray
+    joint_body: IntArray
+    axis: FloatArray
+    anchor: FloatArray
+    first: IntArray
+
+    @classmethod
+    def of(cls, tree: KinematicTree) -> Linkage:
+        """Take the arrays out of a tree."""
+        return cls(
+            tree.parent,
+            tree.offset,
+            tree.rotation,
+            tree.joint_body,
+            tree.axis,
+            tree.anchor,
+            first_joints(tree.joint_body, len(tree.parent)),
+        )
+
+
+@njit(cache=True)
+def solve_frame(
+    q: FloatArray,
+    variance: FloatArray,
+    markers: FloatArray,
+    bodies: IntArray,
+    offsets: FloatArray,
+    weights: FloatArray,
+    linkage: Linkage,
+    low: FloatArray,
+    high: FloatArray,
+    free: BoolArray,
+    rest_weight: FloatArray,
+    outlier_m: float,
+    widening: float,
+    largest_step: float,
+    max_iterations: int,
+    tolerance: float,
+    residuals: FloatArray,
+) -> int:
+    """Move a posture, in place, to the optimum of one frame's cost.
+
+    Args:
+        q: Posture before the frame, shape (7 + n,); holds the solution afterwards.
+        variance: Of each degree of freedom before the frame, shape (6 + n,); after it afterwards.
+        markers: Measured positions, shape (M, 3) [m]; NaN where missing.
+        bodies: Body that carries each marker, shape (M,).
+        offsets: Markers in their body's frame, shape (M, 3) [m].
+        weights: 1 / sigma^2 of each marker, shape (M,) [1/m^2].
+        linkage: The body's kinematics.
+        low: Lower bounds of the step of each degree of freedom, shape (6 + n,).
+        high: Upper bounds, shape (6 + n,).
+        free: Which degrees of freedom may move, shape (6 + n,).
+        rest_weight: Weight of each hinge's distance from zero, shape (n,).
+        outlier_m: The scale c of the Cauchy loss [m]; infinite for least squares.
+        widening: Factor on c in the first iteration, when the posture is still the last frame's.
+        largest_step: Longest step of one iteration in any degree of freedom [m, rad].
+        max_iterations: When to stop at the latest.
+        tolerance: Stop when no degree of freedom moved further [m, rad].
+        residuals: Distance of each marker from its place, shape (M,) [m], filled; NaN where missing.
+
+    Returns:
+        The number of iterations.
+    """
+    n_bodies, n = len(linkage.parent), len(linkage.axis)
+    dofs = 6 + n
+    pos, mat = np.empty((n_bodies, 3)), np.empty((n_bodies, 3, 3))
+    axes, anchors = np.empty((n, 3)), np.empty((n, 3))
+    points = np.empty_like(markers)
+    jacobian = np.zeros((len(markers), 3, dofs))
+    normal, gradient = np.empty((dofs, dofs)), np.empty(dofs)
+    moved, step = np.zeros(dofs), np.empty(dofs)  # since the last frame; in this iteration
+    iteration = 0
+    while True:
+        locate(q, linkage, bodies, offsets, pos, mat, axes, anchors, points)
+        for m in range(len(markers)):
+            residuals[m] = np.sqrt(
+                (markers[m, 0] - points[m, 0]) ** 2
+                + (markers[m, 1] - points[m, 1]) ** 2
+                + (markers[m, 2] - points[m, 2]) ** 2
+            )
+        if iteration == max_iterations:
+            break
+        point_jacobian(
+            points,
+            bodies,
+            pos[0],
+            mat[0],
+            axes,
+            anchors,
+            linkage.parent,
+            linkage.first,
+            jacobian,
+        )
+        c = outlier_m * widening if iteration == 0 else outlier_m
+        normal_equations(
+            jacobian, markers, points, residuals, bodies, weights, c, linkage, normal, gradient
+        )
+        for i in range(dofs):
+            normal[i, i] += 1.0 / variance[i]
+            gradient[i] -= moved[i] / variance[i]
+            if i >= 6:
+                normal[i, i] += rest_weight[i - 6]
+                gradient[i] -= rest_weight[i - 6] * q[i + 1]
+        bounded_solve(normal, gradient, low - moved, high - moved, free, step)
+        longest = np.max(np.abs(step))
+        if longest > largest_step:
+            step *= largest_step / longest
+        integrate(q, step)
+        moved += step
+        iteration += 1
+        if longest < tolerance:
+            break
+    inverse_diagonal(normal, free, variance)
+    return iteration
+
+
+@njit(cache=True)
+def locate(
+    q: FloatArray,
+    linkage: Linkage,
+    bodies: IntArray,
+    offsets: FloatArray,
+    pos: FloatArray,
+    mat: FloatArray,
+    axes: FloatArray,
+    anchors: FloatArray,
+    points: FloatArray,
+) -> None:
+    """Fill the bodies' places, the hinges' axes and anchors, and the markers' positions."""
+    forward_kinematics(
+        q,
+        linkage.parent,
+        linkage.offset,
+        linkage.rotation,
+        linkage.joint_body,
+        linkage.axis,
+        linkage.anchor,
+        pos,
+        mat,
+        axes,
+        anchors,
+    )
+    for m in range(len(bodies)):
+        b = bodies[m]
+        for i in range(3):
+            points[m, i] = (
+                pos[b, i]
+                + mat[b, i, 0] * offsets[m, 0]
+                + mat[b, i, 1] * offsets[m, 1]
+                + mat[b, i, 2] * offsets[m, 2]
+            )
+
+
+@njit(cache=True)
+def normal_equations(
+    jacobian: FloatArray,
+    markers: FloatArray,
+    points: FloatArray,
+    residuals: FloatArray,
+    bodies: IntArray,
+    weights: FloatArray,
+    c: float,
+    linkage: Linkage,
+    normal: FloatArray,
+    gradient: FloatArray,
+) -> None:
+    """Fill J'WJ (lower triangle) and J'W(error); only the joints above a marker have a part."""
+    normal[:] = 0.0
+    gradient[:] = 0.0
+    chain = np.empty(len(gradient), dtype=np.int64)
+    for m in range(len(markers)):
+        if np.isnan(residuals[m]) or weights[m] == 0.0:
+            continue
+        weight = weights[m] / (1.0 + (residuals[m] / c) ** 2)
+        e0 = weight * (markers[m, 0] - points[m, 0])
+        e1 = weight * (markers[m, 1] - points[m, 1])
+        e2 = weight * (markers[m, 2] - points[m, 2])
+        length = 0
+        b = bodies[m]
+        while b >= 0:
+            for j in range(linkage.first[b + 1] - 1, linkage.first[b] - 1, -1):
+                chain[length] = 6 + j
+                length += 1
+            b = linkage.parent[b]
+        for k in range(5, -1, -1):
+            chain[length] = k
+            length += 1
+        for a in range(length):
+            i = chain[a]
+            x, y, z = jacobian[m, 0, i], jacobian[m, 1, i], jacobian[m, 2, i]
+            gradient[i] += x * e0 + y * e1 + z * e2
+            x, y, z = weight * x, weight * y, weight * z
+            for d in range(a, length):
+                j = chain[d]
+                normal[i, j] += (
+                    x * jacobian[m, 0, j] + y * jacobian[m, 1, j] + z * jacobian[m, 2, j]
+                )
+
+
+@njit(cache=True)
+def bounded_solve(
+    normal: FloatArray,
+    gradient: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    free: BoolArray,
+    step: FloatArray,
+) -> None:
+    """Minimise the quadratic model between bounds: what runs into a bound is fixed there, and so on.
+
+    Args:
+        normal: Symmetric positive definite, its lower triangle, shape (d, d).
+        gradient: Descent direction at zero, shape (d,).
+        low: Lower bounds, shape (d,).
+        high: Upper bounds, shape (d,).
+        free: Unknowns that may move at all, shape (d,).
+        step: The solution, shape (d,), filled.
+    """
+    d = len(gradient)
+    fixed = ~free
+    step[:] = 0.0
+    factor = np.empty_like(normal)
+    solution = np.empty(d)
+    while True:
+        for i in range(d):
+            solution[i] = step[i]
+            if fixed[i]:
+                factor[i, :i] = 0.0
+                factor[i, i] = 1.0
+                continue
+            value = gradient[i]
+            for j in range(d):
+                if fixed[j]:
+                    value -= (normal[i, j] if j < i else normal[j, i]) * step[j]
+                    if j < i:
+                        factor[i, j] = 0.0
+                elif j <= i:
+                    factor[i, j] = normal[i, j]
+            solution[i] = value
+        cholesky(factor)
+        cholesky_solve(factor, solution)
+        hit = False
+        for i in range(d):
+            if not fixed[i] and not low[i] <= solution[i] <= high[i]:
+                solution[i] = min(max(solution[i], low[i]), high[i])
+                fixed[i] = True
+                hit = True
+        step[:] = solution
+        if not hit:
+            return
+
+
+@njit(cache=True)
+def cholesky(a: FloatArray) -> None:
+    """Factor a symmetric positive definite matrix in place, lower triangle."""
+    for i in range(len(a)):
+        for j in range(i + 1):
+            value = a[i, j]
+            for k in range(j):
+                value -= a[i, k] * a[j, k]
+            a[i, j] = np.sqrt(value) if i == j else value / a[j, j]
+
+
+@njit(cache=True)
+def cholesky_solve(factor: FloatArray, x: FloatArray) -> None:
+    """Solve L L' x = b in place."""
+    d = len(x)
+    for i in range(d):
+        value = x[i]
+        for k in range(i):
+            value -= factor[i, k] * x[k]
+        x[i] = value / factor[i, i]
+    for i in range(d - 1, -1, -1):
+        x[i] /= factor[i, i]
+        for k in range(i):
+            x[k] -= factor[i, k] * x[i]
+
+
+@njit(cache=True)
+def inverse_diagonal(normal: FloatArray, free: BoolArray, out: FloatArray) -> None:
+    """Fill the diagonal of the inverse of the free part of a matrix, given its lower triangle."""
+    rows = np.flatnonzero(free)
+    factor = np.empty((len(rows), len(rows)))
+    for i in range(len(rows)):
+        for j in range(i + 1):
+            factor[i, j] = normal[rows[i], rows[j]]
+    cholesky(factor)
+    column = np.empty(len(rows))
+    for k in range(len(rows)):  # the inverse's diagonal: squared columns of L^-1
+        for i in range(k, len(rows)):
+            value = 1.0 if i == k else 0.0
+            for j in range(k, i):
+                value -= factor[i, j] * column[j]
+            column[i] = value / factor[i, i]
+        out[rows[k]] = 0.0
+        for i in range(k, len(rows)):
+            out[rows[k]] += column[i] ** 2

@@ -1,0 +1,248 @@
+"""On-line inverse kinematics: one frame of markers in, one posture out.
+
+[Kulic2012] computes joint angles on-line from 34 markers ([Yamane2003]). Here each frame is a few damped
+Gauss-Newton steps from the last posture (`gauss_newton`), on a body whose segments and marker places were
+fitted to the person (`calibration`). The angles are the body's own, robot or human, without a detour.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mplearn.errors import BodyError, FrameError, InvalidValueError
+from mplearn.recording import FloatArray
+
+from .body import Body
+from .calibration import Calibration, fit
+from .gauss_newton import Linkage, solve_frame
+from .markers import MarkerSet, find_marker_set
+
+FEWEST_MARKERS = 3  # fewer do not say where a body is: the posture is held
+
+
+@dataclass(frozen=True)
+class IKConfig:
+    """What the solver assumes about markers and people.
+
+    Attributes:
+        marker_sigma_m: Standard deviation of a marker about its place on the segment, skin
+            movement and model error included [m].
+        outlier_m: Distance at which a marker loses half of its weight [m]; infinite for none.
+        joint_drift: Growth of a joint's uncertainty, [rad / sqrt(s)]: how freely it may move.
+        base_drift: The same for the base's position [m / sqrt(s)].
+        joint_speed: Fastest joint [rad/s]; nothing turns faster, whatever the markers do.
+        base_speed: Fastest base [m/s].
+        rest_s: Time constant with which joints that no marker determines return to rest [s].
+        most_uncertain: Bound on the uncertainty of a joint [rad] or the base [m].
+        max_iterations: Gauss-Newton steps a frame.
+        tolerance: Change below which a frame is solved [rad, m].
+    """
+
+    marker_sigma_m: float = 0.01
+    outlier_m: float = 0.06
+    joint_drift: float = 1.5
+    base_drift: float = 1.5
+    joint_speed: float = 17.0
+    base_speed: float = 10.0
+    rest_s: float = 10.0
+    most_uncertain: float = 0.7
+    max_iterations: int = 6
+    tolerance: float = 1e-3
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not value > 0:
+                raise InvalidValueError(f"{name} must be positive, not {value}")
+
+
+class InverseKinematics:
+    """Follows a person's markers with a body.
+
+    Args:
+        body: The body whose angles are wanted.
+        marker_names: Names of the M markers of every frame; names that the set does not know are ignored.
+        rate_hz: Frames per second [1/s].
+        config: Assumptions of the solver.
+        markers: Where the markers sit; found by their names where not given.
+
+    Attributes:
+        calibration: The fit to the person; None before `calibrate`.
+        q: The last posture, shape (7 + n,), in the given body's own size.
+        residual_m: Distance of each marker from its place in the last frame, shape (M,) [m], in the
+            person's size; NaN where a marker was missing.
+        iterations: Gauss-Newton steps of the last frame; 0 where the posture was held.
+
+    Raises:
+        BodyError: The markers belong to no known set, or do not fit the body.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        marker_names: Sequence[str],
+        *,
+        rate_hz: float = 100.0,
+        config: IKConfig | None = None,
+        markers: MarkerSet | None = None,
+    ) -> None:
+        if not (np.isfinite(rate_hz) and rate_hz > 0):
+            raise InvalidValueError(f"rate_hz must be positive and finite, not {rate_hz}")
+        self.body = body
+        self.marker_names = tuple(marker_names)
+        self.rate_hz = float(rate_hz)
+        self.config = config or IKConfig()
+        self.markers = markers or find_marker_set(self.marker_names)
+        known = np.array(self.markers.knows(self.marker_names))
+        if not known.any():
+            raise BodyError(f"marker set {self.markers.name!r} has none of {self.marker_names[:6]}")
+        self._used = np.flatnonzero(known)
+        selected = self.markers.select([self.marker_names[i] for i in self._used])
+        self._bodies, self._template = selected.attach(body.tree)
+        self._free = np.array(
+            [True] * 6 + [name not in body.held for name in body.joint_names], dtype=np.bool_
+        )
+        n = len(body.joint_names)
+        self._drift = np.array([self.config.base_drift] * 3 + [self.config.joint_drift] * (3 + n))
+        self._weights = np.full(len(self._used), self.config.marker_sigma_m**-2)
+        self.calibration: Calibration | None = None
+        self.iterations = 0
+        self.residual_m = np.full(len(self.marker_names), np.nan)
+        self.q = body.rest
+
+    def calibrate(self, markers: FloatArray) -> Calibration:
+        """Fit segments, marker places, the floor and the first posture to a stretch of any motion.
+
+        Args:
+            markers: About half a second to a second, shape (T, M, 3) [m]; NaN where missing.
+
+        Raises:
+            BodyError: The markers do not look like this body's, with the reason.
+        """
+        frames = np.asarray(markers, dtype=np.float64)
+        if frames.ndim != 3 or frames.shape[1:] != (len(self.marker_names), 3) or not len(frames):
+            raise FrameError(
+                f"markers must have shape (T, {len(self.marker_names)}, 3), not {frames.shape}"
+            )
+        names = [self.marker_names[i] for i in self._used]
+        self._start(fit(self.body, names, self._bodies, self._template, frames[:, self._used]))
+        assert self.calibration is not None
+        return self.calibration
+
+    def _start(self, calibration: Calibration) -> None:
+        """Take over a fit, and begin at its posture without knowing it well."""
+        self.calibration = calibration
+        self._tree = self.body.tree.scaled(calibration.factors)
+        self._linkage = Linkage.of(self._tree)
+        self._posture = calibration.posture.copy()
+        self._variance = np.full(self.body.tree.n_dofs, self.config.most_uncertain**2)
+        self._fresh = True
+        self.q = self._on_body()
+
+    def update(self, markers: FloatArray) -> FloatArray:
+        """Take one frame and return the posture, shape (7 + n,): never NaN, never a jump.
+
+        With too few markers in sight the posture is held, and `uncertainty` grows.
+
+        Args:
+            markers: Positions, shape (M, 3) [m]; NaN where missing.
+
+        Raises:
+            BodyError: `calibrate` was not called.
+            FrameError: The frame has another shape, or holds infinite values.
+        """
+        if self.calibration is None:
+            raise BodyError("calibrate before the first update: the person's size is not known")
+        frame = np.asarray(markers, dtype=np.float64)
+        if frame.shape != (len(self.marker_names), 3):
+            raise FrameError(
+                f"a frame must have shape ({len(self.marker_names)}, 3), not {frame.shape}"
+            )
+        frame = frame[self._used]
+        if np.isinf(frame).any():
+            raise FrameError("a frame holds infinite values; a missing marker is NaN")
+        config, dt = self.config, 1.0 / self.rate_hz
+        self._variance += self._drift**2 * dt
+        np.minimum(self._variance, config.most_uncertain**2, out=self._variance)
+        residuals = np.full(len(frame), np.nan)
+        self.iterations = 0
+        if np.isfinite(frame).all(axis=1).sum() >= FEWEST_MARKERS:
+            self.iterations = self._solve(frame, residuals, dt)
+        self.residual_m = np.full(len(self.marker_names), np.nan)
+        self.residual_m[self._used] = residuals
+        self.q = self._on_body()
+        return self.q
+
+    def _solve(self, frame: FloatArray, residuals: FloatArray, dt: float) -> int:
+        config = self.config
+        angles, limits = self._posture[7:], self._tree.limits
+        reach = np.full(self.body.tree.n_dofs, config.joint_speed * dt)
+        reach[:3] = config.base_speed * dt
+        if self._fresh:
+            reach[:] = np.inf
+            self._fresh = False
+        low, high = -reach, reach
+        low[6:] = np.maximum(low[6:], limits[:, 0] - angles)
+        high[6:] = np.minimum(high[6:], limits[:, 1] - angles)
+        return int(
+            solve_frame(
+                self._posture,
+                self._variance,
+                frame,
+                self._bodies,
+                self.calibration.offsets,  # type: ignore[union-attr]
+                self._weights,
+                self._linkage,
+                low,
+                high,
+                self._free,
+                dt / config.rest_s / self._variance[6:],
+                config.outlier_m,
+                3.0,
+                0.5,
+                config.max_iterations,
+                config.tolerance,
+                residuals,
+            )
+        )
+
+    def _on_body(self) -> FloatArray:
+        """Return the posture in the body's own size, standing where the person's floor is."""
+        assert self.calibration is not None
+        q = self._posture.copy()
+        q[2] -= self.calibration.floor_m
+        q[:3] *= self.calibration.scale
+        return q
+
+    @property
+    def uncertainty(self) -> FloatArray:
+        """Standard deviation of base position [m], base rotation and hinges [rad], shape (6 + n,).
+
+        It stays small while the markers determine a joint, and grows while they do not.
+        """
+        return np.sqrt(self._variance)
+
+    def state(self) -> dict[str, Any]:
+        """Return what `load_state` needs to resume bit for bit."""
+        if self.calibration is None:
+            return {"calibration": None}
+        return {
+            "calibration": self.calibration.state(),
+            "posture": self._posture.copy(),
+            "variance": self._variance.copy(),
+            "fresh": self._fresh,
+        }
+
+    def load_state(self, state: dict[str, Any]) -> None:
+        """Resume from what `state` returned."""
+        if state["calibration"] is None:
+            self.calibration = None
+            return
+        self._start(Calibration.from_state(state["calibration"]))
+        self._posture = np.array(state["posture"], dtype=np.float64)
+        self._variance = np.array(state["variance"], dtype=np.float64)
+        self._fresh = bool(state["fresh"])
+        self.q = self._on_body()
