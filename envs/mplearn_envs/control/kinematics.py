@@ -1,4 +1,4 @@
-"""Kinematics of the reference robot: body poses, COG and Jacobians, as numba kernels on plain arrays.
+"""Kinematics of the reference robot with its masses: body poses and COG, as numba kernels.
 
 MuJoCo gives the same numbers (the tests compare), but a call per quantity and posture from Python
 costs more than the mathematics; planning needs some hundred postures for every primitive.
@@ -6,13 +6,16 @@ costs more than the mathematics; planning needs some hundred postures for every 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from mplearn.errors import RobotError
+from mplearn.body.tree import KinematicTree, forward_kinematics
 from mplearn.recording import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    import mujoco
 
 
 class MassTree(NamedTuple):
@@ -21,26 +24,22 @@ class MassTree(NamedTuple):
     Attributes:
         parent: Index of each body's parent, shape (B,); -1 for the base.
         offset: Position in the parent's frame, shape (B, 3) [m].
-        turn: Orientation in the parent's frame, shape (B, 4), w x y z.
-        centre: Centre of mass in the body's own frame, shape (B, 3) [m].
-        mass: Mass, shape (B,) [kg].
-        first_joint: Index of each body's first hinge, shape (B,).
-        n_joints: Number of hinges of each body, shape (B,).
+        rotation: Orientation in the parent's frame, shape (B, 3, 3).
         joint_body: Body that each hinge moves, shape (J,).
-        anchor: A point of each axis in the frame of its body, shape (J, 3) [m].
         axis: Unit axis of each hinge in the frame of its body, shape (J, 3).
+        anchor: A point of each axis in the frame of its body, shape (J, 3) [m].
+        centre: Centre of mass of each body in its own frame, shape (B, 3) [m].
+        mass: Mass of each body, shape (B,) [kg].
     """
 
     parent: IntArray
     offset: FloatArray
-    turn: FloatArray
+    rotation: FloatArray
+    joint_body: IntArray
+    axis: FloatArray
+    anchor: FloatArray
     centre: FloatArray
     mass: FloatArray
-    first_joint: IntArray
-    n_joints: IntArray
-    joint_body: IntArray
-    anchor: FloatArray
-    axis: FloatArray
 
 
 class Pose(NamedTuple):
@@ -63,66 +62,23 @@ class Pose(NamedTuple):
     carried: FloatArray
 
 
-def mass_tree(model: Any) -> MassTree:
-    """Read the tree from an ``MjModel`` of one floating base with hinges.
+def mass_tree(model: mujoco.MjModel) -> MassTree:
+    """Read the tree from a model of one floating base with hinges.
 
     Raises:
-        RobotError: The first joint is not free, or another one is not a hinge.
+        BodyError: The first joint is not free, or another one is not a hinge.
     """
-    kinds = model.jnt_type
-    if model.njnt < 2 or kinds[0] != 0 or np.any(kinds[1:] != 3) or model.jnt_bodyid[0] != 1:
-        raise RobotError("a robot needs one free joint at its first body, then hinges only")
-    n_joints = model.body_jntnum[1:].astype(np.int64)
-    first = model.body_jntadr[1:].astype(np.int64) - 1
-    n_joints[0] -= 1
-    first[0] = 0
+    tree = KinematicTree.from_model(model)
     return MassTree(
-        model.body_parentid[1:].astype(np.int64) - 1,
-        np.array(model.body_pos[1:]),
-        np.array(model.body_quat[1:]),
+        tree.parent,
+        tree.offset,
+        tree.rotation,
+        tree.joint_body,
+        tree.axis,
+        tree.anchor,
         np.array(model.body_ipos[1:]),
         np.array(model.body_mass[1:]),
-        first,
-        n_joints,
-        model.jnt_bodyid[1:].astype(np.int64) - 1,
-        np.array(model.jnt_pos[1:]),
-        np.array(model.jnt_axis[1:]),
     )
-
-
-@njit(cache=True)
-def rotation_matrix(quaternion: FloatArray) -> FloatArray:
-    """Return the rotation matrix, shape (3, 3), of a unit quaternion w x y z."""
-    w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
-    out = np.empty((3, 3))
-    out[0, 0] = 1 - 2 * (y * y + z * z)
-    out[0, 1] = 2 * (x * y - w * z)
-    out[0, 2] = 2 * (x * z + w * y)
-    out[1, 0] = 2 * (x * y + w * z)
-    out[1, 1] = 1 - 2 * (x * x + z * z)
-    out[1, 2] = 2 * (y * z - w * x)
-    out[2, 0] = 2 * (x * z - w * y)
-    out[2, 1] = 2 * (y * z + w * x)
-    out[2, 2] = 1 - 2 * (x * x + y * y)
-    return out
-
-
-@njit(cache=True)
-def axis_rotation(axis: FloatArray, angle: float) -> FloatArray:
-    """Return the rotation matrix, shape (3, 3), about a unit axis by an angle [rad]."""
-    half = 0.5 * angle
-    s = np.sin(half)
-    return rotation_matrix(np.array([np.cos(half), axis[0] * s, axis[1] * s, axis[2] * s]))
-
-
-@njit(cache=True)
-def times(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the product of two (3, 3) matrices (BLAS costs more than this at so small a size)."""
-    out = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
-    return out
 
 
 @njit(cache=True)
@@ -150,23 +106,22 @@ def forward(tree: MassTree, q: FloatArray) -> Pose:
     n_bodies, n_hinges = tree.parent.shape[0], tree.axis.shape[0]
     position, rotation = np.empty((n_bodies, 3)), np.empty((n_bodies, 3, 3))
     anchor, axis = np.empty((n_hinges, 3)), np.empty((n_hinges, 3))
+    forward_kinematics(
+        q,
+        tree.parent,
+        tree.offset,
+        tree.rotation,
+        tree.joint_body,
+        tree.axis,
+        tree.anchor,
+        position,
+        rotation,
+        axis,
+        anchor,
+    )
     moment, carried = np.empty((n_bodies, 3)), tree.mass.copy()
     for b in range(n_bodies):
-        p = tree.parent[b]
-        if p < 0:
-            origin = q[:3].copy()
-            frame = rotation_matrix(q[3:7])
-        else:
-            origin = position[p] + turned(rotation[p], tree.offset[b])
-            frame = times(rotation[p], rotation_matrix(tree.turn[b]))
-        for j in range(tree.first_joint[b], tree.first_joint[b] + tree.n_joints[b]):
-            anchor[j] = origin + turned(frame, tree.anchor[j])
-            axis[j] = turned(frame, tree.axis[j])
-            frame = times(frame, axis_rotation(tree.axis[j], q[7 + j]))
-            origin = anchor[j] - turned(frame, tree.anchor[j])
-        position[b] = origin
-        rotation[b] = frame
-        moment[b] = tree.mass[b] * (origin + turned(frame, tree.centre[b]))
+        moment[b] = tree.mass[b] * (position[b] + turned(rotation[b], tree.centre[b]))
     for b in range(n_bodies - 1, 0, -1):
         moment[tree.parent[b]] += moment[b]
         carried[tree.parent[b]] += carried[b]
@@ -174,9 +129,19 @@ def forward(tree: MassTree, q: FloatArray) -> Pose:
 
 
 @njit(cache=True)
+def _relative(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return a b^T of (3, 3) matrices (at this size BLAS costs more than the product)."""
+    out = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = a[i, 0] * b[j, 0] + a[i, 1] * b[j, 1] + a[i, 2] * b[j, 2]
+    return out
+
+
+@njit(cache=True)
 def rotation_error(wanted: FloatArray, actual: FloatArray) -> FloatArray:
     """Return the rotation vector [rad], world frame, that turns ``actual`` into ``wanted``."""
-    r = times(wanted, actual.T)
+    r = _relative(wanted, actual)
     sine = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]]) * 0.5
     s = np.sqrt(sine[0] ** 2 + sine[1] ** 2 + sine[2] ** 2)
     cosine = 0.5 * (r[0, 0] + r[1, 1] + r[2, 2] - 1.0)
