@@ -1,0 +1,156 @@
+"""Sessions: a person's executions of many primitives in one stream, with the truth.
+
+Recorded takes repeat one movement. A session joins executions from all of a person's takes in a
+Markov order, as a teacher would mix them, so that segmentation, clustering and the graph have
+something to find. Nothing is resampled; only the head of an execution is bent, over 0.2-0.6 s, so
+that it leaves from the posture in which the one before it ended.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import InvalidValueError, RecordingError
+from ..recording import FloatArray, LabelledSegment, Recording
+from .executions import fit_standing, split_repetitions, without_gaps
+
+
+@dataclass(frozen=True)
+class SessionConfig:
+    """How a session is joined.
+
+    Attributes:
+        blend_s: Shortest and longest time over which the posture at a join is blended [s].
+        n_successors: How many movements usually follow a movement.
+        loyalty: Probability that one of those follows, as long as they are not used up.
+        executions: How often each repetition is used.
+    """
+
+    blend_s: tuple[float, float] = (0.2, 0.6)
+    n_successors: int = 3
+    loyalty: float = 0.85
+    executions: int = 1
+
+    def __post_init__(self) -> None:
+        low, high = self.blend_s
+        if not 0 < low <= high < math.inf:
+            raise InvalidValueError(f"blend_s must be 0 < low <= high, not {self.blend_s}")
+        if not 0 <= self.loyalty <= 1:
+            raise InvalidValueError(f"loyalty must lie in [0, 1], not {self.loyalty}")
+        for name in ("n_successors", "executions"):
+            if getattr(self, name) < 1:
+                raise InvalidValueError(f"{name} must be at least 1, not {getattr(self, name)}")
+
+
+@dataclass(frozen=True)
+class _Execution:
+    """Consecutive labels of one take that belong together: out and back."""
+
+    take: int
+    labels: tuple[LabelledSegment, ...]
+
+
+def make_session(
+    takes: Sequence[Recording], rng: np.random.Generator, config: SessionConfig | None = None
+) -> Recording:
+    """Join a person's takes into one session.
+
+    Each repetition is split at its reversal (`split_repetitions`), the first of a take dropped; the
+    halves of a repetition stay together. Which movement follows which is drawn from a Markov chain
+    that is itself drawn from `rng`. Marker takes are turned and shifted horizontally so that the
+    body goes on where it stands. Missing measurements stay missing.
+
+    Args:
+        takes: Recordings of one person with labelled repetitions; same columns, same rate.
+        rng: Source of the order, of the chain, and of the blending times.
+        config: How to join.
+
+    Returns:
+        The session; its labels follow each other from frame 0 to the end.
+
+    Raises:
+        RecordingError: There are no takes, they do not match, or hold too few repetitions.
+    """
+    config = config or SessionConfig()
+    if not takes:
+        raise RecordingError("a session needs at least one take")
+    first = takes[0]
+    for take in takes[1:]:
+        for name in ("channels", "rate_hz", "person"):
+            if getattr(take, name) != getattr(first, name):
+                raise RecordingError(
+                    f"the takes of a session must agree in {name}: {take.name!r} differs from "
+                    f"{first.name!r}"
+                )
+    split = split_repetitions(takes)
+    filled = [without_gaps(take.frames) for take in split]
+    movements = [
+        [_Execution(i, take.labels[k : k + 2]) for k in range(0, len(take.labels), 2)]
+        * config.executions
+        for i, take in enumerate(split)
+    ]
+    pieces: list[FloatArray] = []
+    labels: list[LabelledSegment] = []
+    end = 0
+    last: FloatArray | None = None
+    for execution in _order(movements, rng, config):
+        take = split[execution.take]
+        start = execution.labels[0].start
+        piece = slice(start, execution.labels[-1].end)
+        frames = filled[execution.take][piece]
+        width = round(rng.uniform(*config.blend_s) * first.rate_hz)
+        if last is not None:
+            frames = _continue(last, frames, width, aligned=first.is_markers)
+        last = frames[-1]
+        pieces.append(np.where(np.isnan(take.frames[piece]), np.nan, frames))
+        labels += [
+            replace(label, start=label.start - start + end, end=label.end - start + end)
+            for label in execution.labels
+        ]
+        end += len(frames)
+    return Recording(
+        frames=np.concatenate(pieces),
+        rate_hz=first.rate_hz,
+        channels=first.channels,
+        name=f"session-{first.person}" if first.person else "session",
+        person=first.person,
+        labels=tuple(labels),
+    )
+
+
+def _continue(last: FloatArray, frames: FloatArray, width: int, *, aligned: bool) -> FloatArray:
+    """Bend the first `width` frames so that they leave from `last` without a jump."""
+    if aligned:
+        frames = fit_standing(frames[0], last).apply(frames)
+    width = min(width, len(frames) // 2)
+    x = np.arange(1, width + 1) / (width + 1)
+    fade = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x**2)  # minimum jerk, 1 -> 0
+    bent = frames.copy()
+    bent[:width] += fade[:, None] * (last - frames[0])
+    return bent
+
+
+def _order(
+    movements: Sequence[Sequence[_Execution]], rng: np.random.Generator, config: SessionConfig
+) -> list[_Execution]:
+    """Draw the order of all executions from a random Markov chain over movements."""
+    n = len(movements)
+    left = [[each[i] for i in rng.permutation(len(each))] for each in movements]
+    chain = np.full((n, n), (1.0 - config.loyalty) / n)
+    for row in chain:
+        usual = rng.choice(n, size=min(config.n_successors, n), replace=False)
+        row[usual] += config.loyalty * rng.dirichlet(np.full(len(usual), 3.0))
+    order: list[_Execution] = []
+    at = int(rng.integers(n))
+    while any(left):
+        if order:
+            weight = chain[at] * np.array([len(each) > 0 for each in left])
+            if weight.sum() <= 0.0:  # a chain of full loyalty has run dry here
+                weight = np.array([len(each) for each in left], dtype=np.float64)
+            at = int(rng.choice(n, p=weight / weight.sum()))
+        order.append(left[at].pop())
+    return order
