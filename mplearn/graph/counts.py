@@ -41,15 +41,16 @@ class TransitionCounts:
         self._index: dict[int, int] = {}
         self._edges = EdgeTable()
         self._histories = HistoryTable(order, history_capacity)
-        self._changed()
+        self._frozen = False
+        self._before_change()
 
     # ---- growing
 
     def add_node(self, id: int) -> None:
         """Add a primitive; one that is there already stays as it is."""
         if id not in self._index:
+            self._before_change()
             self._index[id] = len(self._index)
-            self._changed()
 
     def observe(
         self, previous: int, next: int, duration_s: float, *, before: Sequence[int] = ()
@@ -68,19 +69,19 @@ class TransitionCounts:
             InvalidValueError: The duration is negative, not finite or beyond a day.
         """
         self._require(previous, next, *before)
+        self._before_change()
         self._edges.observe(previous, next, duration_s)
         if self.order > 1 and before:
             self._histories.observe((*before[-(self.order - 1) :], previous), next)
-        self._changed()
 
     def remove_node(self, id: int) -> None:
         """Remove a primitive and every transition that names it."""
         self._require(id)
+        self._before_change()
         gone = (self._edges.sources == id) | (self._edges.targets == id)
         self._edges = self._edges.without(gone)
         self._histories = self._histories.without(id)
         self._index = {i: k for k, i in enumerate(i for i in self._index if i != id)}
-        self._changed()
 
     def merge_nodes(self, keep: int, merged: int) -> None:
         """Make two nodes one: what was counted for ``merged`` is added to ``keep``."""
@@ -93,6 +94,7 @@ class TransitionCounts:
 
         Counts do not depend on the order in which graphs are absorbed.
         """
+        self._before_change()
         added = other.copy()
         if new_id is not None:
             added._require(*new_id)
@@ -101,7 +103,6 @@ class TransitionCounts:
             self.add_node(node)
         self._edges.add(added._edges.rows)
         self._histories.add(added._histories)
-        self._changed()
 
     # ---- looking
 
@@ -162,6 +163,7 @@ class TransitionCounts:
         Raises:
             InvalidValueError: The arrays do not describe a graph.
         """
+        self._before_change()
         fresh = type(self)(
             order=int(state["order"]),
             concentration=float(state["concentration"]),
@@ -180,14 +182,22 @@ class TransitionCounts:
         graph.load_state(state)
         return graph
 
+    def snapshot(self) -> Self:
+        """Return an independent copy that refuses to be changed."""
+        frozen = self.copy()
+        frozen._frozen = True
+        return frozen
+
     def copy(self) -> Self:
         """Return an independent copy."""
         return type(self).from_state(self.state())
 
     # ---- inside
 
-    def _changed(self) -> None:
-        """Note that whatever was derived from the counts is out of date."""
+    def _before_change(self) -> None:
+        """Refuse a change to a snapshot; forget what was derived from the counts."""
+        if self._frozen:
+            raise InvalidValueError("this graph is a snapshot; its copy() can grow")
 
     def _require(self, *ids: int) -> None:
         for id in ids:
@@ -213,11 +223,11 @@ class TransitionCounts:
         return row
 
     def _rename(self, new_id: dict[int, int]) -> None:
+        self._before_change()
         self._edges = self._edges.renamed(new_id)
         self._histories = self._histories.renamed(new_id)
         ids = dict.fromkeys(new_id.get(id, id) for id in self._index)
         self._index = {id: k for k, id in enumerate(ids)}
-        self._changed()
 
 
 def _shortened(ids: tuple[int, ...]) -> str:

@@ -115,8 +115,8 @@ class TransitionGraph(TransitionCounts):
 
         Args:
             start: First primitive of the path.
-            goal: Last primitive of the path; if it is ``start``, the path is that one primitive unless
-                ``visit`` or ``length`` ask for more.
+            goal: Last primitive of the path; if it is ``start``, the path is that one primitive
+                unless ``visit`` or ``length`` ask for more.
             by: What is best: the most likely, the fewest steps, or the shortest mean duration.
             avoid: Primitives that must not be passed.
             visit: Primitives that must be passed, in any order (at most 12).
@@ -262,7 +262,8 @@ class TransitionGraph(TransitionCounts):
 
     # ---- inside
 
-    def _changed(self) -> None:
+    def _before_change(self) -> None:
+        super()._before_change()
         self._view = None
         self._sampler = None
 

@@ -1,0 +1,269 @@
+"""What has been learned, frozen: the one interface between learning and acting."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+import numpy as np
+
+from ..errors import InvalidValueError, UnknownPrimitiveError
+from ..generation import StyleName, Trajectory, generate, retime
+from ..graph import History, Prediction, TransitionGraph
+from ..recording import FloatArray
+from . import storage
+from .content import from_content, to_content
+from .primitive import Primitive
+
+if TYPE_CHECKING:
+    from ..tree import Recogniser, Recognition
+
+Key: TypeAlias = int | str
+
+
+class TreeNode(NamedTuple):
+    """A node of the tree that the primitives were learned in.
+
+    Attributes:
+        id: Identity; that of its primitive, if it is a leaf.
+        parent: Node above it; None at the root.
+        n_exemplars: How many segments were placed in it.
+    """
+
+    id: int
+    parent: int | None
+    n_exemplars: int
+
+
+@dataclass(frozen=True, eq=False)
+class PrimitiveLibrary:
+    """A snapshot of learned primitives and their transitions; nothing here changes.
+
+    Wherever a primitive is asked for, its id or its name will do. Two libraries hold the same if
+    their `version` is the same.
+
+    Attributes:
+        primitives: The primitives.
+        graph: Their transitions; a snapshot that refuses changes, its `copy` can grow.
+        channels: Name of each channel, length D.
+        rate_hz: Frame rate of models and exemplars [1/s].
+        body: Name of the body that moves; empty where the channels are no body's.
+        tree: The nodes of the tree.
+        recogniser: What recognises segments; None in a library that only acts.
+    """
+
+    primitives: tuple[Primitive, ...]
+    graph: TransitionGraph = field(repr=False)
+    channels: tuple[str, ...]
+    rate_hz: float
+    body: str = ""
+    tree: tuple[TreeNode, ...] = field(default=(), repr=False)
+    recogniser: Recogniser | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "primitives", tuple(self.primitives))
+        object.__setattr__(self, "channels", tuple(self.channels))
+        object.__setattr__(self, "tree", tuple(TreeNode(*node) for node in self.tree))
+        ids = [primitive.id for primitive in self.primitives]
+        names = [primitive.name for primitive in self.primitives]
+        for what, values in (("ids", ids), ("names", names), ("channels", self.channels)):
+            if len(set(values)) != len(values):
+                raise InvalidValueError(f"{what} of a library must differ, not {values}")
+        for primitive in self.primitives:
+            if primitive.hmm.n_channels != len(self.channels):
+                raise InvalidValueError(
+                    f"primitive {primitive.id} has {primitive.hmm.n_channels} channels, "
+                    f"the library {len(self.channels)}"
+                )
+            if primitive.rate_hz != self.rate_hz:
+                raise InvalidValueError(
+                    f"primitive {primitive.id} has rate_hz {primitive.rate_hz}, "
+                    f"the library {self.rate_hz}"
+                )
+        strangers = set(self.graph.ids) - set(ids)
+        if strangers:
+            raise InvalidValueError(f"the graph names {sorted(strangers)}, which are no primitives")
+        graph = self.graph.copy()
+        for id in ids:
+            graph.add_node(id)
+        object.__setattr__(self, "graph", graph.snapshot())
+
+    # ---- looking
+
+    def __len__(self) -> int:
+        """Number of primitives."""
+        return len(self.primitives)
+
+    def __getitem__(self, key: Key) -> Primitive:
+        """Return a primitive by id or name.
+
+        Raises:
+            UnknownPrimitiveError: There is none.
+        """
+        found = self._by_key.get(key)
+        if found is None:
+            names = ", ".join(primitive.name for primitive in self.primitives[:30])
+            raise UnknownPrimitiveError(
+                f"no primitive {key!r} in the library; it holds {len(self)}: {names}"
+            )
+        return found
+
+    def __contains__(self, key: object) -> bool:
+        """Whether there is a primitive of this id or name."""
+        return key in self._by_key
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """Ids of the primitives."""
+        return tuple(primitive.id for primitive in self.primitives)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the primitives."""
+        return tuple(primitive.name for primitive in self.primitives)
+
+    @cached_property
+    def version(self) -> str:
+        """Hash of all that the library holds, names included: 16 hexadecimal digits."""
+        return storage.digest(to_content(self))[:16]
+
+    def recognise(self, frames: FloatArray) -> Recognition:
+        """Recognise a segment, shape (T, D).
+
+        Raises:
+            InvalidValueError: The library was made without a recogniser.
+        """
+        if self.recogniser is None:
+            raise InvalidValueError("this library holds no recogniser")
+        return self.recogniser.recognise(frames)
+
+    def predict_next(self, history: Sequence[Key | None], k: int = 3) -> tuple[Prediction, ...]:
+        """Return the ``k`` primitives most likely to come next, see `TransitionGraph.predict`.
+
+        Args:
+            history: The latest primitives, oldest first; None where one was not recognised.
+            k: How many to return at most.
+        """
+        known: History = [None if key is None else self[key].id for key in history]
+        return self.graph.predict(known, k)
+
+    # ---- planning
+
+    def path(
+        self,
+        start: Key,
+        goal: Key,
+        *,
+        avoid: Collection[Key] = (),
+        visit: Collection[Key] = (),
+        length: int | None = None,
+    ) -> tuple[int, ...]:
+        """Return the most likely path, see `TransitionGraph.path`."""
+        return self.k_paths(start, goal, 1, avoid=avoid, visit=visit, length=length)[0]
+
+    def k_paths(
+        self,
+        start: Key,
+        goal: Key,
+        k: int,
+        *,
+        avoid: Collection[Key] = (),
+        visit: Collection[Key] = (),
+        length: int | None = None,
+    ) -> tuple[tuple[int, ...], ...]:
+        """Return up to ``k`` most likely paths, see `TransitionGraph.k_paths`."""
+        return self.graph.k_paths(
+            self[start].id,
+            self[goal].id,
+            k,
+            avoid=[self[key].id for key in avoid],
+            visit=[self[key].id for key in visit],
+            length=length,
+        )
+
+    def walk(self, start: Key | None, length: int, rng: np.random.Generator) -> tuple[int, ...]:
+        """Draw a walk of exactly ``length`` primitives, see `TransitionGraph.walk`."""
+        return self.graph.walk(None if start is None else self[start].id, length, rng)
+
+    # ---- acting
+
+    def generate(
+        self,
+        path: Sequence[Key],
+        *,
+        style: StyleName = "deterministic",
+        rate_hz: float | None = None,
+        speed: float = 1.0,
+        velocity_limits: FloatArray | None = None,
+        acceleration_limits: FloatArray | None = None,
+        start: FloatArray | None = None,
+        cutoff_hz: float | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> Trajectory:
+        """Generate the motion of a path, see `mplearn.generation.generate`, and retime it.
+
+        Args:
+            path: Primitives by id or name, at least one; they need not be connected in the graph.
+            style: "deterministic", "nearest", "averaged" or "smooth".
+            rate_hz: Frame rate of the trajectory [1/s]; None is the library's.
+            speed: Speed relative to the human's; 0.5 is the paper's half speed.
+            velocity_limits: Largest speed of each channel, shape (D,) [1/s]; see `retime`.
+            acceleration_limits: Largest acceleration of each channel, shape (D,) [1/s^2].
+            start: Posture to start from, at rest, shape (D,).
+            cutoff_hz: Cut-off of the low-pass filter [1/s]; None is the style's own.
+            rng: Source of randomness, needed by "averaged" only.
+        """
+        motion = generate(
+            [self[key] for key in path],
+            self.channels,
+            self.rate_hz,
+            style=style,
+            rate_hz=rate_hz,
+            start=start,
+            cutoff_hz=cutoff_hz,
+            rng=rng,
+        )
+        return retime(motion, velocity_limits, acceleration_limits, speed)
+
+    # ---- naming and keeping
+
+    def rename(self, key: Key, name: str) -> PrimitiveLibrary:
+        """Return a library in which a primitive has another name.
+
+        Raises:
+            InvalidValueError: The name is empty, not printable, or another primitive's.
+        """
+        chosen = self[key]
+        if not (isinstance(name, str) and name.strip() and name.isprintable()):
+            raise InvalidValueError(f"a name must be printable and not empty, not {name!r}")
+        renamed = (
+            replace(primitive, name=name) if primitive is chosen else primitive
+            for primitive in self.primitives
+        )
+        return replace(self, primitives=tuple(renamed))
+
+    def save(self, path: str | Path) -> Path:
+        """Write the library to a file, all of it or nothing, and return its path.
+
+        Raises:
+            LibraryError: The file cannot be written.
+        """
+        storage.write(Path(path), to_content(self))
+        return Path(path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> PrimitiveLibrary:
+        """Read a library that `save` wrote: equal in every value, and so in `version`.
+
+        Raises:
+            LibraryError: The file is missing, damaged, foreign, or of a newer version.
+        """
+        return from_content(cls, storage.read(Path(path)), str(path))
+
+    @cached_property
+    def _by_key(self) -> dict[Key, Primitive]:
+        keyed: dict[Key, Primitive] = {p.name: p for p in self.primitives}
+        return keyed | {p.id: p for p in self.primitives}
