@@ -7,6 +7,7 @@ count there would make a parser read beyond the file or ask for all the memory t
 from __future__ import annotations
 
 import struct
+from math import prod
 from pathlib import Path
 
 from .files import bad_file
@@ -48,25 +49,34 @@ def check_layout(path: Path, data: bytes) -> None:
 
 
 def _check_parameters(path: Path, data: bytes, at: int, order: str) -> None:
-    while True:
-        name_length, group = struct.unpack_from("bb", data, at) if at + 2 <= len(data) else (0, 0)
+    """Walk the chain of records: groups have negative numbers, parameters their group's."""
+    groups: set[int] = set()
+    owners: set[int] = set()
+    while at + 2 <= len(data):
+        name_length, number = struct.unpack_from("bb", data, at)
         if name_length == 0:
-            return
+            break
         link = at + 2 + abs(name_length)  # the next record is named relative to here
         if link + 4 > len(data):
             raise bad_file(path, f"parameters cut off at byte {len(data)}", _EXPECTED)
         (step,) = struct.unpack_from(order + "h", data, link)
-        if group > 0:
-            kind, n_dimensions = struct.unpack_from("bB", data, link + 2)
-            sizes = data[link + 4 : link + 4 + n_dimensions]
-            count = 1
-            for size in sizes:
-                count *= size
-            used = link + 4 + n_dimensions + count * abs(kind)
-            if kind not in _ITEM_BYTES or n_dimensions > 7 or used > len(data):
+        used = link + 2
+        if number > 0:
+            owners.add(number)
+            kind, n_dimensions = struct.unpack_from("bB", data, used)
+            count = prod(data[used + 2 : used + 2 + n_dimensions])
+            used += 2 + n_dimensions + count * abs(kind)
+            if kind not in _ITEM_BYTES or n_dimensions > 7:
                 raise bad_file(path, f"a damaged parameter at byte {at}", _EXPECTED)
-        if step == 0:
-            return
-        if step < 2:
-            raise bad_file(path, f"a parameter at byte {at} that leads back", _EXPECTED)
-        at = link + step
+        elif number == 0 or -number in groups:
+            raise bad_file(path, f"group {-number} twice or without a number", _EXPECTED)
+        else:
+            groups.add(-number)
+        end = link + step if step else len(data)
+        if used >= end or used + 1 + data[used] > end:  # a description of so many letters follows
+            raise bad_file(path, f"a damaged record at byte {at}", _EXPECTED)
+        at = end
+    if not owners <= groups:
+        raise bad_file(
+            path, f"parameters of group {min(owners - groups)}, which is not there", _EXPECTED
+        )
