@@ -95,6 +95,7 @@ def make_session(
     ]
     pieces: list[FloatArray] = []
     labels: list[LabelledSegment] = []
+    widths = (config.blend_s[0] * first.rate_hz, config.blend_s[1] * first.rate_hz)
     end = 0
     last: FloatArray | None = None
     for execution in _order(movements, rng, config):
@@ -102,9 +103,8 @@ def make_session(
         start = execution.labels[0].start
         piece = slice(start, execution.labels[-1].end)
         frames = filled[execution.take][piece]
-        width = round(rng.uniform(*config.blend_s) * first.rate_hz)
         if last is not None:
-            frames = _continue(last, frames, width, aligned=first.is_markers)
+            frames = _continue(last, frames, widths, rng, aligned=first.is_markers)
         last = frames[-1]
         pieces.append(np.where(np.isnan(take.frames[piece]), np.nan, frames))
         labels += [
@@ -122,15 +122,29 @@ def make_session(
     )
 
 
-def _continue(last: FloatArray, frames: FloatArray, width: int, *, aligned: bool) -> FloatArray:
-    """Bend the first `width` frames so that they leave from `last` without a jump."""
+def _continue(
+    last: FloatArray,
+    frames: FloatArray,
+    widths: tuple[float, float],
+    rng: np.random.Generator,
+    *,
+    aligned: bool,
+) -> FloatArray:
+    """Bend the first frames so that they leave from `last` without a jump.
+
+    The bend takes the least time of `widths` in which it is no faster than the movement itself, if
+    there is one, but not less than a time drawn from them.
+    """
     if aligned:
         frames = fit_standing(frames[0], last).apply(frames)
-    width = min(width, len(frames) // 2)
+    offset = last - frames[0]
+    fastest = np.linalg.norm(frames[4:] - frames[:-4], axis=1).max() / 4.0
+    needed = 1.875 * np.linalg.norm(offset) / max(float(fastest), 1e-12)
+    width = round(float(np.clip(needed, rng.uniform(*widths), widths[1])))
     x = np.arange(1, width + 1) / (width + 1)
     fade = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x**2)  # minimum jerk, 1 -> 0
     bent = frames.copy()
-    bent[:width] += fade[:, None] * (last - frames[0])
+    bent[:width] += fade[:, None] * offset
     return bent
 
 

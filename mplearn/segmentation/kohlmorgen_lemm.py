@@ -67,9 +67,11 @@ class KohlmorgenLemmConfig:
     neighbours_s: float = 0.1
     exact: bool = False
     still_direction: float = 0.05
-    hysteresis_turned: float = 0.5
+    hysteresis_turned: float = 0.4
     tolerance_s: float = 0.15
-    zero_velocity: ZeroVelocityConfig = field(default_factory=ZeroVelocityConfig)
+    zero_velocity: ZeroVelocityConfig = field(
+        default_factory=lambda: ZeroVelocityConfig(hysteresis=0.25)
+    )
 
     def __post_init__(self) -> None:
         if self.density not in ("direction", "posture"):

@@ -37,9 +37,9 @@ class ZeroVelocityConfig:
 
     cutoff_hz: float = 6.0
     hysteresis: float = 0.3
-    still_share: float = 0.06
+    still_share: float = 0.1
     still_s: float = 0.3
-    min_length_s: float = 0.25
+    min_length_s: float = 0.3
     max_length_s: float = 10.0
     memory_s: float = 30.0
 
@@ -67,9 +67,10 @@ STATE = np.dtype(
         ("valley", "f8"),  # lowest speed since that peak
         ("valley_frame", "i8"),
         ("dip_frame", "i8"),  # since when speed is low (moving) or high (still); -1: it is not
-        ("mean", "f8"),  # forgetful means of speed and squared speed
-        ("mean_square", "f8"),
-        ("rest", "f8"),  # sum of the speeds of the open pause
+        ("mean", "f8"),  # forgetful means of the speed and of its square root
+        ("mean_root", "f8"),
+        ("rest", "f8"),  # mean speed of the open pause, and over how many frames
+        ("rest_frames", "i8"),
     ]
 )
 SETTINGS = np.dtype(
@@ -106,8 +107,9 @@ def initial_state() -> Any:
 
 @njit(cache=True)
 def running_speed(m: Any) -> float:
-    """Contraharmonic mean of the speed: that of the moving part, however much of the time is rest."""
-    return m.mean_square / m.mean if m.mean > 0.0 else 0.0
+    """Speed of the moving part of the stream, (E[s] / E[sqrt s])^2, which rest hardly lowers."""
+    ratio = m.mean / m.mean_root if m.mean_root > 0.0 else 0.0
+    return ratio * ratio
 
 
 @njit(cache=True)
@@ -117,7 +119,7 @@ def see_speed(m: Any, p: Any, s: float) -> None:
     weight = p.forget if m.mode != STILL else 0.05 * p.forget
     weight = max(weight, 1.0 / m.frames)
     m.mean += weight * (s - m.mean)
-    m.mean_square += weight * (s * s - m.mean_square)
+    m.mean_root += weight * (math.sqrt(s) - m.mean_root)
 
 
 @njit(cache=True)
@@ -154,7 +156,8 @@ def _watch_motion(m: Any, p: Any, s: float, low: float, hysteresis: float, out: 
         if m.dip_frame - m.start >= p.shortest:
             n = close(m, p, m.dip_frame, 1.0 - m.valley / low, False, out)
         m.mode = STILL
-        m.rest = low * 0.5 * (t + 1 - m.start)
+        m.rest = 0.5 * low
+        m.rest_frames = p.still
         m.dip_frame = -1
     elif m.valley < hysteresis * m.peak and s >= max(m.valley / hysteresis, low):
         if m.valley_frame - m.start >= p.shortest:
@@ -171,15 +174,16 @@ def _watch_motion(m: Any, p: Any, s: float, low: float, hysteresis: float, out: 
 def _watch_pause(m: Any, p: Any, s: float, low: float, out: FloatArray) -> int:
     """Look for the rise that ends a pause."""
     t = m.frames - 1
-    mean = m.rest / max(t - m.start, 1)
     if m.mode == OPENING:  # no motion has been seen yet: the rest itself is the only measure
-        low = 2.0 * mean
+        low = 2.0 * m.rest
+    if s < low or m.mode == OPENING:
+        m.rest_frames += 1
+        m.rest += (s - m.rest) / m.rest_frames
     if s < low:
         m.dip_frame = -1
     elif m.dip_frame < 0:
         m.dip_frame = t
-    m.rest += s
-    if s < max(2.0 * low, 4.0 * mean) or m.dip_frame - m.start < p.still:
+    if s < max(2.0 * low, 4.0 * m.rest) or m.dip_frame - m.start < p.still:
         return 0
     n = close(m, p, m.dip_frame, 1.0 - low / s, True, out)
     m.mode = MOVING
@@ -215,7 +219,6 @@ def watch(m: Any, p: Any, s: float, hysteresis: float, out: FloatArray) -> int:
         if m.mode != STILL and m.valley_frame - m.start >= p.shortest:
             end = m.valley_frame
         n = close(m, p, end, 0.0, m.mode == STILL or m.peak <= low, out)
-        m.rest = 0.0
         m.dip_frame = -1
         m.peak = s
         m.valley = s
