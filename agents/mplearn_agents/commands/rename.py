@@ -1,0 +1,27 @@
+"""``mplearn rename``: gives a primitive a name."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+HELP = "Give a primitive of a library a name; its id stays."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument("library", type=Path, help="library file, which is changed")
+    parser.add_argument("primitive", metavar="ID", help="id or present name of the primitive")
+    parser.add_argument("name", help="its new name")
+
+
+def run(args: argparse.Namespace) -> None:
+    """Rename the primitive and save the library."""
+    from mplearn.library import PrimitiveLibrary
+
+    library = PrimitiveLibrary.load(args.library)
+    digits = args.primitive.isdecimal() and args.primitive not in library
+    key = int(args.primitive) if digits else args.primitive
+    before = library[key]
+    library.rename(key, args.name).save(args.library)
+    print(f"primitive {before.id}: {before.name} -> {args.name}")

@@ -1,0 +1,40 @@
+"""``mplearn show``: what a library holds."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+HELP = "Show the primitives, the tree and the transitions of a library."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument("library", type=Path, help="library file")
+    parser.add_argument(
+        "--report", type=Path, metavar="FILE.html", help="write a page with figures"
+    )
+
+
+def run(args: argparse.Namespace) -> None:
+    """Print the tables, and write the page where one is asked for."""
+    from rich.console import Console
+
+    from mplearn.library import PrimitiveLibrary
+    from mplearn_agents.tables import primitive_table, primitive_tree, transition_table
+
+    console = Console()
+    library = PrimitiveLibrary.load(args.library)
+    for table in (primitive_table(library), transition_table(library), primitive_tree(library)):
+        console.print(table)
+    console.print(
+        f"{len(library)} primitives, {len(library.channels)} channels at {library.rate_hz:g} Hz, "
+        f"body {library.body or 'none'}, version {library.version}"
+    )
+    if args.report:
+        from mplearn_agents.report import library_page, render_page
+
+        page = render_page(library_page(library, args.library.name))
+        args.report.parent.mkdir(parents=True, exist_ok=True)
+        args.report.write_text(page, encoding="utf-8")
+        console.print(f"page written to {args.report}")

@@ -1,0 +1,115 @@
+"""A stage on which bodies stand side by side, and pictures of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mplearn.errors import MissingDependencyError
+from mplearn.recording import FloatArray
+
+if TYPE_CHECKING:
+    import mujoco
+
+#: Distance between neighbours on the stage [m].
+APART_M = 1.15
+
+
+class Stage:
+    """Renders postures, not physics: a posture is shown as it is given.
+
+    Use it in a ``with`` block; it holds a renderer.
+
+    Args:
+        bodies: MJCF text of each body, from left to right as the audience sees them; the first one
+            brings floor and light.
+        size: Width and height of a picture [pixels].
+
+    Raises:
+        MissingDependencyError: There is no off-screen renderer on this machine.
+    """
+
+    def __init__(self, bodies: Sequence[str], size: tuple[int, int] = (640, 480)) -> None:
+        import mujoco
+
+        self.bodies, self.size = tuple(bodies), size
+        self._model = _scene(self.bodies)
+        self._data = mujoco.MjData(self._model)
+        self._starts = np.flatnonzero(self._model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
+        self._starts = self._model.jnt_qposadr[self._starts]
+        self._camera = mujoco.MjvCamera()
+        self._camera.lookat[:] = (0.0, 0.0, 1.02)
+        self._camera.distance = 3.25
+        self._camera.azimuth, self._camera.elevation = 170.0, -9.0
+        try:
+            self._renderer = mujoco.Renderer(self._model, height=size[1], width=size[0])
+        except Exception as error:  # what fails depends on the machine's graphics libraries
+            raise MissingDependencyError(
+                "there is no off-screen renderer here: install libegl1 and libgl1-mesa-dri, or "
+                "libosmesa6, and set MUJOCO_GL to 'egl' or 'osmesa'"
+            ) from error
+        # shadows and reflections take three quarters of the time where there is no graphics card
+        for effect in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
+            self._renderer.scene.flags[effect] = 0
+
+    def picture(self, postures: Sequence[FloatArray]) -> NDArray[np.uint8]:
+        """Return a picture, shape (H, W, 3), of one posture a body, each as its qpos (7 + n,)."""
+        import mujoco
+
+        for start, posture, y in zip(
+            self._starts, postures, _places(len(self.bodies)), strict=True
+        ):
+            qpos = self._data.qpos[start : start + len(posture)]
+            qpos[:] = posture
+            qpos[1] += y
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_camlight(self._model, self._data)
+        self._renderer.update_scene(self._data, self._camera)
+        picture: NDArray[np.uint8] = self._renderer.render()
+        return picture.copy()
+
+    def close(self) -> None:
+        """Give the renderer back."""
+        self._renderer.close()
+
+    def __enter__(self) -> Stage:
+        """Return the stage itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Give the renderer back."""
+        self.close()
+
+
+def _places(n: int) -> FloatArray:
+    """Return where each body stands, across the stage [m]; y points to the audience's right."""
+    return APART_M * (np.arange(n) - (n - 1) / 2)
+
+
+def _scene(bodies: Sequence[str]) -> mujoco.MjModel:
+    import mujoco
+
+    scene = mujoco.MjSpec.from_string(bodies[0])
+    for k, xml in enumerate(bodies[1:]):
+        body = mujoco.MjSpec.from_string(xml)
+        scene.attach(body, prefix=f"body_{k + 2}_", frame=scene.worldbody.add_frame())
+    for y in _places(len(bodies)):
+        for radius in (0.14, 0.19, 0.25, 0.32):  # a soft shade under each body
+            scene.worldbody.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+                size=(radius, 0.001, 0.0),
+                pos=(0.02, y, 0.002 + 0.01 * (0.32 - radius)),
+                rgba=(0.1, 0.13, 0.2, 0.09),
+                contype=0,
+                conaffinity=0,
+            )
+    return scene.compile()

@@ -1,0 +1,130 @@
+"""Learning while one looks on: what happened, kept as it happens, and a bar that shows it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from mplearn.events import (
+    Event,
+    PrimitiveBorn,
+    PrimitiveMerged,
+    PrimitiveSplit,
+    Recognised,
+    SegmentClosed,
+)
+from mplearn.recording import Recording, Segment
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from mplearn.learner import MotionLearner
+
+
+@dataclass
+class LearningLog:
+    """What a learner said, in the order in which it said it.
+
+    Attributes:
+        segments: All segments, pauses too.
+        recognised: For each segment that was recognised on arrival, by its start: its primitive.
+        known: Number of primitives known, each with the frame from which on.
+        watched_s: Length of the streams so far [s].
+        learning_s: How long learning took [s], reading and drawing left out.
+    """
+
+    segments: list[Segment] = field(default_factory=list)
+    recognised: dict[int, int] = field(default_factory=dict)
+    known: list[tuple[int, int]] = field(default_factory=list)
+    watched_s: float = 0.0
+    learning_s: float = 0.0
+    _alive: set[int] = field(default_factory=set)
+
+    @property
+    def n_primitives(self) -> int:
+        """How many primitives are known by now."""
+        return len(self._alive)
+
+    @property
+    def times_real_time(self) -> float:
+        """How much faster than real time learning was."""
+        return self.watched_s / self.learning_s if self.learning_s > 0 else 0.0
+
+    @property
+    def moving(self) -> list[Segment]:
+        """The segments in which something moves."""
+        return [segment for segment in self.segments if not segment.still]
+
+    def note(self, event: Event) -> None:
+        """Keep what an event says."""
+        match event:
+            case SegmentClosed(segment):
+                self.segments.append(segment)
+            case Recognised(segment, primitive):
+                self.recognised[segment.start] = primitive
+            case PrimitiveBorn(segment, primitive):
+                self._alive.add(primitive)
+                self.known.append((segment.end, len(self._alive)))
+            case PrimitiveMerged(segment, _, absorbed):
+                self._alive.discard(absorbed)
+                self.known.append((segment.end, len(self._alive)))
+            case PrimitiveSplit(segment, primitive, into):
+                self._alive.discard(primitive)
+                self._alive.update(into)
+                self.known.append((segment.end, len(self._alive)))
+            case _:
+                pass
+
+
+def learn(learner: MotionLearner, recordings: Sequence[Recording], console: Console) -> LearningLog:
+    """Show recordings to a learner, frame by frame, with a bar on the console.
+
+    A stream ends with each recording.
+    """
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    log = LearningLog()
+    columns = (
+        TextColumn("[bold]learning"),
+        BarColumn(bar_width=32),
+        TextColumn("{task.percentage:3.0f} %"),
+        TextColumn("[cyan]{task.fields[speed]:.0f} x real time"),
+        TextColumn("[green]{task.fields[primitives]} primitives"),
+        TextColumn("{task.fields[segments]} segments"),
+        TimeElapsedColumn(),
+    )
+    total_s = sum(recording.duration_s for recording in recordings)
+    with Progress(*columns, console=console) as progress:
+        bar = progress.add_task("learn", total=total_s, speed=0.0, primitives=0, segments=0)
+        for recording in recordings:
+            before_s = log.watched_s
+            begin = time.perf_counter()
+            for event in _events(learner, recording):
+                log.note(event)
+                if isinstance(event, SegmentClosed):
+                    now = time.perf_counter()
+                    log.learning_s += now - begin
+                    begin = now
+                    log.watched_s += event.segment.length_frames / recording.rate_hz
+                    _show(progress, bar, log)
+            log.learning_s += time.perf_counter() - begin
+            log.watched_s = before_s + recording.duration_s
+            _show(progress, bar, log)
+    return log
+
+
+def _events(learner: MotionLearner, recording: Recording) -> Iterable[Event]:
+    yield from learner.learn_recording(recording)
+    yield from learner.end_stream()
+
+
+def _show(progress: object, bar: object, log: LearningLog) -> None:
+    progress.update(  # type: ignore[attr-defined]
+        bar,
+        completed=log.watched_s,
+        speed=log.times_real_time,
+        primitives=log.n_primitives,
+        segments=len(log.moving),
+    )

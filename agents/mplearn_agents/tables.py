@@ -1,0 +1,78 @@
+"""What a library holds, as tables on the console."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from rich.table import Table
+    from rich.tree import Tree
+
+    from mplearn.library import Primitive, PrimitiveLibrary
+
+
+def most_active(primitive: Primitive, channels: Sequence[str], k: int = 3) -> tuple[str, ...]:
+    """Return the names of the channels that a primitive moves most, most active first."""
+    travel = np.ptp(primitive.hmm.means, axis=0)
+    return tuple(channels[i] for i in np.argsort(-travel, kind="stable")[:k])
+
+
+def primitive_table(library: PrimitiveLibrary) -> Table:
+    """Return a row for each primitive."""
+    from rich.table import Table
+
+    table = Table(title="primitives", title_justify="left")
+    for name, justify in (("id", "right"), ("name", "left"), ("demonstrations", "right")):
+        table.add_column(name, justify=justify)  # type: ignore[arg-type]
+    table.add_column("duration", justify="right")
+    table.add_column("most active")
+    for primitive in library.primitives:
+        table.add_row(
+            str(primitive.id),
+            primitive.name,
+            str(primitive.n_exemplars),
+            f"{primitive.mean_duration_s:.2f} s",
+            ", ".join(most_active(primitive, library.channels)),
+        )
+    return table
+
+
+def transition_table(library: PrimitiveLibrary) -> Table:
+    """Return a row for each primitive: what followed it, the most frequent first."""
+    from rich.table import Table
+
+    graph = library.graph.to_networkx()
+    table = Table(title="transitions", title_justify="left")
+    table.add_column("after")
+    table.add_column("comes")
+    for primitive in library.primitives:
+        out = sorted(
+            graph.out_edges(primitive.id, data=True), key=lambda e: (-e[2]["probability"], e[1])
+        )
+        following = ", ".join(
+            f"{library[after].name} {100 * edge['probability']:.0f} %" for _, after, edge in out
+        )
+        table.add_row(primitive.name, following or "[dim]nothing was seen to follow[/dim]")
+    return table
+
+
+def primitive_tree(library: PrimitiveLibrary) -> Tree:
+    """Return the tree that the primitives were learned in."""
+    from rich.tree import Tree
+
+    below: dict[int | None, list[int]] = {}
+    counts = {node.id: node.n_exemplars for node in library.tree}
+    for node in library.tree:
+        below.setdefault(node.parent, []).append(node.id)
+
+    def grow(branch: Tree, parent: int | None) -> None:
+        for id in below.get(parent, ()):
+            name = library[id].name if id in library else f"node {id}"
+            grow(branch.add(f"{name} [dim]{counts[id]} demonstrations[/dim]"), id)
+
+    tree = Tree("tree")
+    grow(tree, None)
+    return tree
