@@ -10,20 +10,24 @@ that the angles need no compromise, and the base is scaled by the ratio of the l
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mplearn.errors import BodyError
 from mplearn.recording import FloatArray, IntArray
 
-from .body import Body
 from .first_posture import first_posture, place_trunk, settle
-from .sizes import fit_sizes
+from .follower import Follower
+from .follower import follower as make_follower
+from .human import human_body
+from .markers import MarkerSet
+from .sizes import fit_sizes, match_sizes
 from .tree import KinematicTree
 
 ROUNDS = 6
+SIZE_SIGMA, FIXED_SIGMA = 0.08, 1e-4  # of a segment's length, relative to the overall size
 FRAMES = 12  # postures that the fit takes from the stretch it is given
 WORST_FIT_M = 0.06  # root mean square distance above which the markers are not this body's
 
@@ -63,55 +67,90 @@ class Calibration:
         return cls(**state)
 
 
-def fit(
-    body: Body,
-    names: Sequence[str],
-    bodies: IntArray,
-    template: FloatArray,
-    frames: FloatArray,
-) -> Calibration:
-    """Fit a body to markers.
+def fit(follower: Follower, markers: MarkerSet, frames: FloatArray) -> Calibration:
+    """Fit a body to a person's markers: the human body first, then, if it is another, that one.
+
+    The human body, with its spine and clavicles, measures the person; the robot's links then take
+    those lengths, and only the markers' places are fitted again.
 
     Args:
-        body: The body.
-        names: Names of the markers, length M, for messages.
-        bodies: Body of each marker, shape (M,).
-        template: Expected place of each marker in its body's frame, shape (M, 3) [m].
+        follower: The body as the solver sees it.
+        markers: The markers, in the frames' order.
         frames: Measured positions, shape (T, M, 3) [m]; NaN where missing.
 
     Raises:
         BodyError: The markers do not look like a person in metres, upright, z up.
     """
-    chosen = _choose(frames, names)
-    size, start = place_trunk(body, bodies, template, chosen[0])
-    factors = np.full_like(body.tree.offset, size)
-    offsets = template * size
-    tree = body.tree.scaled(factors)
-    first = first_posture(body, tree, bodies, offsets, start, chosen[0])
-    postures = np.tile(first, (len(chosen), 1))
-    for _ in range(ROUNDS):
-        settle(body, tree, bodies, offsets, postures, chosen)
-        factors, offsets = fit_sizes(body, size, bodies, template, postures, chosen)
-        tree = body.tree.scaled(factors)
-    residuals = settle(body, tree, bodies, offsets, postures, chosen)
-    rms = float(np.sqrt(np.nanmean(residuals**2)))
+    chosen = _choose(frames, markers.names)
+    person = follower if follower.is_human else make_follower(human_body())
+    bodies, template = markers.attach(person.tree)
+    size, start = place_trunk(person, bodies, template, chosen[0])
+    sizes = np.full_like(person.tree.offset, size)
+    found = _alternate(person, sizes, SIZE_SIGMA, bodies, template, start, chosen)
+    if person is not follower:
+        measured = person.tree.scaled(found.factors)
+        sizes = match_sizes(follower.tree, measured)
+        placed = replace(markers, offsets=found.offsets)
+        bodies, template = placed.attach(follower.tree.scaled(sizes), measured)
+        start = follower.tree.rest
+        start[:7] = found.postures[0, :7]
+        template = template / sizes[bodies]
+        found = _alternate(follower, sizes, FIXED_SIGMA, bodies, template, start, chosen)
+    rms = float(np.sqrt(np.nanmean(found.residuals**2)))
     if rms > WORST_FIT_M:
-        worst = np.argsort(-np.nan_to_num(np.nanmean(residuals, axis=0)))[:4]
+        mean = np.nan_to_num(np.nanmean(found.residuals, axis=0))
+        worst = [markers.names[i] for i in np.argsort(-mean)[:4]]
         raise BodyError(
-            f"the markers lie {1000 * rms:.0f} mm from where they belong on {body.name!r} "
-            f"({1000 * WORST_FIT_M:.0f} mm allowed), farthest {[names[i] for i in worst]}: are they "
-            f"mirrored, swapped, or of another set?"
+            f"the markers lie {1000 * rms:.0f} mm from where they belong on {follower.body.name!r} "
+            f"({1000 * WORST_FIT_M:.0f} mm allowed), farthest {worst}: are they mirrored, swapped, "
+            f"or of another set?"
         )
+    tree = follower.tree.scaled(found.factors)
     standing = tree.rest
     return Calibration(
-        factors=factors,
-        offsets=offsets,
-        scale=float(body.tree.offset[0, 2] / standing[2]),
-        floor_m=_floor(tree, postures),
+        factors=found.factors,
+        offsets=found.offsets,
+        scale=float(follower.tree.offset[0, 2] / standing[2]),
+        floor_m=_floor(tree, found.postures),
         height_m=float(tree.site_positions(standing)[tree.site_names.index("head_top"), 2]),
         residual_m=rms,
-        posture=postures[0],
+        posture=found.postures[0],
     )
+
+
+class _Fit(NamedTuple):
+    factors: FloatArray  # (B, 3)
+    offsets: FloatArray  # (M, 3)
+    postures: FloatArray  # (K, 7 + n)
+    residuals: FloatArray  # (K, M)
+
+
+def _alternate(
+    follower: Follower,
+    sizes: FloatArray,
+    size_sigma: float,
+    bodies: IntArray,
+    template: FloatArray,
+    start: FloatArray,
+    frames: FloatArray,
+) -> _Fit:
+    """Estimate postures, and sizes with places, in turn."""
+    tree = follower.tree.scaled(sizes)
+    offsets = template * sizes[bodies]
+    factors = sizes
+    last = first_posture(follower, tree, bodies, offsets, start, frames[0])
+    postures = np.empty((len(frames), len(last)))
+    for k in range(len(frames)):  # from one to the next, so that no limb loses its way
+        postures[k] = last
+        settle(follower, tree, bodies, offsets, postures[k : k + 1], frames[k : k + 1])
+        last = postures[k]
+    for _ in range(ROUNDS):
+        factors, offsets = fit_sizes(
+            follower.tree, sizes, size_sigma, bodies, template, postures, frames
+        )
+        tree = follower.tree.scaled(factors)
+        residuals = settle(follower, tree, bodies, offsets, postures, frames)
+    return _Fit(factors, offsets, postures, residuals)
 
 
 def _choose(frames: FloatArray, names: Sequence[str]) -> FloatArray:

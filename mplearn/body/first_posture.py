@@ -7,14 +7,14 @@ import numpy as np
 from mplearn.errors import BodyError
 from mplearn.recording import FloatArray, IntArray
 
-from .body import Body
+from .follower import Follower
 from .gauss_newton import Linkage, solve_frame
 from .tree import KinematicTree
 
 TRUNK = ("pelvis", "abdomen", "chest", "clavicle_l", "clavicle_r", "head")
 LEAST_UPRIGHT = 0.35  # cosine of the trunk's lean
 SMALLEST, LARGEST = 0.35, 1.6  # size relative to the body
-MARKER_SIGMA_M, OUTLIER_M = 0.01, 0.15
+MARKER_SIGMA_M, OUTLIER_M, REST_WEIGHT = 0.01, 0.15, 0.1
 
 # where limbs may be in the first frame [deg], for the left; about x and z the right is mirrored
 ARM_STARTS: tuple[dict[str, float], ...] = (
@@ -39,12 +39,12 @@ LEG_STARTS: tuple[dict[str, float], ...] = (
 
 
 def place_trunk(
-    body: Body, bodies: IntArray, template: FloatArray, frame: FloatArray
+    follower: Follower, bodies: IntArray, template: FloatArray, frame: FloatArray
 ) -> tuple[float, FloatArray]:
     """Fit the upright body's trunk to the markers: one size, one rotation, one shift.
 
     Args:
-        body: The body.
+        follower: The body as the solver sees it.
         bodies: Body of each marker, shape (M,).
         template: Place of each marker in its body's frame, shape (M, 3) [m].
         frame: Measured positions, shape (M, 3) [m]; NaN where missing.
@@ -55,13 +55,13 @@ def place_trunk(
     Raises:
         BodyError: Too few trunk markers, or they are not upright, mirrored, or of a strange size.
     """
-    trunk = [i for i, name in enumerate(body.tree.body_names) if name in TRUNK]
+    trunk = [i for i, name in enumerate(follower.tree.body_names) if name in TRUNK]
     rows = np.flatnonzero(np.isin(bodies, trunk) & np.isfinite(frame).all(axis=1))
     if len(rows) < 4:
         raise BodyError(
             f"calibration needs 4 markers on pelvis, chest and head in sight, not {len(rows)}"
         )
-    expected = body.tree.points(body.rest, bodies[rows], template[rows])
+    expected = follower.tree.points(follower.tree.rest, bodies[rows], template[rows])
     measured = frame[rows]
     a, b = expected - expected.mean(axis=0), measured - measured.mean(axis=0)
     u, s, vt = np.linalg.svd(b.T @ a)
@@ -77,7 +77,7 @@ def place_trunk(
         )
     if not SMALLEST < size < LARGEST:
         raise BodyError(
-            f"the trunk is {size:.3g} times as large as {body.name!r}'s; {SMALLEST} to {LARGEST} "
+            f"the trunk is {size:.3g} times as large as {follower.body.name!r}'s; {SMALLEST} to {LARGEST} "
             f"are people, in metres"
         )
     if turn[2, 2] < LEAST_UPRIGHT:
@@ -86,14 +86,14 @@ def place_trunk(
             f"the trunk leans {lean:.0f} deg from upright in the first frames: calibrate on a "
             f"standing person, with z up"
         )
-    q = body.rest
+    q = follower.tree.rest
     q[:3] = measured.mean(axis=0) + size * turn @ (q[:3] - expected.mean(axis=0))
     q[3:7] = _quaternion(turn)
     return size, q
 
 
 def first_posture(
-    body: Body,
+    follower: Follower,
     tree: KinematicTree,
     bodies: IntArray,
     offsets: FloatArray,
@@ -103,7 +103,7 @@ def first_posture(
     """Find the posture of a single frame from the trunk's place: each limb's best of several starts.
 
     Args:
-        body: The body.
+        follower: The body as the solver sees it.
         tree: Its kinematics in the person's size.
         bodies: Body of each marker, shape (M,).
         offsets: Place of each marker, shape (M, 3) [m].
@@ -120,9 +120,9 @@ def first_posture(
             ).items():
                 mirrored = side == "r" and name.endswith(("roll", "yaw"))
                 joint = f"{name}_{side}"
-                if joint in body.joint_names:
-                    q[7 + body.joint_names.index(joint)] = np.radians(-angle if mirrored else angle)
-    residuals = settle(body, tree, bodies, offsets, postures, np.tile(frame, (n_starts, 1, 1)))
+                if joint in tree.joint_names:
+                    q[7 + tree.joint_names.index(joint)] = np.radians(-angle if mirrored else angle)
+    residuals = settle(follower, tree, bodies, offsets, postures, np.tile(frame, (n_starts, 1, 1)))
     best = postures[np.argmin(np.nanmean(residuals**2, axis=1))].copy()
     for limb, _ in limbs:
         markers = np.isin(bodies, limb) & np.isfinite(frame).all(axis=1)
@@ -131,12 +131,12 @@ def first_posture(
             errors = (residuals[:, markers] ** 2).sum(axis=1) / MARKER_SIGMA_M**2
             effort = (postures[:, 7 + hinges] ** 2).sum(axis=1)
             best[7 + hinges] = postures[np.argmin(errors + effort)][7 + hinges]
-    settle(body, tree, bodies, offsets, best[None], frame[None])
+    settle(follower, tree, bodies, offsets, best[None], frame[None])
     return best
 
 
 def settle(
-    body: Body,
+    follower: Follower,
     tree: KinematicTree,
     bodies: IntArray,
     offsets: FloatArray,
@@ -146,7 +146,7 @@ def settle(
     """Solve each frame by itself from a posture that may be far away, in place.
 
     Args:
-        body: The body.
+        follower: The body as the solver sees it.
         tree: Its kinematics in the person's size.
         bodies: Body of each marker, shape (M,).
         offsets: Place of each marker, shape (M, 3) [m].
@@ -157,7 +157,6 @@ def settle(
         Distance of each marker from its place, shape (K, M) [m].
     """
     residuals = np.full(frames.shape[:2], np.nan)
-    free = np.array([True] * 6 + [name not in body.held for name in body.joint_names])
     limits = np.concatenate((np.tile((-np.inf, np.inf), (6, 1)), tree.limits))
     linkage = Linkage.of(tree)
     for q, frame, residual in zip(postures, frames, residuals, strict=True):
@@ -172,8 +171,8 @@ def settle(
             linkage,
             limits[:, 0] - angles,
             limits[:, 1] - angles,
-            free,
-            np.full(len(tree.axis), 0.1),
+            follower.free,
+            np.maximum(follower.rest_weight, REST_WEIGHT),
             OUTLIER_M,
             10.0,
             0.5,

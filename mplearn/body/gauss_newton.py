@@ -28,6 +28,7 @@ class Linkage(NamedTuple):
     offset: FloatArray
     rotation: FloatArray
     joint_body: IntArray
+    slides: BoolArray
     axis: FloatArray
     anchor: FloatArray
     first: IntArray
@@ -40,6 +41,7 @@ class Linkage(NamedTuple):
             tree.offset,
             tree.rotation,
             tree.joint_body,
+            tree.slides,
             tree.axis,
             tree.anchor,
             first_joints(tree.joint_body, len(tree.parent)),
@@ -116,6 +118,7 @@ def solve_frame(
             mat[0],
             axes,
             anchors,
+            linkage.slides,
             linkage.parent,
             linkage.first,
             jacobian,
@@ -162,6 +165,7 @@ def locate(
         linkage.offset,
         linkage.rotation,
         linkage.joint_body,
+        linkage.slides,
         linkage.axis,
         linkage.anchor,
         pos,

@@ -18,6 +18,7 @@ from mplearn.recording import FloatArray
 
 from .body import Body
 from .calibration import Calibration, fit
+from .follower import follower
 from .gauss_newton import Linkage, solve_frame
 from .markers import MarkerSet, find_marker_set
 
@@ -101,11 +102,10 @@ class InverseKinematics:
             raise BodyError(f"marker set {self.markers.name!r} has none of {self.marker_names[:6]}")
         self._used = np.flatnonzero(known)
         selected = self.markers.select([self.marker_names[i] for i in self._used])
-        self._bodies, self._template = selected.attach(body.tree)
-        self._free = np.array(
-            [True] * 6 + [name not in body.held for name in body.joint_names], dtype=np.bool_
-        )
-        n = len(body.joint_names)
+        self._follower = follower(body)
+        self._selected = selected
+        self._bodies, _ = selected.attach(self._follower.tree)
+        n = len(self._follower.tree.joint_names)
         self._drift = np.array([self.config.base_drift] * 3 + [self.config.joint_drift] * (3 + n))
         self._weights = np.full(len(self._used), self.config.marker_sigma_m**-2)
         self.calibration: Calibration | None = None
@@ -127,18 +127,17 @@ class InverseKinematics:
             raise FrameError(
                 f"markers must have shape (T, {len(self.marker_names)}, 3), not {frames.shape}"
             )
-        names = [self.marker_names[i] for i in self._used]
-        self._start(fit(self.body, names, self._bodies, self._template, frames[:, self._used]))
+        self._start(fit(self._follower, self._selected, frames[:, self._used]))
         assert self.calibration is not None
         return self.calibration
 
     def _start(self, calibration: Calibration) -> None:
         """Take over a fit, and begin at its posture without knowing it well."""
         self.calibration = calibration
-        self._tree = self.body.tree.scaled(calibration.factors)
+        self._tree = self._follower.tree.scaled(calibration.factors)
         self._linkage = Linkage.of(self._tree)
         self._posture = calibration.posture.copy()
-        self._variance = np.full(self.body.tree.n_dofs, self.config.most_uncertain**2)
+        self._variance = np.full(self._tree.n_dofs, self.config.most_uncertain**2)
         self._fresh = True
         self.q = self._on_body()
 
@@ -179,7 +178,7 @@ class InverseKinematics:
     def _solve(self, frame: FloatArray, residuals: FloatArray, dt: float) -> int:
         config = self.config
         angles, limits = self._posture[7:], self._tree.limits
-        reach = np.full(self.body.tree.n_dofs, config.joint_speed * dt)
+        reach = np.full(self._tree.n_dofs, config.joint_speed * dt)
         reach[:3] = config.base_speed * dt
         if self._fresh:
             reach[:] = np.inf
@@ -198,8 +197,8 @@ class InverseKinematics:
                 self._linkage,
                 low,
                 high,
-                self._free,
-                dt / config.rest_s / self._variance[6:],
+                self._follower.free,
+                self._follower.rest_weight + dt / config.rest_s / self._variance[6:],
                 config.outlier_m,
                 3.0,
                 0.5,
@@ -212,7 +211,7 @@ class InverseKinematics:
     def _on_body(self) -> FloatArray:
         """Return the posture in the body's own size, standing where the person's floor is."""
         assert self.calibration is not None
-        q = self._posture.copy()
+        q = self._posture[self._follower.own]
         q[2] -= self.calibration.floor_m
         q[:3] *= self.calibration.scale
         return q
@@ -223,7 +222,8 @@ class InverseKinematics:
 
         It stays small while the markers determine a joint, and grows while they do not.
         """
-        return np.sqrt(self._variance)
+        own = self._follower.own
+        return np.sqrt(self._variance[np.concatenate((np.arange(6), own[7:] - 1))])
 
     def state(self) -> dict[str, Any]:
         """Return what `load_state` needs to resume bit for bit."""

@@ -66,9 +66,22 @@ class MarkerSet:
         known = {plain_name(name) for name in self.names}
         return tuple(plain_name(name) in known for name in marker_names)
 
-    def attach(self, tree: KinematicTree) -> tuple[IntArray, FloatArray]:
-        """Put the markers on a body: index of each one's body (M,), and offsets there (M, 3) [m]."""
-        reference = human_body().tree
+    def attach(
+        self, tree: KinematicTree, reference: KinematicTree | None = None
+    ) -> tuple[IntArray, FloatArray]:
+        """Put the markers on a body.
+
+        Args:
+            tree: The body.
+            reference: Where the offsets were measured; the human of 1.75 m where not given.
+
+        Returns:
+            Index of each marker's body, shape (M,), and offsets there, shape (M, 3) [m].
+
+        Raises:
+            BodyError: The body lacks a segment that carries markers.
+        """
+        reference = reference or human_body().tree
         factors = segment_factors(tree, reference)
         bodies, offsets = [], []
         for carrier, offset in zip(self.bodies, self.offsets, strict=True):

@@ -6,18 +6,19 @@ import numpy as np
 
 from mplearn.recording import FloatArray, IntArray
 
-from .body import Body
 from .human import PROPORTIONS
+from .tree import KinematicTree
 
-SIZE_SIGMA = 0.08  # of a segment's length, relative to the person's overall size
 PLACE_SIGMA_M = 0.02  # of a marker's place on its segment
 MARKER_SIGMA_M = 0.005
+SHORTEST_M = 0.03  # a link shorter than this along an axis says nothing about its body's size
 NARROWEST, WIDEST = 0.7, 1.4  # bounds on a segment's length relative to the overall size
 
 
 def fit_sizes(
-    body: Body,
-    size: float,
+    tree: KinematicTree,
+    size: FloatArray,
+    size_sigma: float,
     bodies: IntArray,
     template: FloatArray,
     postures: FloatArray,
@@ -31,8 +32,9 @@ def fit_sizes(
     the base's position in each frame.
 
     Args:
-        body: The body.
-        size: The person's overall size relative to the body.
+        tree: The body, in its own size.
+        size: Expected size of each body relative to the tree's, shape (B, 3).
+        size_sigma: Standard deviation of a segment's size, relative to what is expected.
         bodies: Body of each marker, shape (M,).
         template: Expected place of each marker on the body, shape (M, 3) [m].
         postures: Posture in each frame, shape (K, 7 + n).
@@ -41,8 +43,7 @@ def fit_sizes(
     Returns:
         Factors on the body's sizes, shape (B, 3), and the markers' places, shape (M, 3) [m].
     """
-    tree = body.tree
-    groups = _groups(body)
+    groups = _groups(tree)
     n_groups, n_markers, n_frames = groups.max() + 1, len(bodies), len(frames)
     n_unknowns = n_groups + 3 * n_markers + 3 * n_frames
     rows, values = [], []
@@ -51,12 +52,12 @@ def fit_sizes(
         reach = np.zeros((len(tree.parent), 3, n_groups))  # body origins, per unit of each group
         for b in range(1, len(tree.parent)):
             p = tree.parent[b]
-            reach[b] = reach[p] + _per_group(mats[p], size * tree.offset[b], groups[p], n_groups)
+            reach[b] = reach[p] + _per_group(mats[p], size[p] * tree.offset[b], groups[p], n_groups)
         for m in np.flatnonzero(np.isfinite(frame).all(axis=1)):
             b = bodies[m]
             row = np.zeros((3, n_unknowns))
             row[:, :n_groups] = reach[b] + _per_group(
-                mats[b], size * template[m], groups[b], n_groups
+                mats[b], size[b] * template[m], groups[b], n_groups
             )
             row[:, n_groups + 3 * m : n_groups + 3 * m + 3] = mats[b]
             at = n_groups + 3 * n_markers + 3 * k
@@ -66,7 +67,7 @@ def fit_sizes(
     design = np.concatenate(rows) / MARKER_SIGMA_M
     target = np.concatenate(values) / MARKER_SIGMA_M
     prior_sigma = np.concatenate(
-        (np.full(n_groups, SIZE_SIGMA), np.full(3 * n_markers, PLACE_SIGMA_M))
+        (np.full(n_groups, size_sigma), np.full(3 * n_markers, PLACE_SIGMA_M))
     )
     precision = np.zeros(n_unknowns)
     precision[: len(prior_sigma)] = prior_sigma**-2
@@ -80,13 +81,42 @@ def fit_sizes(
     return factors, template * factors[bodies] + shifts
 
 
-def _groups(body: Body) -> IntArray:
+def match_sizes(tree: KinematicTree, person: KinematicTree) -> FloatArray:
+    """Return the factors, shape (B, 3), that give a tree's links the lengths of a person's.
+
+    Bodies are matched by name. What has no length to match (the hands, an axis along which nothing
+    hangs) takes the ratio of the hips' heights.
+    """
+    origins = _origins(person)
+    factors = np.full_like(tree.offset, person.offset[0, 2] / tree.offset[0, 2])
+    longest = np.full_like(tree.offset, SHORTEST_M)
+    for child, name in enumerate(tree.body_names):
+        parent = tree.parent[child]
+        if parent < 0 or name not in person.body_names:
+            continue
+        above = tree.body_names[parent]
+        if above not in person.body_names:
+            continue
+        length = np.abs(tree.offset[child])
+        wanted = np.abs(origins[person.body(name)] - origins[person.body(above)])
+        for axis in np.flatnonzero((length > longest[parent]) & (wanted > SHORTEST_M)):
+            factors[parent, axis] = wanted[axis] / length[axis]
+            longest[parent, axis] = length[axis]
+    return factors
+
+
+def _origins(tree: KinematicTree) -> FloatArray:
+    """Return the bodies' origins in the upright posture, shape (B, 3) [m]."""
+    return tree.forward(tree.rest)[0]
+
+
+def _groups(tree: KinematicTree) -> IntArray:
     """Return the group of each body's size along each axis, shape (B, 3); 0 is all else."""
-    groups = np.zeros(body.tree.offset.shape, dtype=np.int64)
+    groups = np.zeros(tree.offset.shape, dtype=np.int64)
     for group, (names, axes) in enumerate(PROPORTIONS.values(), start=1):
         for name in names:
-            if name in body.tree.body_names:
-                groups[body.tree.body(name), np.flatnonzero(axes)] = group
+            if name in tree.body_names:
+                groups[tree.body(name), np.flatnonzero(axes)] = group
     return groups
 
 

@@ -1,8 +1,8 @@
 """The kinematics of a body as plain arrays: postures, point positions, their Jacobian.
 
 MuJoCo's conventions throughout, so that `mj_kinematics` and `mj_jacSite` are exact oracles. A
-posture q has MuJoCo's qpos layout (free base, then hinges). A velocity has the layout of qvel:
-base velocity in the world's axes, base angular velocity in the base's own axes, then the hinge
+posture q has MuJoCo's qpos layout (free base, then hinges and slides). A velocity has the layout of qvel:
+base velocity in the world's axes, base angular velocity in the base's own axes, then the joint
 rates.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from mplearn.errors import BodyError
-from mplearn.recording import FloatArray, IntArray
+from mplearn.recording import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     import mujoco
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class KinematicTree:
-    """A tree of rigid bodies, each hung on its parent by zero or more hinges; the root is free.
+    """A tree of rigid bodies, each hung on its parent by hinges and slides; the root is free.
 
     Attributes:
         body_names: Names of the B bodies, parents before children.
@@ -31,11 +31,12 @@ class KinematicTree:
         offset: Position of each body in its parent's frame, shape (B, 3) [m]; for the root, its
             position in the upright posture.
         rotation: Orientation of each body in its parent's frame at rest, shape (B, 3, 3).
-        joint_names: Names of the n hinges.
-        joint_body: Body that each hinge moves, shape (n,), not decreasing.
-        axis: Hinge axes in the body's frame, shape (n, 3).
-        anchor: Hinge anchors in the body's frame, shape (n, 3) [m].
-        limits: Lower and upper joint limits, shape (n, 2) [rad].
+        joint_names: Names of the n joints.
+        joint_body: Body that each joint moves, shape (n,), not decreasing.
+        slides: Which joints slide along their axis instead of turning about it, shape (n,).
+        axis: Joint axes in the body's frame, shape (n, 3).
+        anchor: Joint anchors in the body's frame, shape (n, 3) [m].
+        limits: Lower and upper joint limits, shape (n, 2) [rad, or m for a slide].
         site_names: Names of the S sites.
         site_body: Body of each site, shape (S,).
         site_offset: Sites in their body's frame, shape (S, 3) [m].
@@ -47,6 +48,7 @@ class KinematicTree:
     rotation: FloatArray
     joint_names: tuple[str, ...]
     joint_body: IntArray
+    slides: BoolArray
     axis: FloatArray
     anchor: FloatArray
     limits: FloatArray
@@ -59,15 +61,16 @@ class KinematicTree:
         """Extract the kinematics of a compiled model.
 
         Raises:
-            BodyError: The model is not one tree with a free root, or has joints other than hinges.
+            BodyError: The model is not one tree with a free root, or has joints other than hinges and slides.
         """
         import mujoco
 
         kinds = model.jnt_type
         if model.nbody < 2 or model.body_jntnum[1] != 1 or kinds[0] != mujoco.mjtJoint.mjJNT_FREE:
             raise BodyError("the first body of the model needs one free joint")
-        if (kinds[1:] != mujoco.mjtJoint.mjJNT_HINGE).any():
-            raise BodyError("all joints but the base's must be hinges")
+        allowed = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+        if not np.isin(kinds[1:], [int(kind) for kind in allowed]).all():
+            raise BodyError("all joints but the base's must be hinges or slides")
         if (model.body_parentid[2:] == 0).any():
             raise BodyError("all bodies must hang on the first one; the model has several trees")
 
@@ -82,6 +85,7 @@ class KinematicTree:
             rotation=np.array([quaternion_matrix(q) for q in quats]),
             joint_names=tuple(name(mujoco.mjtObj.mjOBJ_JOINT, i) for i in range(1, model.njnt)),
             joint_body=model.jnt_bodyid[1:].astype(np.int64) - 1,
+            slides=kinds[1:] == int(mujoco.mjtJoint.mjJNT_SLIDE),
             axis=model.jnt_axis[1:].astype(np.float64),
             anchor=model.jnt_pos[1:].astype(np.float64),
             limits=np.where(
@@ -94,7 +98,7 @@ class KinematicTree:
 
     @property
     def n_dofs(self) -> int:
-        """Degrees of freedom: 6 of the base and one a hinge."""
+        """Degrees of freedom: 6 of the base and one a joint."""
         return 6 + len(self.joint_names)
 
     def body(self, name: str) -> int:
@@ -111,7 +115,7 @@ class KinematicTree:
         """Return the tree with each body's own lengths multiplied, factors (B, 3) in its frame's
         axes.
 
-        A body's factors move what is attached to it: its children, hinges and sites. The root's
+        A body's factors move what is attached to it: its children, joints and sites. The root's
         rest height follows, so that the soles stay on the floor.
         """
         if factors.shape != self.offset.shape or not (factors > 0).all():
@@ -133,7 +137,7 @@ class KinematicTree:
 
     @property
     def rest(self) -> FloatArray:
-        """The upright posture, all hinges at zero, shape (7 + n,)."""
+        """The upright posture, all joints at zero, shape (7 + n,)."""
         return np.concatenate((self.offset[0], (1.0, 0.0, 0.0, 0.0), np.zeros(len(self.axis))))
 
     def forward(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -162,7 +166,9 @@ class KinematicTree:
         points = pos[bodies] + np.einsum("mij,mj->mi", mat[bodies], offsets)
         out = np.zeros((len(bodies), 3, self.n_dofs))
         first = first_joints(self.joint_body, len(self.parent))
-        point_jacobian(points, bodies, pos[0], mat[0], axes, anchors, self.parent, first, out)
+        point_jacobian(
+            points, bodies, pos[0], mat[0], axes, anchors, self.slides, self.parent, first, out
+        )
         return out
 
     def _forward(self, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -177,6 +183,7 @@ class KinematicTree:
             self.offset,
             self.rotation,
             self.joint_body,
+            self.slides,
             self.axis,
             self.anchor,
             pos,
@@ -233,6 +240,7 @@ def forward_kinematics(
     offset: FloatArray,
     rotation: FloatArray,
     joint_body: IntArray,
+    slides: BoolArray,
     axis: FloatArray,
     anchor: FloatArray,
     pos: FloatArray,
@@ -240,7 +248,7 @@ def forward_kinematics(
     axes: FloatArray,
     anchors: FloatArray,
 ) -> None:
-    """Fill body positions and orientations, and each hinge's axis and anchor in the world."""
+    """Fill body positions and orientations, and each joint's axis and anchor in the world."""
     pos[0] = q[:3]
     mat[0] = quaternion_matrix(q[3:7])
     j = 0
@@ -265,6 +273,11 @@ def forward_kinematics(
                     along += mat[b, i, k] * axis[j, k]
                 anchors[j, i] = at
                 axes[j, i] = along
+            if slides[j]:
+                for i in range(3):
+                    pos[b, i] += axes[j, i] * q[7 + j]
+                j += 1
+                continue
             turn(mat[b], axis[j], q[7 + j])
             for i in range(3):
                 at = anchors[j, i]
@@ -282,6 +295,7 @@ def point_jacobian(
     base_mat: FloatArray,
     axes: FloatArray,
     anchors: FloatArray,
+    slides: BoolArray,
     parent: IntArray,
     first: IntArray,
     out: FloatArray,
@@ -299,6 +313,10 @@ def point_jacobian(
         b = bodies[m]
         while b >= 0:
             for j in range(first[b], first[b + 1]):
+                if slides[j]:
+                    for k in range(3):
+                        out[m, k, 6 + j] = axes[j, k]
+                    continue
                 rx, ry, rz = x - anchors[j, 0], y - anchors[j, 1], z - anchors[j, 2]
                 out[m, 0, 6 + j] = axes[j, 1] * rz - axes[j, 2] * ry
                 out[m, 1, 6 + j] = axes[j, 2] * rx - axes[j, 0] * rz
