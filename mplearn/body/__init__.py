@@ -2,6 +2,11 @@
 
 from .body import Body as Body
 from .calibration import Calibration as Calibration
+from .calibration import TooFewMarkersError as TooFewMarkersError
+from .features import feature_channels as feature_channels
+from .features import features_of as features_of
+from .features import foot_clearance as foot_clearance
+from .features import posture_of as posture_of
 from .human import PROPORTIONS as PROPORTIONS
 from .human import human_body as human_body
 from .inverse_kinematics import IKConfig as IKConfig
@@ -9,5 +14,6 @@ from .inverse_kinematics import InverseKinematics as InverseKinematics
 from .markers import MarkerSet as MarkerSet
 from .markers import find_marker_set as find_marker_set
 from .markers import marker_set as marker_set
+from .observer import MotionObserver as MotionObserver
 from .robot import robot_body as robot_body
 from .tree import KinematicTree as KinematicTree

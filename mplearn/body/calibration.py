@@ -18,7 +18,7 @@ import numpy as np
 from mplearn.errors import BodyError
 from mplearn.recording import FloatArray, IntArray
 
-from .first_posture import first_posture, place_trunk, settle
+from .first_posture import TooFewMarkersError, first_posture, place_trunk, settle
 from .follower import Follower
 from .follower import follower as make_follower
 from .human import human_body
@@ -159,11 +159,13 @@ def _choose(frames: FloatArray, names: Sequence[str]) -> FloatArray:
         raise BodyError("the markers hold infinite values; a missing marker is NaN")
     seen = np.isfinite(frames).all(axis=2)
     if not seen.any():
-        raise BodyError(f"none of the {len(names)} markers is seen in any of {len(frames)} frames")
+        raise TooFewMarkersError(
+            f"none of the {len(names)} markers is seen in any of {len(frames)} frames"
+        )
     good = np.flatnonzero(seen.sum(axis=1) >= 0.8 * seen.any(axis=0).sum())
     if seen.any(axis=0).mean() < 0.6 or not len(good):
         unseen = [name for name, ever in zip(names, seen.any(axis=0), strict=True) if not ever]
-        raise BodyError(
+        raise TooFewMarkersError(
             f"too few markers to calibrate: in the best of {len(frames)} frames "
             f"{seen.sum(axis=1).max()} of {len(names)} are seen; never seen: {unseen[:8]}"
         )

@@ -11,6 +11,11 @@ from .follower import Follower
 from .gauss_newton import Linkage, solve_frame
 from .tree import KinematicTree
 
+
+class TooFewMarkersError(BodyError):
+    """Not enough markers are in sight yet to fit a body to them."""
+
+
 TRUNK = ("pelvis", "abdomen", "chest", "clavicle_l", "clavicle_r", "head")
 LEAST_UPRIGHT = 0.35  # cosine of the trunk's lean
 SMALLEST, LARGEST = 0.35, 1.6  # size relative to the body
@@ -58,7 +63,7 @@ def place_trunk(
     trunk = [i for i, name in enumerate(follower.tree.body_names) if name in TRUNK]
     rows = np.flatnonzero(np.isin(bodies, trunk) & np.isfinite(frame).all(axis=1))
     if len(rows) < 4:
-        raise BodyError(
+        raise TooFewMarkersError(
             f"calibration needs 4 markers on pelvis, chest and head in sight, not {len(rows)}"
         )
     expected = follower.tree.points(follower.tree.rest, bodies[rows], template[rows])

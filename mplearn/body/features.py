@@ -1,0 +1,138 @@
+"""What the learner sees of a posture: base height, roll and pitch, and the driven joint angles.
+
+Position on the floor and heading are left out: a motion is the same motion wherever it is performed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mplearn.errors import BodyError
+from mplearn.recording import BoolArray, FloatArray, IntArray
+
+from .body import Body
+from .gauss_newton import Linkage
+from .robot import robot_body
+from .tree import forward_kinematics
+
+BASE_CHANNELS = ("base_height", "base_roll", "base_pitch")
+
+
+def feature_channels(body: Body | None = None) -> tuple[str, ...]:
+    """Return the channel names: the three of the base, then the driven joints (the robot's: 33)."""
+    return BASE_CHANNELS + (body or robot_body()).driven_names
+
+
+def features_of(q: FloatArray, body: Body | None = None) -> FloatArray:
+    """Return the features of postures.
+
+    The base's orientation is yaw, then pitch, then roll (z-y'-x''), of which the yaw is dropped.
+
+    Args:
+        q: Postures, shape (..., 7 + n).
+        body: The body; the robot where not given.
+
+    Returns:
+        Height [m], roll and pitch [rad], driven joint angles [rad], shape (..., 3 + driven).
+    """
+    body = body or robot_body()
+    if q.shape[-1] != body.nq:
+        raise BodyError(f"a posture of {body.name!r} has {body.nq} values, not {q.shape[-1]}")
+    w, x, y, z = np.moveaxis(q[..., 3:7], -1, 0)
+    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
+    base = np.stack((q[..., 2], roll, pitch), axis=-1)
+    return np.concatenate((base, q[..., 7 + body.driven]), axis=-1)
+
+
+def posture_of(
+    features: FloatArray,
+    x: float | FloatArray = 0.0,
+    y: float | FloatArray = 0.0,
+    yaw: float | FloatArray = 0.0,
+    body: Body | None = None,
+) -> FloatArray:
+    """Return the postures that features describe; the inverse of `features_of`.
+
+    Args:
+        features: Shape (..., 3 + driven).
+        x: Position of the base [m], a number or shape (...).
+        y: The same to the left [m].
+        yaw: Heading [rad].
+        body: The body; the robot where not given.
+
+    Returns:
+        Postures, shape (..., 7 + n); held joints are zero.
+    """
+    body = body or robot_body()
+    width = 3 + len(body.driven)
+    if features.shape[-1] != width:
+        raise BodyError(f"features of {body.name!r} have {width} values, not {features.shape[-1]}")
+    q = np.zeros((*features.shape[:-1], body.nq))
+    q[..., 0], q[..., 1], q[..., 2] = x, y, features[..., 0]
+    half = np.stack(np.broadcast_arrays(features[..., 1], features[..., 2], yaw)) / 2
+    (cr, cp, cy), (sr, sp, sy) = np.cos(half), np.sin(half)
+    q[..., 3] = cr * cp * cy + sr * sp * sy
+    q[..., 4] = sr * cp * cy - cr * sp * sy
+    q[..., 5] = cr * sp * cy + sr * cp * sy
+    q[..., 6] = cr * cp * sy - sr * sp * cy
+    q[..., 7 + body.driven] = features[..., 3:]
+    return q
+
+
+def foot_clearance(features: FloatArray, body: Body | None = None) -> FloatArray:
+    """Return how high each sole's lowest corner is above the other foot's or its own lowest.
+
+    Args:
+        features: Shape (T, 3 + driven).
+        body: The body; the robot where not given.
+
+    Returns:
+        Height of the left and the right sole above the lower of both, shape (T, 2) [m].
+    """
+    body = body or robot_body()
+    tree = body.tree
+    soles = [i for i, site in enumerate(tree.site_names) if site.startswith("sole_")]
+    left = np.array([tree.site_names[i].endswith("_l") for i in soles])
+    lowest = _lowest_corners(
+        posture_of(np.atleast_2d(features), body=body),
+        Linkage.of(tree),
+        tree.site_body[soles],
+        tree.site_offset[soles],
+        left,
+    )
+    return lowest - lowest.min(axis=1, keepdims=True)
+
+
+@njit(cache=True)
+def _lowest_corners(
+    postures: FloatArray, linkage: Linkage, bodies: IntArray, offsets: FloatArray, left: BoolArray
+) -> FloatArray:
+    n_bodies, n = len(linkage.parent), len(linkage.axis)
+    pos, mat = np.empty((n_bodies, 3)), np.empty((n_bodies, 3, 3))
+    axes, anchors = np.empty((n, 3)), np.empty((n, 3))
+    lowest = np.full((len(postures), 2), np.inf)
+    for t in range(len(postures)):
+        forward_kinematics(
+            postures[t],
+            linkage.parent,
+            linkage.offset,
+            linkage.rotation,
+            linkage.joint_body,
+            linkage.slides,
+            linkage.axis,
+            linkage.anchor,
+            pos,
+            mat,
+            axes,
+            anchors,
+        )
+        for s in range(len(bodies)):
+            b = bodies[s]
+            height = pos[b, 2]
+            for k in range(3):
+                height += mat[b, 2, k] * offsets[s, k]
+            side = 0 if left[s] else 1
+            lowest[t, side] = min(lowest[t, side], height)
+    return lowest
