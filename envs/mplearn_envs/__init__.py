@@ -1,0 +1,8 @@
+"""Gymnasium environments whose actions are motion primitives: ``gym.make("mplearn/PrimitiveHumanoid-v0")``."""
+
+from gymnasium.envs.registration import register
+
+register(
+    id="mplearn/PrimitiveHumanoid-v0",
+    entry_point="mplearn_envs.primitive_humanoid:PrimitiveHumanoidEnv",
+)

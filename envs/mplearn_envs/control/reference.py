@@ -163,6 +163,41 @@ def lowest_sole(robot: Robot, q: FloatArray) -> float:
     return float(soles(robot, q)[..., 2].min())
 
 
+def sole_heights(robot: Robot, frames: FloatArray) -> FloatArray:
+    """Return the height of each sole's lowest corner along a motion, shape (T, 2) [m].
+
+    Args:
+        robot: The robot.
+        frames: Values of the robot's channels, shape (T, 3 + n) [m, rad].
+    """
+    model = robot.model()
+    feet = np.array([model.body(n).id - 1 for n in robot.feet])
+    return _lowest(mass_tree(model), feet, sole_corners(robot), np.ascontiguousarray(frames))
+
+
+@njit(cache=True)
+def _lowest(
+    tree: MassTree, feet: IntArray, corners: FloatArray, frames: FloatArray
+) -> FloatArray:
+    out = np.full((frames.shape[0], 2), np.inf)
+    q = np.zeros(4 + frames.shape[1])
+    for t in range(frames.shape[0]):
+        q[2] = frames[t, 0]
+        cr, sr = np.cos(0.5 * frames[t, 1]), np.sin(0.5 * frames[t, 1])
+        cp, sp = np.cos(0.5 * frames[t, 2]), np.sin(0.5 * frames[t, 2])
+        q[3], q[4], q[5], q[6] = cp * cr, cp * sr, sp * cr, -sp * sr
+        q[7:] = frames[t, 3:]
+        pose = forward(tree, q)
+        for side in range(2):
+            foot = feet[side]
+            for corner in range(corners.shape[1]):
+                z = pose.position[foot, 2]
+                for i in range(3):
+                    z += pose.rotation[foot, 2, i] * corners[side, corner, i]
+                out[t, side] = min(out[t, side], z)
+    return out
+
+
 def sole_centre(robot: Robot, q: FloatArray) -> FloatArray:
     """Return the middle of both soles on the floor, shape (2,) [m]."""
     return soles(robot, q)[..., :2].mean(axis=(0, 1))

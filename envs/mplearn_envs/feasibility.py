@@ -1,0 +1,181 @@
+"""Whether a robot can perform a motion, and if not why, before it tries."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from mplearn.recording import FloatArray
+
+from .control.controller import tracked_columns
+from .control.inverse_dynamics import InverseDynamics
+from .control.planner import Motion, Plan, Planner
+from .control.reference import Reference, reference_robot, rest_reference, sole_heights
+from .control.support import support_margin
+
+ProblemKind: TypeAlias = Literal["foot_lift", "limit", "velocity", "reach", "torque", "balance"]
+
+
+@dataclass(frozen=True)
+class FeasibilityConfig:
+    """What is still allowed.
+
+    Attributes:
+        foot_lift_m: How far one sole may rise over the other [m].
+        overshoot: How far the motion may go beyond the tracked coordinates' limits, where it is
+            cut off [m, rad].
+        slowest: Smallest share of the wanted speed that still counts as performing the motion.
+        reach_error: How far feet, COG and base may stay off what is wanted [m, rad].
+        torque_share: Share of the torque limits that may be used.
+        zmp_margin_m: How near the zero-moment point may come to the edge of the soles [m].
+    """
+
+    foot_lift_m: float = 0.03
+    overshoot: float = 0.25
+    slowest: float = 0.3
+    reach_error: float = 0.01
+    torque_share: float = 0.9
+    zmp_margin_m: float = 0.015
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One reason why a motion cannot be performed.
+
+    Attributes:
+        kind: What is violated.
+        where: The joint, channel or foot concerned.
+        value: What the motion needs.
+        allowed: What is allowed.
+    """
+
+    kind: ProblemKind
+    where: str
+    value: float
+    allowed: float
+
+    def __str__(self) -> str:
+        """Return the reason in a few words."""
+        return f"{self.kind} of {self.where}: {self.value:.3g}, allowed {self.allowed:.3g}"
+
+
+@dataclass(frozen=True)
+class Feasibility:
+    """The verdict on a motion.
+
+    Attributes:
+        problems: Why it cannot be performed; empty where it can.
+        speed: Speed at which it is performed, as a share of the human's.
+        zmp_margin_m: Smallest distance of the planned zero-moment point from the edge of the soles,
+            negative outside [m]; NaN where no plan was made.
+        torque_share: Largest share of a torque limit that is needed; NaN where no plan was made.
+    """
+
+    problems: tuple[Problem, ...]
+    speed: float
+    zmp_margin_m: float
+    torque_share: float
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the robot can perform the motion."""
+        return not self.problems
+
+
+class FeasibilityCheck:
+    """Judges motions by planning them from their own start posture.
+
+    Velocities never exceed the limits, for the plan slows down; so does this check where balance or
+    torques ask for it. A motion that must become slower than ``config.slowest`` is refused.
+
+    Args:
+        planner: Plans for the robot.
+        config: What is allowed.
+    """
+
+    def __init__(self, planner: Planner, config: FeasibilityConfig | None = None) -> None:
+        self.planner = planner
+        self.config = config or FeasibilityConfig()
+        self._dynamics = InverseDynamics(planner.robot)
+        self._columns = tracked_columns(planner.robot)
+
+    def judge(self, frames: FloatArray, rate_hz: float, speed: float) -> Feasibility:
+        """Return whether a motion can be performed.
+
+        Args:
+            frames: Values of the robot's channels, shape (T, 3 + n) [m, rad].
+            rate_hz: Frames per second, at human speed [1/s].
+            speed: Wanted speed, as a share of the human's.
+        """
+        problems = (*self._foot_lift(frames), *self._overshoot(frames))
+        if problems:  # not a motion for both feet on the floor: nothing to plan
+            return Feasibility(problems, speed, np.nan, np.nan)
+        motion = Motion(frames[:, self._columns], rate_hz)
+        start = self.posture(motion.frames[0])
+        wanted = speed
+        while True:
+            plan = self.planner.plan(start, motion, speed)
+            margin, share, joint = self._load(plan)
+            shaky = margin < self.config.zmp_margin_m or share > self.config.torque_share
+            speed = plan.speed
+            if not shaky or speed * 0.7 < self.config.slowest * wanted:
+                break
+            speed *= 0.7
+        found = [*self._too_slow(speed, wanted), *self._out_of_reach(plan)]
+        if share > self.config.torque_share:
+            found.append(Problem("torque", joint, share, self.config.torque_share))
+        if margin < self.config.zmp_margin_m:
+            found.append(Problem("balance", "the soles", margin, self.config.zmp_margin_m))
+        return Feasibility(tuple(found), speed, margin, share)
+
+    def posture(self, target: FloatArray) -> Reference:
+        """Return the reference robot at rest in a posture, tracked coordinates (U,)."""
+        here = rest_reference(self.planner.robot)
+        still = Motion(np.stack((target, target)), 1.0)
+        return self.planner.plan(here, still, 1.0).end
+
+    def _foot_lift(self, frames: FloatArray) -> tuple[Problem, ...]:
+        heights = sole_heights(self.planner.robot, frames)
+        gap = heights[:, 0] - heights[:, 1]
+        side = int(np.max(-gap) > np.max(gap))
+        lift = float(np.abs(gap).max())
+        if lift <= self.config.foot_lift_m:
+            return ()
+        foot = self.planner.robot.feet[side]
+        return (Problem("foot_lift", foot, lift, self.config.foot_lift_m),)
+
+    def _overshoot(self, frames: FloatArray) -> tuple[Problem, ...]:
+        limits = reference_robot(self.planner.robot).limits
+        tracked = frames[:, self._columns]
+        beyond = np.maximum(limits[:, 0] - tracked, tracked - limits[:, 1]).max(axis=0)
+        return tuple(
+            Problem(
+                "limit",
+                self.planner.robot.channels[self._columns[u]],
+                float(beyond[u]),
+                self.config.overshoot,
+            )
+            for u in np.flatnonzero(beyond > self.config.overshoot)
+        )
+
+    def _too_slow(self, speed: float, wanted: float) -> tuple[Problem, ...]:
+        if speed >= self.config.slowest * wanted:
+            return ()
+        return (Problem("velocity", "the joints", wanted / speed, 1.0 / self.config.slowest),)
+
+    def _out_of_reach(self, plan: Plan) -> tuple[Problem, ...]:
+        worst = float(plan.error.max())
+        if worst <= self.config.reach_error:
+            return ()
+        return (Problem("reach", "feet, COG or base", worst, self.config.reach_error),)
+
+    def _load(self, plan: Plan) -> tuple[float, float, str]:
+        """Return smallest ZMP margin [m], largest share of a torque limit, and whose that is."""
+        zmp, share = self._dynamics.along(plan.q, plan.knot_s)
+        worst = np.nan_to_num(share, nan=np.inf).max(axis=0)
+        joint = int(np.argmax(worst))
+        margin = support_margin(self._dynamics.support, np.nan_to_num(zmp, nan=np.inf))
+        margin = np.nan_to_num(margin, nan=-np.inf)
+        return float(margin.min()), float(worst[joint]), self.planner.robot.joint_names[joint]
