@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -73,36 +72,40 @@ def _skeleton_file(path: Path, hints: Hints) -> Path | None:
 
 
 def _frames(path: Path) -> tuple[bool | None, list[tuple[str, int]], FloatArray]:
-    """Return whether angles are degrees (None: not said), (bone, width) of a frame, and its table."""
-    lines = [line.strip() for line in read_text(path).splitlines()]
-    lines = [line for line in lines if line and not line.startswith("#")]
-    modes = [line.lower() for line in lines if line.startswith(":")]
+    """Return whether angles are degrees (None: not said), a frame's bones, and the table."""
+    lines, places, modes = [], [], set()
+    for place, line in enumerate(read_text(path).splitlines(), start=1):
+        words = line.split()
+        if words and words[0].startswith(":"):
+            modes.add(words[0].lower())
+        elif words and not words[0].startswith("#"):
+            lines.append(words)
+            places.append(place)
     degrees = True if ":degrees" in modes else False if ":radians" in modes else None
-    lines = [line for line in lines if not line.startswith(":")]
-    starts = [i for i, line in enumerate(lines) if re.fullmatch(r"\d+", line)]
+    starts = [i for i, words in enumerate(lines) if len(words) == 1 and words[0].isdecimal()]
     if not starts or starts[0] != 0:
-        raise bad_file(path, f"starts with {lines[0][:40] if lines else ''!r}", _EXPECTED)
+        raise bad_file(path, f"starts with {lines[0][0][:40] if lines else ''!r}", _EXPECTED)
     height = starts[1] if len(starts) > 1 else len(lines)
     if height == 1 or len(lines) != height * len(starts) or any(np.diff(starts) != height):
         wrong = next((i for i, s in enumerate(starts) if s != i * height), len(starts))
         raise bad_file(path, f"frame {wrong} has another number of bones than the first", _EXPECTED)
-    count = [int(lines[start]) for start in starts]
+    count = [int(lines[start][0][:12]) for start in starts]
     if any(np.diff(count) != 1):
         wrong = int(np.argmax(np.diff(count) != 1))
         raise bad_file(path, f"frame {count[wrong + 1]} follows frame {count[wrong]}", _EXPECTED)
 
     layout, tables = [], []
     for row in range(1, height):
-        bone, *cells = lines[row].split()
-        rows = [line.split() for line in lines[row::height]]
+        bone, *cells = lines[row]
+        rows = lines[row::height]
         for frame, words in enumerate(rows):
             if words[0] != bone:
                 raise bad_file(
                     path, f"bone {words[0]!r} in frame {count[frame]}", f"{bone!r}, as before"
                 )
         layout.append((bone, len(cells)))
-        places = range(row, len(lines), height)
-        tables.append(numbers(path, [words[1:] for words in rows], len(cells), places))
+        where = places[row::height]
+        tables.append(numbers(path, [words[1:] for words in rows], len(cells), where))
     return degrees, layout, np.concatenate(tables, axis=1)
 
 
@@ -142,7 +145,8 @@ def _in_si(
     values: FloatArray, columns: tuple[Column, ...], degrees: bool, unit: float
 ) -> FloatArray:
     turn = np.pi / 180.0 if degrees else 1.0
-    return values * np.array([turn if column.rotates else unit for column in columns])
+    factors: FloatArray = np.array([turn if column.rotates else unit for column in columns])
+    return values * factors
 
 
 def _check_size(path: Path, skeleton: Skeleton) -> None:

@@ -81,4 +81,5 @@ def rotation_about(axis: FloatArray, angles: FloatArray) -> FloatArray:
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sine, versine = np.sin(angles)[:, None, None], (1.0 - np.cos(angles))[:, None, None]
-    return _IDENTITY + sine * cross + versine * (cross @ cross)
+    rotations: FloatArray = _IDENTITY + sine * cross + versine * (cross @ cross)
+    return rotations

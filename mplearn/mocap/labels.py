@@ -1,7 +1,7 @@
 """Labels that lie in a file beside a recording.
 
-* ``13_29.txt`` beside ``13_29.amc``: a class number for each tenth of a second, as published for the
-  exercises of CMU's subject 13 [CMU13]; for other recordings the label is the number itself.
+* ``13_29.txt`` beside ``13_29.amc``: a class number for each tenth of a second; CMU's subject 13
+  does the exercises 1 to 12, elsewhere the label is the number itself.
 * ``labels_parsed.json``: ``{"86_01": [{"label": "walk", "end_nominal": 550}, ...], ...}``: segments
   that follow each other from frame 0 on, each up to its nominal end in frames of the file.
 """

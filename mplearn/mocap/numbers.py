@@ -33,7 +33,7 @@ def number(path: Path, cell: str, where: str) -> float:
 
 
 def numbers(
-    path: Path, rows: Sequence[Sequence[str]], n_columns: int, lines: Sequence[int] | range
+    path: Path, rows: Sequence[Sequence[str]], n_columns: int, lines: Sequence[int]
 ) -> FloatArray:
     """Return the cells of a table as an array.
 

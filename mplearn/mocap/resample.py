@@ -19,8 +19,8 @@ def resample(recording: Recording, rate_hz: float) -> Recording:
     """Return a recording at another rate.
 
     A zero-phase low-pass filter (a sinc in a Kaiser window, cut at the lower Nyquist frequency) is
-    evaluated at the new times, which start at the first frame's. Gaps are bridged for the filter, and
-    a new frame whose nearest old frame is missing is missing too.
+    evaluated at the new times, which start at the first frame's. Gaps are bridged for the filter,
+    and a new frame whose nearest old frame is missing is missing too.
 
     Args:
         recording: At any rate.

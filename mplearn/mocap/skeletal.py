@@ -1,4 +1,4 @@
-"""From the columns of a skeletal file to a recording: its joint angles, or its joints' positions."""
+"""From the columns of a skeletal file to a recording of joint angles or joint positions."""
 
 from __future__ import annotations
 

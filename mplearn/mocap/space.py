@@ -114,4 +114,5 @@ def _axis(name: str) -> FloatArray:
     letter = letter.removeprefix("-")
     if letter not in ("x", "y", "z"):
         raise InvalidValueError(f"an axis is x, y or z, with a sign or without, not {name!r}")
-    return sign * np.eye(3)["xyz".index(letter)]
+    unit: FloatArray = sign * np.eye(3)["xyz".index(letter)]
+    return unit

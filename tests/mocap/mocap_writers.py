@@ -197,9 +197,7 @@ def bvh_values(n_frames: int = 12, seed: int = 0) -> np.ndarray:
     return values
 
 
-def write_bvh(
-    path: Path, values: np.ndarray | None = None, hierarchy: str = BVH_HIERARCHY
-) -> Path:
+def write_bvh(path: Path, values: np.ndarray | None = None, hierarchy: str = BVH_HIERARCHY) -> Path:
     values = bvh_values() if values is None else values
     rows = "".join(" ".join(repr(float(x)) for x in row) + "\n" for row in values)
     path.write_text(f"{hierarchy}MOTION\nFrames: {len(values)}\nFrame Time: 0.01\n{rows}")

@@ -136,9 +136,7 @@ def test_wrong_column_count(valid: dict[str, Path], suffix: str, tmp_path: Path)
 
 @pytest.mark.parametrize("suffix", TEXT_SUFFIXES)
 @pytest.mark.parametrize("cell", ["x", "1_0", "inf", "-inf", "1e999"])
-def test_non_numeric_cell(
-    valid: dict[str, Path], suffix: str, cell: str, tmp_path: Path
-) -> None:
+def test_non_numeric_cell(valid: dict[str, Path], suffix: str, cell: str, tmp_path: Path) -> None:
     text = valid[suffix].read_text().rstrip()
     last = re.search(r"[-\d.e]+$", text)
     assert last is not None

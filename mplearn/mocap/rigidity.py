@@ -1,0 +1,113 @@
+"""Where an unseen marker must be, from the markers that keep their distance to it.
+
+Markers on one segment of the body keep their distances. How much each distance varies is followed
+on-line; from it follows how much a marker says about another. The neighbours of an unseen marker,
+as they lay when it was last seen, are moved onto where they are now by the best weighted rigid
+motion [Kabsch1976], and the marker with them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..recording import BoolArray, FloatArray, IntArray
+
+_STEP_S = 0.1  # time between two looks at the distances
+_MEMORY_S = 2.0  # over which their variances forget
+_NOISE_M = 0.005  # variation of a distance that means nothing
+_UNKNOWN_M = 0.05  # variation of a distance that was seen once
+
+
+class RigidNeighbours:
+    """Follows the distances between markers, and predicts one marker from the others.
+
+    Args:
+        n_markers: Number M of markers.
+        rate_hz: Frames per second [1/s].
+    """
+
+    def __init__(self, n_markers: int, rate_hz: float) -> None:
+        self.n_markers = n_markers
+        self.rate_hz = rate_hz
+        self._every_frames = max(1, round(_STEP_S * rate_hz))
+        self._forget = 1.0 - float(np.exp(-self._every_frames / rate_hz / _MEMORY_S))
+        square = (n_markers, n_markers)
+        self._mean = np.zeros(square)
+        self._variance = np.zeros(square)
+        self._looks: IntArray = np.zeros(square, np.int64)
+        self._frames = 0
+        self._before = np.full((n_markers, 3), np.nan)
+        self._as_last_seen = np.full((*square, 3), np.nan)
+
+    def update(self, positions: FloatArray, lost: BoolArray) -> FloatArray:
+        """Take one frame, and predict the markers that are lost in it.
+
+        Args:
+            positions: What is seen, shape (M, 3) [m]; NaN elsewhere.
+            lost: Which of the unseen markers to predict, shape (M,).
+
+        Returns:
+            Positions of the lost markers, shape (K, 3) [m]; NaN where fewer than three others help.
+        """
+        which = np.flatnonzero(lost)
+        if len(which):
+            just = which[~np.isnan(self._before[which, 0])]
+            self._as_last_seen[just] = self._before
+        if self._frames % self._every_frames == 0:
+            self._look(positions)
+        self._frames += 1
+        self._before = positions.copy()
+        return self._predict(which, positions)
+
+    def state(self) -> dict[str, Any]:
+        """Return the whole state as plain values and arrays."""
+        return {
+            "mean": self._mean.copy(),
+            "variance": self._variance.copy(),
+            "looks": self._looks.copy(),
+            "frames": self._frames,
+            "before": self._before.copy(),
+            "as_last_seen": self._as_last_seen.copy(),
+        }
+
+    def load_state(self, state: dict[str, Any]) -> None:
+        """Resume from what `state` returned."""
+        self._mean, self._variance = state["mean"].copy(), state["variance"].copy()
+        self._looks, self._frames = state["looks"].copy(), int(state["frames"])
+        self._before, self._as_last_seen = state["before"].copy(), state["as_last_seen"].copy()
+
+    def _look(self, positions: FloatArray) -> None:
+        """Follow mean and variance of all distances, in exponential memory."""
+        distances = np.linalg.norm(positions[:, None] - positions[None], axis=2)
+        known = ~np.isnan(distances)
+        self._looks += known
+        share = np.where(known, np.maximum(self._forget, 1.0 / np.maximum(self._looks, 1)), 0.0)
+        change = np.where(known, distances - self._mean, 0.0)
+        self._mean += share * change
+        self._variance = (1.0 - share) * (self._variance + share * change**2)
+
+    def _predict(self, which: IntArray, positions: FloatArray) -> FloatArray:
+        if not len(which):
+            return np.empty((0, 3))
+        then = self._as_last_seen[which]  # (K, M, 3)
+        helps = ~np.isnan(then[:, :, 0]) & ~np.isnan(positions[None, :, 0])  # (K, M)
+        own = then[np.arange(len(which)), which]  # (K, 3)
+        doubt = self._variance[which] + _UNKNOWN_M**2 / np.maximum(self._looks[which], 1)
+        weights = np.where(helps, (doubt + _NOISE_M**2) ** -2.0, 0.0)
+        enough = helps.sum(axis=1) >= 3
+        weights[~enough] = 1.0  # any, to be thrown away below
+        weights /= weights.sum(axis=1, keepdims=True)
+        then, now = np.nan_to_num(then), np.nan_to_num(positions)
+        middle_then = np.einsum("km,kmi->ki", weights, then)
+        middle_now = weights @ now
+        spread = np.einsum(
+            "km,kmi,kmj->kij", weights, now - middle_now[:, None], then - middle_then[:, None]
+        )
+        left, _, right = np.linalg.svd(spread)
+        left[:, :, 2] *= np.linalg.det(left @ right)[:, None]  # a rotation, not a reflection
+        rotation = left @ right
+        predicted: FloatArray = np.einsum("kij,kj->ki", rotation, own - middle_then) + middle_now
+        predicted[~enough] = np.nan
+        return predicted
