@@ -120,13 +120,13 @@ def _lowest_corners(
             linkage.offset,
             linkage.rotation,
             linkage.joint_body,
-            linkage.slides,
             linkage.axis,
             linkage.anchor,
             pos,
             mat,
             axes,
             anchors,
+            linkage.slides,
         )
         for s in range(len(bodies)):
             b = bodies[s]

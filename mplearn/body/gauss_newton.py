@@ -165,13 +165,13 @@ def locate(
         linkage.offset,
         linkage.rotation,
         linkage.joint_body,
-        linkage.slides,
         linkage.axis,
         linkage.anchor,
         pos,
         mat,
         axes,
         anchors,
+        linkage.slides,
     )
     for m in range(len(bodies)):
         b = bodies[m]

@@ -183,13 +183,13 @@ class KinematicTree:
             self.offset,
             self.rotation,
             self.joint_body,
-            self.slides,
             self.axis,
             self.anchor,
             pos,
             mat,
             axes,
             anchors,
+            self.slides,
         )
         return pos, mat, axes, anchors
 
@@ -240,15 +240,18 @@ def forward_kinematics(
     offset: FloatArray,
     rotation: FloatArray,
     joint_body: IntArray,
-    slides: BoolArray,
     axis: FloatArray,
     anchor: FloatArray,
     pos: FloatArray,
     mat: FloatArray,
     axes: FloatArray,
     anchors: FloatArray,
+    slides: BoolArray | None = None,
 ) -> None:
-    """Fill body positions and orientations, and each joint's axis and anchor in the world."""
+    """Fill body positions and orientations, and each joint's axis and anchor in the world.
+
+    All joints are hinges where `slides` is not given.
+    """
     pos[0] = q[:3]
     mat[0] = quaternion_matrix(q[3:7])
     j = 0
@@ -273,7 +276,7 @@ def forward_kinematics(
                     along += mat[b, i, k] * axis[j, k]
                 anchors[j, i] = at
                 axes[j, i] = along
-            if slides[j]:
+            if slides is not None and slides[j]:
                 for i in range(3):
                     pos[b, i] += axes[j, i] * q[7 + j]
                 j += 1
