@@ -17,15 +17,17 @@ _FLOOR = 0.02  # least standard deviation within a state, as a share of that ove
 
 @dataclass(frozen=True)
 class Dynamics:
-    """Gaussians of position, velocity and acceleration in the states of a primitive.
+    """How a primitive moves in each of its states: Gaussians, and how long it stays.
 
     Attributes:
         means: Shape (3, N, D): position, velocity [1/s], acceleration [1/s^2].
         variances: Shape (3, N, D).
+        durations_s: Mean time in each state, shape (N,) [s].
     """
 
     means: FloatArray
     variances: FloatArray
+    durations_s: FloatArray
 
 
 def estimate_dynamics(
@@ -37,7 +39,7 @@ def estimate_dynamics(
         hmm: The primitive's model.
         exemplars: Finite motions of shape (T, D) at ``rate_hz``. Those of fewer frames than the
             model has states cannot be aligned and are left out; if none remains, the model's own
-            means, and their differences over its expected durations, stand in.
+            means stand in, each for 1 / (1 - a_ii) frames.
         rate_hz: Frames per second of the model and the exemplars [1/s].
     """
     usable = [frames for frames in exemplars if len(frames) >= hmm.n_states]
@@ -52,7 +54,8 @@ def estimate_dynamics(
     )
     moments = [_moments(np.concatenate(column), states, hmm.n_states) for column in columns]
     means, variances = (np.stack(part) for part in zip(*moments, strict=True))
-    return Dynamics(means, variances)
+    durations_s = np.bincount(states, minlength=hmm.n_states) / len(usable) / rate_hz
+    return Dynamics(means, variances, durations_s)
 
 
 def _stepwise(hmm: LeftRightHMM) -> FloatArray:

@@ -41,7 +41,7 @@ def generate(
         start: Posture to start from, at rest, shape (D,). Each style reaches its own course
             continuously from there.
         cutoff_hz: Cut-off of the zero-phase low-pass filter over the whole path [1/s]; None is
-            the style's own (3 for "deterministic", 6 for "averaged", else none), infinity is none.
+            the style's own (2.5 for "deterministic", 3 for "averaged", else none), infinity is none.
         blend_s: Time over which pieces of "nearest" and "averaged", and a given start, pass into
             what follows [s].
         n_samples: How many samples "averaged" draws of each primitive.
@@ -62,7 +62,7 @@ def generate(
     if n_samples < 1:
         raise InvalidValueError(f"n_samples must be at least 1, not {n_samples}")
     chosen = STYLES[style]
-    timing = schedule(path, model_rate_hz, rate)
+    timing = schedule(path, rate)
     request = Request(
         path=path,
         timing=timing,

@@ -50,22 +50,22 @@ class Schedule(NamedTuple):
     states: IntArray
 
 
-def state_durations_s(primitive: GenerativePrimitive, model_rate_hz: float) -> FloatArray:
-    """Return the expected time in each state, shape (N,) [s].
+def state_durations_s(primitive: GenerativePrimitive) -> FloatArray:
+    """Return the expected time in each state, shape (N,) [s], summing to the mean duration.
 
-    1 / (1 - a_ii) frames each [Kulic2007]; the last state, which nothing leaves, lasts for what
-    remains of the primitive's mean duration, one frame at least.
+    In a model fitted by maximum likelihood this is 1 / (1 - a_ii) frames [Kulic2007]. It is taken
+    from the aligned exemplars, as the model says nothing about its last, absorbing state, and a
+    prior on its stays biases the others.
     """
-    leading = primitive.hmm.durations_frames / model_rate_hz
-    rest = max(primitive.mean_duration_s - leading.sum(), 1.0 / model_rate_hz)
-    return np.append(leading, rest)
+    durations = primitive.dynamics.durations_s
+    return np.asarray(durations * (primitive.mean_duration_s / durations.sum()))
 
 
-def schedule(path: Sequence[GenerativePrimitive], model_rate_hz: float, rate_hz: float) -> Schedule:
+def schedule(path: Sequence[GenerativePrimitive], rate_hz: float) -> Schedule:
     """Return which state of which primitive each frame is in, at any frame rate."""
     states = []
     for primitive in path:
-        ends = np.cumsum(state_durations_s(primitive, model_rate_hz)) * rate_hz
+        ends = np.cumsum(state_durations_s(primitive)) * rate_hz
         n_frames = max(round(ends[-1]), 1)
         middle = np.arange(n_frames) + 0.5
         states.append(np.minimum(np.searchsorted(ends, middle), len(ends) - 1))

@@ -76,9 +76,9 @@ def smooth(request: Request) -> FloatArray:
     known = [primitive.dynamics for primitive in request.path]
     first_row = np.cumsum([0, *(d.means.shape[1] for d in known[:-1])])
     rows = first_row[request.timing.positions] + request.timing.states
-    means = np.concatenate([d.means for d in known], axis=1)[:, rows]
-    variances = np.concatenate([d.variances for d in known], axis=1)[:, rows]
-    return most_likely_trajectory(means, variances, request.rate_hz, request.start)
+    means = np.concatenate([d.means for d in known], axis=1)
+    variances = np.concatenate([d.variances for d in known], axis=1)
+    return most_likely_trajectory(means, variances, rows, request.rate_hz, request.start)
 
 
 def nearest(request: Request) -> FloatArray:
@@ -123,9 +123,9 @@ def from_start(frames: FloatArray, request: Request) -> FloatArray:
 
 
 STYLES: dict[str, Style] = {
-    "deterministic": Style(deterministic, cutoff_hz=3.0),
+    "deterministic": Style(deterministic, cutoff_hz=2.5),
     "nearest": Style(nearest),
-    "averaged": Style(averaged, cutoff_hz=6.0),
+    "averaged": Style(averaged, cutoff_hz=3.0),
     "smooth": Style(smooth, starts_itself=True),
 }
 
@@ -134,7 +134,7 @@ def _average_of_samples(
     primitive: GenerativePrimitive, request: Request, rng: np.random.Generator, n_frames: int
 ) -> FloatArray:
     hmm, n = primitive.hmm, request.n_samples
-    expected = state_durations_s(primitive, request.model_rate_hz) * request.model_rate_hz
+    expected = state_durations_s(primitive) * request.model_rate_hz
     stays = rng.geometric(1.0 / np.maximum(expected, 1.0), size=(n, len(expected)))
     deviations = np.sqrt(hmm.variances)
     total = np.zeros((n_frames, hmm.n_channels))
