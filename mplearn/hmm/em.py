@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from ..recording import FloatArray, IntArray
-from .kernels import log_add, backward, forward, log_densities
+from .kernels import backward, forward, log_add, log_densities, log_norms
 
 # posterior weights below this cannot change a sum of order 1
 _NEGLIGIBLE_SHARE = 1e-17
@@ -53,10 +53,11 @@ def expectation(
     means, variances, log_stay, log_next = model
     mass, first, second, stays, moves = statistics
     n_states = len(means)
+    norms = log_norms(variances)
     likelihood = 0.0
     for s in range(len(offsets) - 1):
         begin, end = offsets[s], offsets[s + 1]
-        densities = log_densities(columns, weights, begin, end, means, variances, n_states)
+        densities = log_densities(columns, weights, begin, end, means, variances, norms, n_states)
         alpha = forward(densities, log_stay, log_next)
         beta = backward(densities, log_stay, log_next, complete)
         total = alpha[end - begin - 1, n_states - 1]

@@ -43,6 +43,12 @@ def has_infinity(frames: FloatArray) -> bool:
 
 
 @njit(cache=True)
+def log_norms(variances: FloatArray) -> FloatArray:
+    """Return the log of each Gaussian's normalisation, -log(2 pi variance) / 2."""
+    return np.asarray(-0.5 * (_LOG_2PI + np.log(variances)))
+
+
+@njit(cache=True)
 def log_densities(
     columns: FloatArray,
     weights: FloatArray,
@@ -50,6 +56,7 @@ def log_densities(
     end: int,
     means: FloatArray,
     variances: FloatArray,
+    log_norms: FloatArray,
     n_states: int,
 ) -> FloatArray:
     """Return the weighted log-density of frames [begin, end) in each state, shape (N, T).
@@ -61,6 +68,7 @@ def log_densities(
         end: One past the last.
         means: Shape (N or more, D).
         variances: Likewise.
+        log_norms: `log_norms` of the variances.
         n_states: N.
     """
     n_frames = end - begin
@@ -71,7 +79,7 @@ def log_densities(
         for d in range(columns.shape[0]):
             column = columns[d, begin:end]
             mean = means[n, d]
-            norm = -0.5 * (_LOG_2PI + np.log(variances[n, d]))
+            norm = log_norms[n, d]
             scale = -0.5 / variances[n, d]
             for t in range(n_frames):
                 offset = column[t] - mean
@@ -168,10 +176,10 @@ def viterbi(
 
 @njit(cache=True)
 def _score(models: Any, batch: Any, m: int, s: int, complete: bool) -> float:
-    means, variances, log_stay, log_next, n_states = models
+    means, variances, norms, log_stay, log_next, n_states = models
     columns, weights, offsets = batch
     densities = log_densities(
-        columns, weights, offsets[s], offsets[s + 1], means[m], variances[m], n_states[m]
+        columns, weights, offsets[s], offsets[s + 1], means[m], variances[m], norms[m], n_states[m]
     )
     return log_likelihood(densities, log_stay[m], log_next[m], complete)
 

@@ -70,6 +70,11 @@ class LeftRightHMM:
         """Log-probability of moving on, shape (N,); the last state has nowhere to go."""
         return np.append(np.log(-np.expm1(self.log_stay[:-1])), -np.inf)
 
+    @cached_property
+    def log_norms(self) -> FloatArray:
+        """Log of each Gaussian's normalisation, -log(2 pi variance) / 2, shape (N, D)."""
+        return np.asarray(kernels.log_norms(self.variances))
+
     @property
     def durations_frames(self) -> FloatArray:
         """Expected frames in each state but the last, 1 / (1 - stay), shape (N - 1,)."""
@@ -135,6 +140,7 @@ class LeftRightHMM:
                 len(frames),
                 self.means,
                 self.variances,
+                self.log_norms,
                 self.n_states,
             )
         )

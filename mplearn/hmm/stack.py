@@ -25,6 +25,7 @@ class ModelStack(NamedTuple):
     Attributes:
         means: Shape (M, N, D).
         variances: Shape (M, N, D).
+        log_norms: -log(2 pi variance) / 2, shape (M, N, D).
         log_stay: Shape (M, N).
         log_next: Shape (M, N).
         n_states: States that are not padding, shape (M,).
@@ -32,6 +33,7 @@ class ModelStack(NamedTuple):
 
     means: FloatArray
     variances: FloatArray
+    log_norms: FloatArray
     log_stay: FloatArray
     log_next: FloatArray
     n_states: IntArray
@@ -48,14 +50,15 @@ class ModelStack(NamedTuple):
             raise ModelError(f"models must share one number of channels, not {widths}")
         n_states = np.array([model.n_states for model in models], dtype=np.int64)
         shape = (len(models), int(n_states.max()), widths[0])
-        means, variances = np.zeros(shape), np.ones(shape)
+        means, variances, log_norms = np.zeros(shape), np.ones(shape), np.zeros(shape)
         log_stay, log_next = np.zeros(shape[:2]), np.full(shape[:2], -np.inf)
         for m, model in enumerate(models):
             means[m, : model.n_states] = model.means
             variances[m, : model.n_states] = model.variances
+            log_norms[m, : model.n_states] = model.log_norms
             log_stay[m, : model.n_states] = model.log_stay
             log_next[m, : model.n_states] = model.log_next
-        return cls(means, variances, log_stay, log_next, n_states)
+        return cls(means, variances, log_norms, log_stay, log_next, n_states)
 
     @property
     def n_models(self) -> int:
