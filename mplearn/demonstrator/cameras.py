@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..body import KinematicTree, MarkerSet
-from ..body.tree import forward_kinematics
-from ..recording import FloatArray, IntArray
+from mplearn.body import KinematicTree, MarkerSet
+from mplearn.body.gauss_newton import Linkage, locate
+from mplearn.recording import FloatArray, IntArray
+
 from .variability import Variability
 
 
@@ -33,7 +34,7 @@ class Cameras:
         variability: Variability,
         rng: np.random.Generator,
     ) -> None:
-        self._tree, self._rate_hz, self._variability = tree, rate_hz, variability
+        self._linkage, self._rate_hz, self._variability = Linkage.of(tree), rate_hz, variability
         self._bodies, self._offsets = markers.attach(tree)
         self._noise, self._hiding = rng.spawn(2)
         self._n_frames = 0
@@ -45,11 +46,7 @@ class Cameras:
 
     def measure(self, postures: FloatArray) -> FloatArray:
         """Return the markers (T, M, 3) [m] of the next T postures (T, nq); NaN where hidden."""
-        tree = self._tree
-        markers = points_of_postures(
-            postures, tree.parent, tree.offset, tree.rotation, tree.joint_body, tree.axis,
-            tree.anchor, self._bodies, self._offsets,
-        )  # fmt: skip
+        markers = points_of_postures(postures, self._linkage, self._bodies, self._offsets)
         markers += self._variability.noise_m * self._noise.standard_normal(markers.shape)
         end = self._n_frames + len(postures)
         for marker in np.flatnonzero(self._next_s[:, 0] * self._rate_hz < end):
@@ -77,32 +74,13 @@ class Cameras:
 
 @njit(cache=True)
 def points_of_postures(
-    postures: FloatArray,
-    parent: IntArray,
-    offset: FloatArray,
-    rotation: FloatArray,
-    joint_body: IntArray,
-    axis: FloatArray,
-    anchor: FloatArray,
-    bodies: IntArray,
-    offsets: FloatArray,
+    postures: FloatArray, linkage: Linkage, bodies: IntArray, offsets: FloatArray
 ) -> FloatArray:
     """Return the world positions (T, M, 3) [m] of body-fixed points at each posture (T, nq)."""
-    n_frames, n_points, n_bodies, n_joints = (
-        len(postures), len(bodies), len(parent), len(joint_body),
-    )  # fmt: skip
-    out = np.empty((n_frames, n_points, 3))
+    n_bodies, n_joints = len(linkage.parent), len(linkage.axis)
+    out = np.empty((len(postures), len(bodies), 3))
     pos, mat = np.empty((n_bodies, 3)), np.empty((n_bodies, 3, 3))
     axes, anchors = np.empty((n_joints, 3)), np.empty((n_joints, 3))
-    for t in range(n_frames):
-        forward_kinematics(
-            postures[t], parent, offset, rotation, joint_body, axis, anchor, pos, mat, axes, anchors
-        )
-        for m in range(n_points):
-            b = bodies[m]
-            for i in range(3):
-                at = pos[b, i]
-                for k in range(3):
-                    at += mat[b, i, k] * offsets[m, k]
-                out[t, m, i] = at
+    for t in range(len(postures)):
+        locate(postures[t], linkage, bodies, offsets, pos, mat, axes, anchors, out[t])
     return out

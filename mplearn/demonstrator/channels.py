@@ -16,7 +16,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..recording import FloatArray
+from mplearn.recording import FloatArray
 
 TRUNK = (
     "lumbar_pitch", "lumbar_roll", "lumbar_yaw", "thorax_pitch", "thorax_roll",

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..recording import FloatArray
+from mplearn.recording import FloatArray
+
 from .channels import CHANNELS, INDEX, UPPER_JOINTS, as_vector, both_sides
 from .variability import Variability
 

@@ -6,17 +6,14 @@ velocity is bell-shaped. Movements that overlap in time add up, as people's do [
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..recording import FloatArray, IntArray
-from .channels import LEVERS
+from mplearn.recording import FloatArray, IntArray
 
-VISIBLE = 0.05
-"""Share of its peak speed below which a movement is no longer seen to move."""
-
-_GRID = 201
+from .channels import CHANNELS, LEVERS
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,24 +57,10 @@ class Movement:
     def _phase(self, times_s: FloatArray) -> FloatArray:
         return np.clip((times_s[:, None] - self.begin_s) / self.duration_s, 0.0, 1.0)
 
-    def visible_s(self) -> tuple[float, float]:
-        """Return when the movement is first and last seen: its speed exceeds `VISIBLE` of its peak."""
-        times = np.linspace(self.start_s, self.end_s, _GRID)
-        speed = np.linalg.norm(self.velocity(times) * LEVERS[self.channels], axis=1)
-        seen = np.flatnonzero(speed > VISIBLE * speed.max())
-        return float(times[seen[0]]), float(times[seen[-1]])
 
-
-def turning_point_s(first: Movement, second: Movement) -> float:
-    """Return when one movement gives way to the next [s]: the middle of a stop, or the slowest moment.
-
-    Where the second starts after the first has ended it is the middle between them; where they overlap
-    it is the moment of least speed of their sum within the overlap.
-    """
-    if second.start_s >= first.end_s:
-        return 0.5 * (first.end_s + second.start_s)
-    times = np.linspace(second.start_s, first.end_s, _GRID)
-    velocity = np.zeros((_GRID, len(LEVERS)))
-    velocity[:, first.channels] += first.velocity(times)
-    velocity[:, second.channels] += second.velocity(times)
-    return float(times[np.argmin(np.linalg.norm(velocity * LEVERS, axis=1))])
+def body_velocity(movements: Iterable[Movement], times_s: FloatArray) -> FloatArray:
+    """Return the velocity of the movements' sum, each channel in metres of body, (T, C) [m/s]."""
+    velocity = np.zeros((len(times_s), len(CHANNELS)))
+    for movement in movements:
+        velocity[:, movement.channels] += movement.velocity(times_s)
+    return velocity * LEVERS

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..body import PROPORTIONS
-from ..errors import InvalidValueError
+from mplearn.body import PROPORTIONS
+from mplearn.errors import InvalidValueError
+
 from .channels import CHANNELS, UPPER_JOINTS, both_sides, mirrored
 from .postures import POSTURES
 from .primitives import PRIMITIVES
@@ -26,11 +27,14 @@ class Person:
         height_m: Stature [m].
         proportions: Lengths relative to the average at that stature, as `mplearn.body.human_body`
             takes them.
-        tempo: Primitive -> factor on its duration; 1 where none is given.
-        reach: Key posture -> factor on how far the person goes into it.
-        joint_reach: Channel -> factor on how far it moves; where left and right differ, so does
-            the person.
-        rest: Channel -> habitual deviation from upright standing [rad or leg lengths].
+        tempo: Primitive -> factor on its duration, in [0.5, 1.5]; 1 where none is given.
+        reach: Key posture -> factor on how far the person goes into it, in [0.5, 1.5].
+        joint_reach: Channel -> factor on how far it moves, in [0.5, 1.5]; where left and right
+            differ, so does the person.
+        rest: Channel -> habitual deviation from upright standing, at most 0.3 [rad or leg lengths].
+
+    Raises:
+        InvalidValueError: A name is unknown or a value out of range.
     """
 
     name: str = "average"
@@ -52,9 +56,9 @@ class Person:
             values: Mapping[str, float] = getattr(self, attribute)
             if unknown := sorted(set(values) - names):
                 raise InvalidValueError(f"{attribute} names {unknown}; known are {sorted(names)}")
-            low = -np.inf if attribute == "rest" else 0.0
-            if bad := {n: v for n, v in values.items() if not low < v < np.inf}:
-                raise InvalidValueError(f"{attribute} needs finite values above {low}, not {bad}")
+            low, high = (-0.3, 0.3) if attribute == "rest" else (0.5, 1.5)
+            if bad := {n: v for n, v in values.items() if not low <= v <= high}:
+                raise InvalidValueError(f"{attribute} must lie in [{low}, {high}], not {bad}")
 
     @classmethod
     def random(cls, rng: np.random.Generator, name: str = "") -> Person:

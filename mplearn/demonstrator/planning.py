@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..recording import FloatArray
+from mplearn.recording import FloatArray, IntArray
+
 from .channels import CHANNELS, INDEX, UPPER_JOINTS, as_vector
 from .movement import Movement
 from .person import Person
 from .postures import POSTURES, STAND
 from .primitives import Primitive
+from .stance import Stance
 from .variability import Variability
 
 _N_UPPER = len(UPPER_JOINTS)
@@ -17,10 +19,30 @@ _N_UPPER = len(UPPER_JOINTS)
 _UNSCALED = np.array([name in ("pelvis_y", "pelvis_roll") for name in CHANNELS])
 _PLACED = np.array([name.startswith(("foot_x", "foot_y_")) for name in CHANNELS])
 _TURNED = np.array([name.startswith("foot_yaw") for name in CHANNELS])
+_ARM_SIDE = np.array(
+    [
+        {"_l": 0.5, "_r": -0.5}.get(name[-2:], 0.0) * (i < _N_UPPER)
+        for i, name in enumerate(CHANNELS)
+    ]
+)
 _MARGIN_RAD = 0.1  # kept to the joint limits, for sway and drift
 _LEAD_S = 1.0  # the person stands still before the first motion
-_HIGHEST_REACH_RAD = -3.0  # an arm that is raised forward ends before the vertical
-_LARGEST_OVERLAP = 0.22  # of the shorter of two motions: a foot has landed before the next is lifted
+# an arm that is raised forward ends before the vertical; the legs stay within their joints' limits
+_RANGES = {
+    "shoulder_pitch_l": (-3.0, np.inf),
+    "shoulder_pitch_r": (-3.0, np.inf),
+    "crouch": (0.001, 0.36),
+    "pelvis_pitch": (-0.4, 0.95),
+    "foot_x_l": (-0.2, 0.9),
+    "foot_x_r": (-0.2, 0.9),
+    "foot_z_l": (0.0, 0.55),
+    "foot_z_r": (0.0, 0.55),
+    "foot_pitch_l": (-0.95, 0.4),
+    "foot_pitch_r": (-0.95, 0.4),
+}
+_LARGEST_OVERLAP = (
+    0.22  # of the shorter of two motions: a foot has landed before the next is lifted
+)
 
 
 class Planner:
@@ -29,8 +51,7 @@ class Planner:
     Args:
         person: Who moves.
         variability: Sizes of the variation.
-        leg_m: Length of the person's legs [m].
-        upper_limits: Limits of the `UPPER_JOINTS`, shape (26, 2) [rad].
+        stance: Knows the person's body.
         rng: Source of randomness.
 
     Attributes:
@@ -41,22 +62,22 @@ class Planner:
         self,
         person: Person,
         variability: Variability,
-        leg_m: float,
-        upper_limits: FloatArray,
+        stance: Stance,
         rng: np.random.Generator,
     ) -> None:
         self._person, self._variability, self._rng = person, variability, rng
         self._stand = as_vector(STAND)
         self._rest = self._stand + as_vector(person.rest)
         self._joint_reach = np.array([person.joint_reach.get(name, 1.0) for name in CHANNELS])
-        self._scatter = np.where(_PLACED, variability.placement_m / leg_m, 0.0)
+        self._scatter = np.where(_PLACED, variability.placement_m / stance.leg_m, 0.0)
         self._scatter[:_N_UPPER] = variability.scatter_rad
         self._scatter[_TURNED] = variability.scatter_rad
         low, high = np.full(len(CHANNELS), -np.inf), np.full(len(CHANNELS), np.inf)
-        low[:_N_UPPER], high[:_N_UPPER] = upper_limits.T + [[_MARGIN_RAD], [-_MARGIN_RAD]]
-        for side in "lr":
-            index = INDEX[f"shoulder_pitch_{side}"]
-            low[index] = max(low[index], _HIGHEST_REACH_RAD)
+        low[:_N_UPPER] = stance.upper_limits[:, 0] + _MARGIN_RAD
+        high[:_N_UPPER] = stance.upper_limits[:, 1] - _MARGIN_RAD
+        for name, (least, most) in _RANGES.items():
+            low[INDEX[name]] = max(low[INDEX[name]], least)
+            high[INDEX[name]] = min(high[INDEX[name]], most)
         self._low, self._high = low, high
         self.planned = np.clip(self._rest, low, high)
 
@@ -107,7 +128,7 @@ class Planner:
         return np.clip(self._rest + change * factor + scatter, self._low, self._high)
 
     def _times(
-        self, primitive: Primitive, channels: np.ndarray, start_s: float, end_s: float
+        self, primitive: Primitive, channels: IntArray, start_s: float, end_s: float
     ) -> tuple[FloatArray, FloatArray]:
         """Draw when each channel begins and ends, both shape (K,) [s], within the movement.
 
@@ -115,14 +136,10 @@ class Planner:
         feet keep to the primitive's windows, on which balance rests.
         """
         v, rng = self._variability, self._rng
-        lag = np.zeros(len(CHANNELS))
-        lag[:_N_UPPER] += np.where(
-            [name.endswith("_l") for name in UPPER_JOINTS], 0.5, -0.5
-        ) * rng.normal(0.0, v.side_lag_s)
-        lag[: _N_UPPER] *= [name[-2:] in ("_l", "_r") for name in UPPER_JOINTS]
-        jitter = np.zeros((2, len(CHANNELS)))
-        jitter[:, :_N_UPPER] = rng.normal(0.0, v.timing_s, (2, _N_UPPER))
+        shift = np.zeros((2, len(CHANNELS)))
+        shift[:, :_N_UPPER] = rng.normal(0.0, v.timing_s, (2, _N_UPPER))
+        shift += _ARM_SIDE * rng.normal(0.0, v.side_lag_s)
         windows = np.array([primitive.windows.get(CHANNELS[i], (0.0, 1.0)) for i in channels])
-        times = start_s + windows.T * (end_s - start_s) + (lag + jitter)[:, channels]
+        times = start_s + windows.T * (end_s - start_s) + shift[:, channels]
         begin, end = np.clip(times, start_s, end_s)
         return begin, end

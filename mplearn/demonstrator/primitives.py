@@ -13,7 +13,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from ..errors import InvalidValueError
+from mplearn.errors import InvalidValueError
+
 from .channels import CHANNELS, mirrored, mirrored_name
 from .postures import POSTURES
 
@@ -144,50 +145,50 @@ def _pair(
 _PAPER = (
     *_pair(
         ("BAR", "both arms raise"), ("BAL", "both arms lower"), ("stand", "both arms up"),
-        (1.40, 1.40), _ARM_LAGS, {**_RAISE_BUMPS, **mirrored(_RAISE_BUMPS)},
+        (1.45, 1.45), _ARM_LAGS, {**_RAISE_BUMPS, **mirrored(_RAISE_BUMPS)},
     ),
     *_pair(
         ("RAR", "right arm raise"), ("RAL", "right arm lower"), ("stand", "right arm up"),
-        (1.32, 1.32), _ARM_LAGS, mirrored(_RAISE_BUMPS),
+        (1.37, 1.37), _ARM_LAGS, mirrored(_RAISE_BUMPS),
     ),
     *_pair(
         ("LAR", "left arm raise"), ("LAL", "left arm lower"), ("stand", "left arm up"),
-        (1.32, 1.32), _ARM_LAGS, _RAISE_BUMPS,
+        (1.37, 1.37), _ARM_LAGS, _RAISE_BUMPS,
     ),
-    Primitive("AR", "arms ready", "stand", "guard", 1.15, _GUARD_WINDOWS),
+    Primitive("AR", "arms ready", "stand", "guard", 1.20, _GUARD_WINDOWS),
     *_pair(
-        ("BAD", "bow down"), ("BAU", "bow up"), ("stand", "bow"), (1.55, 1.55), _BOW_WINDOWS,
+        ("BAD", "bow down"), ("BAU", "bow up"), ("stand", "bow"), (1.60, 1.60), _BOW_WINDOWS,
         {"pelvis_x": -0.02},
     ),
     *_pair(
-        ("SQD", "squat down"), ("SQR", "squat raise"), ("stand", "squat"), (1.45, 1.40),
+        ("SQD", "squat down"), ("SQR", "squat raise"), ("stand", "squat"), (1.50, 1.45),
         _SQUAT_WINDOWS,
     ),
     *_pair(
         ("LKR", "left kick raise"), ("LKT", "left kick retract"), ("stand", "left kick"),
-        (1.30, 1.30), _LIFT_WINDOWS,
+        (1.35, 1.35), _LIFT_WINDOWS,
     ),
     *_pair(
         ("RKR", "right kick raise"), ("RKT", "right kick retract"), ("stand", "right kick"),
-        (1.30, 1.30), _mirrored_windows(_LIFT_WINDOWS),
+        (1.35, 1.35), _mirrored_windows(_LIFT_WINDOWS),
     ),
     Primitive(
-        "MRL", "march, right leg raise", "stand", "right march", 1.20,
+        "MRL", "march, right leg raise", "stand", "right march", 1.25,
         _mirrored_windows(_MARCH_WINDOWS),
     ),
-    Primitive("MLR", "march, left leg raise", "right march", "left march", 1.45, _EXCHANGE_WINDOWS),
+    Primitive("MLR", "march, left leg raise", "right march", "left march", 1.50, _EXCHANGE_WINDOWS),
     Primitive(
-        "MMID", "march, mid step", "left march", "stand", 1.20, _reversed_windows(_MARCH_WINDOWS)
+        "MMID", "march, mid step", "left march", "stand", 1.25, _reversed_windows(_MARCH_WINDOWS)
     ),
     *_pair(
         ("LPE", "left punch"), ("LPR", "left punch retract"), ("guard", "left punch"),
-        (1.00, 1.10), _PUNCH_WINDOWS,
+        (1.04, 1.14), _PUNCH_WINDOWS,
     ),
     Primitive(
-        "RPE", "right punch", "guard", "right punch", 1.00, _mirrored_windows(_PUNCH_WINDOWS)
+        "RPE", "right punch", "guard", "right punch", 1.04, _mirrored_windows(_PUNCH_WINDOWS)
     ),
     Primitive(
-        "RPR", "right punch retract", "right punch", "stand", 1.30,
+        "RPR", "right punch retract", "right punch", "stand", 1.35,
         _reversed_windows(_mirrored_windows(_PUNCH_WINDOWS)),
     ),
 )  # fmt: skip

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ..errors import InvalidValueError
+from mplearn.errors import InvalidValueError
+
 from .primitives import PRIMITIVES, followers, primitive
 
 Sequencing = Mapping[str, Mapping[str, float]]
@@ -55,7 +57,7 @@ def check_script(script: tuple[str, ...]) -> None:
     if not script:
         raise InvalidValueError(f"a script needs at least one of {', '.join(PRIMITIVES)}")
     primitive(script[0])
-    for index, (first, second) in enumerate(zip(script, script[1:], strict=False)):
+    for index, (first, second) in enumerate(itertools.pairwise(script)):
         check_follows(first, second, index + 1)
 
 

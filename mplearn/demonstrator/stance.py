@@ -1,4 +1,4 @@
-"""From planned channels to postures: where the base is, and what the legs do so that feet stand still.
+"""From planned channels to postures: where the base is, and the legs that keep the feet in place.
 
 The feet are given in space, so a foot that stands cannot slide or sink. The base is as high as the
 legs reach; each leg's six joints follow in closed form, the hip's three axes and the ankle's two
@@ -9,17 +9,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..body import Body
-from ..errors import BodyError
-from ..recording import FloatArray
+from mplearn.body import Body
+from mplearn.errors import BodyError
+from mplearn.recording import FloatArray
+
 from .channels import INDEX, UPPER_JOINTS
 
-# how far a leg stretches: a standing leg to nearly straight; a lifted one stays softer and is limited
-# softly, so that its knee does not snap (shares of the leg length; full effect when lifted this far)
-_STANDING_REACH, _LIFTED_REACH = 0.9995, 0.985
-_STANDING_SOFTNESS, _LIFTED_SOFTNESS = 0.0002, 0.010
+# how far a leg stretches: a standing leg to nearly straight; a lifted one stays softer and is
+# limited softly, so that its knee does not snap (leg lengths; full effect when lifted this far)
+_STANDING_REACH, _LIFTED_REACH = 0.9995, 0.975
+_STANDING_SOFTNESS, _LIFTED_SOFTNESS = 0.0002, 0.020
 _LIFTED = 0.10
-_LEVEL_SOFTNESS = 0.001
+_LEVEL_SOFTNESS, _RELIEF = 0.003, 0.12
 
 LEG = ("hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle_pitch", "ankle_roll")
 
@@ -33,6 +34,7 @@ class Stance:
     Attributes:
         body: The body.
         leg_m: Length of a stretched leg, hip to ankle [m].
+        upper_limits: Limits of the upper body's joints, shape (26, 2), as `UPPER_JOINTS` [rad].
     """
 
     def __init__(self, body: Body) -> None:
@@ -51,23 +53,16 @@ class Stance:
         self._legs = [
             [7 + body.joint_names.index(f"{joint}_{side}") for joint in LEG] for side in "lr"
         ]
-        self._limits = body.joint_limits[np.array(self._upper) - 7]
-
-    @property
-    def upper_limits(self) -> FloatArray:
-        """Limits of the upper body's joints, in the order of `UPPER_JOINTS`, shape (26, 2) [rad]."""
-        return self._limits
+        self.upper_limits: FloatArray = body.joint_limits[np.array(self._upper) - 7]
 
     def solve(self, plan: FloatArray) -> FloatArray:
         """Return the postures, shape (T, 7 + n), of planned channels, shape (T, C)."""
         n = len(plan)
         q = np.zeros((n, self.body.nq))
         q[:, self._upper] = np.clip(
-            plan[:, : len(UPPER_JOINTS)], self._limits[:, 0], self._limits[:, 1]
+            plan[:, : len(UPPER_JOINTS)], self.upper_limits[:, 0], self.upper_limits[:, 1]
         )
-        pelvis = _rotation(
-            *(plan[:, INDEX[f"pelvis_{axis}"]] for axis in ("roll", "pitch", "yaw"))
-        )
+        pelvis = _rotation(*(plan[:, INDEX[f"pelvis_{axis}"]] for axis in ("roll", "pitch", "yaw")))
         feet = [self._foot(plan, side) for side in range(2)]
         hips = np.einsum("tij,sj->tsi", pelvis, self._hips)  # (T, 2, 3) relative to the pelvis
         base = self._base(plan, hips, feet)
@@ -101,11 +96,13 @@ class Stance:
         length = self.leg_m * (1.0 - plan[:, INDEX["crouch"]])
         heights = np.empty((len(plan), 2))
         for side in range(2):
-            # a lifted foot counts where it was: it will come down there
+            lifted = plan[:, INDEX[f"foot_z_{'lr'[side]}"]]
+            # a lifted foot counts where it was, as it will come down there, and the less the higher
             across = base[:, 1] + hips[:, side, 1] - feet[side][0][:, 1]
             along = base[:, 0] + hips[:, side, 0] - self._ankles[side, 0]
             drop = np.sqrt(length**2 - along**2 - across**2)
-            heights[:, side] = self._ankles[side, 2] + drop - hips[:, side, 2]
+            height = self._ankles[side, 2] + _RELIEF * lifted * self.leg_m
+            heights[:, side] = height + drop - hips[:, side, 2]
         softness = _LEVEL_SOFTNESS * self.leg_m
         base[:, 2] = -softness * np.logaddexp(*(-heights.T / softness)) + softness * np.log(2.0)
         return base
@@ -134,7 +131,9 @@ class Stance:
         ankle_pitch = -np.arctan2(back[:, 0], np.hypot(back[:, 1], back[:, 2])) - lean
         zero = np.zeros(len(hip))
         rest = np.einsum("tji,tjk->tik", pelvis, foot)
-        rest = rest @ _rotation(-ankle_roll, zero, zero) @ _rotation(zero, -knee - ankle_pitch, zero)
+        rest = (
+            rest @ _rotation(-ankle_roll, zero, zero) @ _rotation(zero, -knee - ankle_pitch, zero)
+        )
         hip_yaw = np.arctan2(-rest[:, 0, 1], rest[:, 1, 1])
         across = -rest[:, 0, 1] * np.sin(hip_yaw) + rest[:, 1, 1] * np.cos(hip_yaw)
         hip_roll = np.arctan2(rest[:, 2, 1], across)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..errors import InvalidValueError
+from mplearn.errors import InvalidValueError
 
 Range = tuple[float, float]
 
@@ -44,11 +44,11 @@ class Variability:
     placement_m: float = 0.008
     drift_rad: float = 0.02
     sway: float = 1.0
-    fluid: float = 0.45
+    fluid: float = 0.5
     overlap_s: Range = (0.1, 0.3)
-    pause: float = 0.08
-    pause_s: Range = (0.4, 1.0)
-    dwell_s: Range = (0.0, 0.2)
+    pause: float = 0.05
+    pause_s: Range = (0.4, 0.9)
+    dwell_s: Range = (0.0, 0.1)
     noise_m: float = 0.002
     occlusion: float = 0.01
     occlusion_s: Range = (0.05, 0.5)
@@ -64,7 +64,9 @@ class Variability:
             "occlusion": 0.5,
         }.items():  # fmt: skip
             if getattr(self, name) > limit:
-                raise InvalidValueError(f"{name} must be in [0, {limit}], not {getattr(self, name)}")
+                raise InvalidValueError(
+                    f"{name} must be in [0, {limit}], not {getattr(self, name)}"
+                )
         if self.fluid + self.pause > 1.0:
             raise InvalidValueError(
                 f"fluid and pause are shares of the joins, together at most 1, "
