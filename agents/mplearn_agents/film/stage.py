@@ -92,7 +92,7 @@ class Stage:
 
 def _places(n: int) -> FloatArray:
     """Return where each body stands, across the stage [m]; y points to the audience's right."""
-    return APART_M * (np.arange(n) - (n - 1) / 2)
+    return np.asarray(APART_M * (np.arange(n) - (n - 1) / 2), dtype=np.float64)
 
 
 def _scene(bodies: Sequence[str]) -> mujoco.MjModel:

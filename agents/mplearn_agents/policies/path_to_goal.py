@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
+import gymnasium
 import networkx as nx
 import numpy as np
 
-from mplearn.errors import InvalidValueError, NoPathError, UnknownPrimitiveError
+from mplearn.errors import InvalidValueError, NoPathError, RobotError, UnknownPrimitiveError
 
 from .base import Policy, transition_prior
+
+Prefer: TypeAlias = Literal["likely", "short"]
 
 
 class PathToGoal(Policy):
@@ -31,9 +34,7 @@ class PathToGoal(Policy):
         InvalidValueError: ``prefer`` is neither.
     """
 
-    def __init__(
-        self, graph: nx.DiGraph[int], goal: int, prefer: Literal["likely", "short"] = "likely"
-    ) -> None:
+    def __init__(self, graph: nx.DiGraph[int], goal: int, prefer: Prefer = "likely") -> None:
         if goal not in graph:
             raise UnknownPrimitiveError(
                 f"the goal {goal} is not in the graph; its nodes are {sorted(graph)}"
@@ -50,22 +51,46 @@ class PathToGoal(Policy):
         )
         self._rest: dict[int, float] = nx.single_source_dijkstra_path_length(costs, goal)
 
+    @classmethod
+    def for_env(
+        cls, env: gymnasium.Env[Any, Any], goal: int | str, prefer: Prefer = "likely"
+    ) -> PathToGoal:
+        """Return the policy that leads an environment's robot to a primitive, given by id or name.
+
+        Raises:
+            UnknownPrimitiveError: The library does not hold the goal.
+            RobotError: The robot cannot perform it.
+        """
+        repertoire = env.unwrapped.repertoire  # type: ignore[attr-defined]
+        target = repertoire.library[goal]
+        verdict = repertoire.feasibility(target.id)
+        if not verdict.feasible:
+            raise RobotError(
+                f"the robot cannot perform the goal {target.name!r}: "
+                f"{'; '.join(map(str, verdict.problems))}"
+            )
+        possible = [id for id in repertoire.ids if repertoire.feasibility(id).feasible]
+        graph = repertoire.library.graph.to_networkx().subgraph(possible)
+        slots = nx.relabel_nodes(graph, repertoire.slots)
+        return cls(slots, repertoire.slots[target.id], prefer)
+
     def act(self, observation: Any, info: Mapping[str, Any]) -> int:
         """Return the first action of the best path.
 
         Raises:
-            NoPathError: No legal action leads to the goal.
+            NoPathError: There is a choice, and no legal action leads to the goal.
         """
         prior = transition_prior(info)
+        possible = np.flatnonzero(prior)
+        if len(possible) == 1:
+            return int(possible[0])
         ways = {
             int(action): self._cost(prior[action]) + self._rest[int(action)]
-            for action in np.flatnonzero(prior)
+            for action in possible
             if int(action) in self._rest
         }
         if not ways:
-            raise NoPathError(
-                f"none of the legal actions {np.flatnonzero(prior).tolist()} leads to {self.goal}"
-            )
+            raise NoPathError(f"none of the legal actions {possible.tolist()} leads to {self.goal}")
         return min(ways, key=lambda action: (ways[action], action))
 
     def _cost(self, probability: float) -> float:

@@ -1,0 +1,149 @@
+"""Walks on the primitive graph: a policy chooses, the robot performs.
+
+As a program: ``python -m mplearn_agents.walk --policy random --steps 20 --video walk.mp4``.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from mplearn.errors import InvalidValueError
+from mplearn.recording import FloatArray, IntArray
+
+from .policies import Policy
+
+HOLD = 0
+
+
+@dataclass(frozen=True)
+class WalkStep:
+    """One macro step.
+
+    Attributes:
+        action: What the policy chose.
+        primitive: Id of the primitive that was performed; None where the robot held its posture.
+        name: Its name; "hold" where there was none.
+        duration_s: How long it took [s].
+        reward: What it earned.
+        illegal: Whether the action was not allowed.
+        fallen: Whether the robot fell.
+    """
+
+    action: int
+    primitive: int | None
+    name: str
+    duration_s: float
+    reward: float
+    illegal: bool
+    fallen: bool
+
+
+@dataclass(frozen=True)
+class WalkResult:
+    """A walk.
+
+    Attributes:
+        steps: All macro steps, holds too.
+        postures: The robot's qpos at each moment recorded, shape (F, nq); F = 0 where nothing was.
+        step_of: Step to which each posture belongs, shape (F,).
+        rate_hz: Recorded postures per second [1/s].
+    """
+
+    steps: tuple[WalkStep, ...]
+    postures: FloatArray
+    step_of: IntArray
+    rate_hz: float
+
+    @property
+    def primitives(self) -> tuple[int, ...]:
+        """Ids of the primitives in the order of their performance."""
+        return tuple(step.primitive for step in self.steps if step.primitive is not None)
+
+    @property
+    def falls(self) -> int:
+        """How often the robot fell."""
+        return sum(step.fallen for step in self.steps)
+
+    @property
+    def duration_s(self) -> float:
+        """How long the walk took [s]."""
+        return sum(step.duration_s for step in self.steps)
+
+
+def walk(
+    env: gymnasium.Env[Any, Any],
+    policy: Policy,
+    steps: int,
+    seed: int | None = None,
+    *,
+    record: bool = False,
+) -> WalkResult:
+    """Let a policy walk until it has performed a number of primitives.
+
+    After a fall, or where the environment cuts the episode, it starts again from standing. Holding
+    does not count; a policy that holds in nine of ten steps is stopped at ten times the steps.
+
+    Args:
+        env: A `mplearn/PrimitiveHumanoid-v0`, or another environment with its actions and infos.
+        policy: Who chooses.
+        steps: How many primitives to perform.
+        seed: Seed of the environment and the policy.
+        record: Whether to keep the robot's postures, as often as the environment's
+            ``frame_rate_hz``, so that a film can be made.
+
+    Raises:
+        InvalidValueError: ``steps`` is less than 1.
+    """
+    if steps < 1:
+        raise InvalidValueError(f"a walk has at least 1 step, not {steps}")
+    base: Any = env.unwrapped
+    done: list[WalkStep] = []
+    postures: list[FloatArray] = []
+    step_of: list[int] = []
+
+    def keep() -> None:
+        postures.append(base.simulation.data.qpos.copy())
+        step_of.append(len(done))
+
+    if record:
+        base.frame_callback = keep
+    policy.reset(seed)
+    observation, info = env.reset(seed=seed)
+    performed = 0
+    while performed < steps and len(done) < 10 * steps:
+        action = policy.act(observation, info)
+        observation, reward, fallen, truncated, info = env.step(action)
+        held = action == HOLD or info["illegal"]
+        done.append(
+            WalkStep(
+                action=action,
+                primitive=None if held else info["primitive"],
+                name="hold" if held else info["primitive_name"],
+                duration_s=info["duration_s"],
+                reward=float(reward),
+                illegal=info["illegal"],
+                fallen=bool(fallen),
+            )
+        )
+        performed += not held
+        if fallen or truncated:
+            observation, info = env.reset()
+    if record:
+        base.frame_callback = None
+    return WalkResult(
+        steps=tuple(done),
+        postures=np.array(postures),
+        step_of=np.array(step_of, dtype=np.int64),
+        rate_hz=float(base.frame_rate_hz) if record else 0.0,
+    )
+
+
+if __name__ == "__main__":
+    from .cli import main
+
+    sys.exit(main(["perform", *sys.argv[1:]]))
