@@ -41,7 +41,7 @@ def generate(
         start: Posture to start from, at rest, shape (D,). Each style reaches its own course
             continuously from there.
         cutoff_hz: Cut-off of the zero-phase low-pass filter over the whole path [1/s]; None is
-            the style's own (2.5 for "deterministic", 3 for "averaged", else none), infinity is none.
+            the style's own (2.5 for "deterministic", 3 for "averaged"), infinity is none.
         blend_s: Time over which pieces of "nearest" and "averaged", and a given start, pass into
             what follows [s].
         n_samples: How many samples "averaged" draws of each primitive.

@@ -27,7 +27,7 @@ class TransitionCounts:
     """
 
     def __init__(
-        self, *, order: int = 2, concentration: float = 1.0, history_capacity: int = 20_000
+        self, *, order: int = 2, concentration: float = 2.0, history_capacity: int = 20_000
     ) -> None:
         if not 1 <= order <= 8:
             raise InvalidValueError(f"order must lie in [1, 8], not {order}")
