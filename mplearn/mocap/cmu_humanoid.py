@@ -68,21 +68,22 @@ def cmu_humanoid_positions(
 
 
 def _converted(angles: FloatArray, unit_m: float) -> tuple[FloatArray, Any]:
-    with warnings.catch_warnings():  # dm_control looks for a screen and warns that there is none
+    """Return dm_control's positions of the humanoid's joints, shape (T, 63), and its model."""
+    per_unit = [180.0 / np.pi if c.rotates else 1.0 / unit_m for c in CMU_COLUMNS]
+    lines = [
+        f"{number}\nroot {' '.join(map(repr, frame))}\n"
+        for number, frame in enumerate((angles * per_unit).tolist(), start=1)
+    ]
+    # dm_control warns where there is no screen, and parse_amc leaves its file to the collector
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from dm_control import mujoco
         from dm_control.suite import humanoid_CMU
         from dm_control.suite.utils import parse_amc
-    physics = mujoco.Physics.from_xml_string(*humanoid_CMU.get_model_and_assets())
-    per_unit = [180.0 / np.pi if c.rotates else 1.0 / unit_m for c in CMU_COLUMNS]
-    values = angles * per_unit
-    lines = []
-    for number, frame in enumerate(values, start=1):
-        lines.append(str(number))
-        lines.append("root " + " ".join(map(repr, frame.tolist())))
-    with tempfile.TemporaryDirectory() as folder:
+
         plain = Path(folder) / "frames.amc"
-        plain.write_text("\n".join(lines) + "\n")
+        plain.write_text("".join(lines))
+        physics = mujoco.Physics.from_xml_string(*humanoid_CMU.get_model_and_assets())
         converted = parse_amc.convert(str(plain), physics, parse_amc.MOCAP_DT)
     return converted.qpos.T, physics.model
 

@@ -221,7 +221,7 @@ def test_broken_bvh(tmp_path: Path, old: str, new: str, found: str) -> None:
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new))
-    with pytest.raises(RecordingError, match=f"broken.bvh.*({found})"):
+    with pytest.raises(RecordingError, match=rf"broken\.bvh.*({found})"):
         open_recording(path)
 
 
@@ -255,7 +255,7 @@ def test_bones_that_do_not_fit(tmp_path: Path, old: str, new: str, found: str | 
     if found is None:
         open_recording(path)
         return
-    with pytest.raises(RecordingError, match=f"take.*{found}.*expected"):
+    with pytest.raises(RecordingError, match=rf"take.*{found}.*expected"):
         open_recording(path)
 
 
@@ -265,7 +265,7 @@ def test_bones_that_do_not_fit(tmp_path: Path, old: str, new: str, found: str | 
         ("\n3\n", "\n4\n", "frame 4 follows frame 2"),
         ("thigh", "femur", "femur"),
         (":DEGREES\n1\n", ":DEGREES\n", "starts with"),
-        ("root ", "root nan ", "line 5 has 6 columns"),
+        ("root ", "root nan ", "line 11 has 6 columns"),
         ("\nshank ", "\nshank nan\nshank ", "another number of bones"),
         ("\nlarm ", "\nlarm nan ", "2 numbers|columns"),
     ],
@@ -274,7 +274,7 @@ def test_broken_amc(tmp_path: Path, old: str, new: str, found: str) -> None:
     write_asf(tmp_path / "take.asf")
     path = write_amc(tmp_path / "take.amc")
     path.write_text(path.read_text().replace(old, new, 1))
-    with pytest.raises(RecordingError, match=f"take.amc.*{found}"):
+    with pytest.raises(RecordingError, match=rf"take\.amc.*{found}"):
         open_recording(path)
 
 
@@ -288,5 +288,5 @@ def test_skeleton_may_be_passed(tmp_path: Path) -> None:
     skeleton = write_asf(tmp_path / "bones" / "anna.asf")
     path = write_amc(tmp_path / "take.amc")
     assert len(open_recording(path, hints=Hints(skeleton=skeleton))) == 12
-    with pytest.raises(RecordingError, match="nobody.asf"):
+    with pytest.raises(RecordingError, match=r"nobody\.asf"):
         open_recording(path, hints=Hints(skeleton=tmp_path / "nobody.asf"))

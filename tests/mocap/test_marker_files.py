@@ -48,9 +48,9 @@ def test_takes_of_a_folder_in_order_and_by_name(tmp_path: Path) -> None:
     assert take_names(tmp_path) == ("m01_s01", "m01_s02", "m02_s01")
     assert [take.name for take in open_recordings(tmp_path)] == list(take_names(tmp_path))
     assert open_recording(tmp_path, take="m01_s02").person == "s02"
-    with pytest.raises(RecordingError, match="3 takes.*m01_s01, m01_s02, m02_s01"):
+    with pytest.raises(RecordingError, match=r"3 takes.*m01_s01, m01_s02, m02_s01"):
         open_recording(tmp_path)
-    with pytest.raises(RecordingError, match="no take 'm09_s01'.*m01_s01, m01_s02, m02_s01"):
+    with pytest.raises(RecordingError, match=r"no take 'm09_s01'.*m01_s01, m01_s02, m02_s01"):
         open_recording(tmp_path, take="m09_s01")
 
 
@@ -145,7 +145,7 @@ def test_c3d_without_points(tmp_path: Path) -> None:
 
 def test_c3d_same_name_twice(tmp_path: Path) -> None:
     path = write_c3d(tmp_path / "a.c3d", person(), names=["A", "B", "A", "C", "D", "E"])
-    with pytest.raises(RecordingError, match="'A'.*more than once"):
+    with pytest.raises(RecordingError, match=r"'A'.*more than once"):
         open_recording(path)
 
 
@@ -228,7 +228,7 @@ def test_csv_of_angles_with_semicolons_and_quotes(tmp_path: Path) -> None:
     assert recording.channels == ("knee", "hip")
     assert recording.frames == pytest.approx(np.array([[0.5, 1], [np.nan, 2]]), nan_ok=True)
     assert spans(recording.labels) == [(0, 1, "down; slowly"), (1, 2, "up")]
-    with pytest.raises(RecordingError, match="no rate.*rate_hz"):
+    with pytest.raises(RecordingError, match=r"no rate.*rate_hz"):
         open_recording(path)
 
 
