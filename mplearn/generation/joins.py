@@ -46,7 +46,7 @@ def drawn_from(
     span = min(blend_s, (len(frames) - 1) / rate_hz)
     own = (frames[1] - frames[0]) * rate_hz if len(frames) > 1 else np.zeros_like(velocity)
     offset, slope = posture - frames[0], velocity - own
-    if span <= 0:
+    if span * rate_hz < 1:  # no time to blend in
         return np.concatenate([[posture], frames[1:]])
     s = np.minimum(np.arange(len(frames)) / rate_hz / span, 1.0)[:, None]
     fading = 1 - 10 * s**3 + 15 * s**4 - 6 * s**5

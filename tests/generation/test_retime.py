@@ -1,0 +1,113 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mplearn.errors import InvalidValueError
+from mplearn.generation import Trajectory, retime
+
+RATE = 100.0
+
+
+def motion(seed, n_pieces=3, n_channels=4, rate_hz=RATE):
+    """Smooth random motion through pieces of different vigour."""
+    rng = np.random.default_rng(seed)
+    lengths = rng.integers(25, 70, n_pieces)
+    t = np.arange(lengths.sum()) / rate_hz
+    frames = sum(
+        rng.normal(0, 1, n_channels) * np.sin(2 * np.pi * f * t[:, None] + rng.uniform(0, 6))
+        for f in (0.3, 0.8, 1.6)
+    )
+    ids = np.repeat(rng.permutation(n_pieces), lengths)
+    return Trajectory(frames, rate_hz, tuple("abcdefgh"[:n_channels]), ids)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 2**32),
+    velocity=st.floats(0.2, 30),
+    acceleration=st.none() | st.floats(0.5, 300),
+    speed=st.floats(0.2, 2.5),
+    rate_hz=st.sampled_from([20.0, 100.0, 250.0]),
+)
+def test_limits_always_hold_and_the_way_stays_the_same(
+    seed, velocity, acceleration, speed, rate_hz
+):
+    before = motion(seed, rate_hz=rate_hz)
+    limits = velocity * np.array([1.0, 0.5, 2.0, np.inf])
+    a_limits = None if acceleration is None else acceleration * np.array([1, np.inf, 0.5, 3])
+    after = retime(before, limits, a_limits, speed)
+    assert (np.abs(after.velocities) <= limits).all()
+    if a_limits is not None:
+        assert (np.abs(after.accelerations) <= a_limits).all()
+    assert after.path == before.path
+    assert (len(after) - 1) / (len(before) - 1) >= 1 / speed - 1e-6
+    np.testing.assert_allclose(after.frames[[0, -1]], before.frames[[0, -1]], atol=1e-9)
+    if speed <= 1:  # every posture on the way is still passed, between two frames
+        step = np.abs(np.diff(before.frames, axis=0)).max(axis=0) + 1e-3
+        nearest = np.abs(after.frames[:, None] - before.frames[None]).max(axis=2).min(axis=0)
+        assert (nearest <= step.max()).all()
+
+
+def test_within_limits_nothing_changes():
+    before = motion(1)
+    assert retime(before) is before
+    assert retime(before, np.full(4, 1e6), np.full(4, 1e6)) is before
+
+
+def test_half_speed_is_half_speed():
+    before = motion(2)
+    after = retime(before, speed=0.5)
+    assert len(after) == 2 * len(before) - 1
+    np.testing.assert_allclose(after.frames[::2], before.frames, atol=1e-9)
+    assert after.starts.tolist() == (2 * before.starts).tolist()
+    np.testing.assert_allclose(
+        np.abs(after.velocities).max(), np.abs(before.velocities).max() / 2, rtol=0.02
+    )
+
+
+def test_the_slow_down_is_the_smallest_and_each_primitives_own():
+    t = np.arange(400) / RATE
+    velocity = 1 + 3 / (1 + np.exp(-(t - 2.2) / 0.03))
+    frames = np.stack([np.cumsum(velocity) / RATE, np.zeros(400)], axis=1)
+    ids = np.repeat([5, 6], 200)
+    before = Trajectory(frames, RATE, ("x", "y"), ids)
+    after = retime(before, np.array([2.0, 1.0]))
+    lengths = np.diff(np.append(after.starts, len(after)))
+    # 1 /s is within 2 /s, 4 /s needs twice the time; the slow-down sets in 0.2 s before the join
+    assert 200 <= lengths[0] <= 225
+    assert 395 <= lengths[1] <= 405
+    assert np.abs(after.velocities).max() == pytest.approx(2.0, rel=0.01)
+
+
+def test_accelerations_fall_with_the_square():
+    t = np.arange(200) / RATE
+    before = Trajectory(np.sin(np.pi * t)[:, None], RATE, ("x",), np.zeros(200))
+    peak = np.abs(before.accelerations).max()
+    after = retime(before, acceleration_limits=np.array([peak / 4]))
+    assert len(after) == pytest.approx(400, abs=6)
+
+
+def test_a_jump_becomes_a_ramp_within_limits():
+    frames = np.repeat([0.0, 1.0], 30)[:, None]
+    before = Trajectory(frames, RATE, ("x",), np.zeros(60))
+    after = retime(before, np.array([2.0]), np.array([40.0]))
+    assert np.abs(after.velocities).max() <= 2.0
+    assert np.abs(after.accelerations).max() <= 40.0
+
+
+def test_bad_limits_are_named():
+    before = motion(3)
+    for wrong, match in (
+        ({"velocity_limits": np.ones(3)}, "velocity_limits must be 4"),
+        ({"velocity_limits": np.array([1, 0, 1, 1])}, "velocity_limits"),
+        ({"acceleration_limits": np.array([1, np.nan, 1, 1])}, "acceleration_limits"),
+        ({"speed": 0.0}, "speed"),
+        ({"speed": np.inf}, "speed"),
+        ({"velocity_limits": np.full(4, 1e-12)}, "would stretch"),
+        ({"speed": 1e5}, "without a frame"),
+    ):
+        with pytest.raises(InvalidValueError, match=match):
+            retime(before, **wrong)
+    still = Trajectory(np.zeros((1, 1)), RATE, ("x",), np.zeros(1))
+    assert len(retime(still, np.ones(1), speed=0.5)) == 1
