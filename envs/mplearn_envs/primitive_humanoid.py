@@ -304,11 +304,12 @@ class PrimitiveHumanoidEnv(gymnasium.Env[Observation, np.int64]):
 
     def _observation(self) -> Observation:
         simulation, choices = self.simulation, self._choices
+        cog, margin = simulation.balance()
         return {
             "posture": simulation.posture(),
             "velocity": simulation.velocity(),
-            "cog": simulation.cog(),
-            "support_margin": np.array([simulation.support_margin()]),
+            "cog": cog,
+            "support_margin": np.array([margin]),
             "current_primitive": np.int64(self._current_slot()),
             "action_mask": choices.mask.copy(),
             "transition_prior": choices.prior.copy(),

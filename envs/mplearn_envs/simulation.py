@@ -161,25 +161,22 @@ class Simulation:
         out[:2] = self._heading() @ out[:2]
         return out
 
-    def cog(self) -> FloatArray:
-        """Return the COG from the middle of the soles, x along the heading, shape (3,) [m]."""
-        out = self.data.subtree_com[1].copy()
-        out[:2] = self._heading() @ (out[:2] - self.soles()[..., :2].mean(axis=(0, 1)))
-        return out
+    def balance(self) -> tuple[FloatArray, float]:
+        """Return how the COG stands over the feet.
 
-    def support_margin(self) -> float:
-        """Return the distance of the COG's projection from the edge of the support polygon [m].
-
-        The corners of the soles that are less than 1.5 cm above the floor support. Negative outside;
-        -1 where less than a polygon supports.
+        Returns:
+            The COG from the middle of the soles, x along the heading, shape (3,) [m]; and the distance
+            of its projection from the edge of the support polygon [m], negative outside. Those corners
+            of the soles support that are less than 1.5 cm above the floor; -1 if fewer than three do.
         """
-        corners = self.soles().reshape(-1, 3)
+        corners = self.soles().reshape(8, 3)
+        cog = self.data.subtree_com[1].copy()
         down: BoolArray = corners[:, 2] < 0.015
-        if down.sum() < 3:
-            return -1.0
-        return float(
-            support_margin(convex_hull(corners[down, :2]), self.data.subtree_com[1, :2])
-        )
+        margin = -1.0
+        if np.count_nonzero(down) >= 3:
+            margin = float(support_margin(convex_hull(corners[down, :2]), cog[:2]))
+        cog[:2] = self._heading() @ (cog[:2] - corners[:, :2].sum(axis=0) / 8.0)
+        return cog, margin
 
     def _heading(self) -> FloatArray:
         """Return the matrix that turns vectors of the floor into the base's heading, shape (2, 2)."""
@@ -197,6 +194,7 @@ class Simulation:
         """Bring poses up to the state, which a step leaves one step behind."""
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_camlight(self.model, self.data)
 
     def _state_of(self, data: mujoco.MjData) -> FloatArray:
         out = np.empty(mujoco.mj_stateSize(self.model, _STATE))

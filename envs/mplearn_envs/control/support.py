@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray
@@ -19,23 +20,36 @@ def convex_hull(points: FloatArray) -> FloatArray:
     Raises:
         InvalidValueError: There are fewer than three points that span a polygon.
     """
-    ordered = np.unique(np.round(points, 9), axis=0).tolist()  # by x, then y
-    halves = []
-    for sequence in (ordered, ordered[::-1]):
-        chain: list[list[float]] = []
-        for x, y in sequence:
-            while len(chain) > 1 and _turns_right(chain[-2], chain[-1], x, y):
-                chain.pop()
-            chain.append([x, y])
-        halves.append(chain[:-1])
-    hull = np.array(halves[0] + halves[1])
+    hull = _chain(np.ascontiguousarray(points, dtype=np.float64))
     if len(hull) < 3:
         raise InvalidValueError(f"{len(points)} points on a line or in one place span no polygon")
     return hull
 
 
-def _turns_right(a: list[float], b: list[float], x: float, y: float) -> bool:
-    return (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]) <= 0
+@njit(cache=True)
+def _chain(points: FloatArray) -> FloatArray:
+    """Return the hull's corners by Andrew's monotone chain: sorted by x, then lower and upper half."""
+    order = np.argsort(points[:, 1], kind="mergesort")
+    order = order[np.argsort(points[order, 0], kind="mergesort")]
+    n = points.shape[0]
+    hull = np.empty((2 * n + 2, 2))
+    size = 0
+    for half in range(2):
+        first = size
+        for k in range(n):
+            point = points[order[k if half == 0 else n - 1 - k]]
+            while size - first > 1 and not _left_turn(hull[size - 2], hull[size - 1], point):
+                size -= 1
+            hull[size] = point
+            size += 1
+        size -= 1  # the last point starts the other half
+    return hull[:size].copy()
+
+
+@njit(cache=True)
+def _left_turn(a: FloatArray, b: FloatArray, c: FloatArray) -> bool:
+    area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    return bool(area > 1e-12)
 
 
 def support_margin(hull: FloatArray, point: FloatArray) -> FloatArray:
@@ -49,11 +63,23 @@ def support_margin(hull: FloatArray, point: FloatArray) -> FloatArray:
         Margins, shape (...) [m]. Outside, it is the distance to the most violated edge's line, which
         at most equals the distance to the polygon.
     """
-    edge = np.roll(hull, -1, axis=0) - hull
-    inward = np.stack((-edge[:, 1], edge[:, 0]), axis=1)
-    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
-    distance = np.asarray(point) @ inward.T - np.sum(hull * inward, axis=1)  # (..., H)
-    return np.asarray(distance.min(axis=-1))
+    points = np.ascontiguousarray(point, dtype=np.float64)
+    return _margins(hull, points.reshape(-1, 2)).reshape(points.shape[:-1])
+
+
+@njit(cache=True)
+def _margins(hull: FloatArray, points: FloatArray) -> FloatArray:
+    out = np.full(points.shape[0], np.inf)
+    for i in range(hull.shape[0]):
+        ax, ay = hull[i - 1, 0], hull[i - 1, 1]
+        ex, ey = hull[i, 0] - ax, hull[i, 1] - ay
+        length = np.sqrt(ex * ex + ey * ey)
+        for k in range(points.shape[0]):
+            inside = (ex * (points[k, 1] - ay) - ey * (points[k, 0] - ax)) / length
+            # NaN must not pass for a point inside
+            if not inside >= out[k]:
+                out[k] = inside
+    return out
 
 
 def zero_moment_point(force: FloatArray, moment: FloatArray, origin: FloatArray) -> FloatArray:
