@@ -31,8 +31,8 @@ _LEAD_S = 1.0  # the person stands still before the first motion
 _RANGES = {
     "shoulder_pitch_l": (-3.0, np.inf),
     "shoulder_pitch_r": (-3.0, np.inf),
-    "crouch": (0.001, 0.36),
-    "pelvis_pitch": (-0.4, 0.95),
+    "crouch": (0.001, 0.34),
+    "pelvis_pitch": (-0.4, 0.85),
     "foot_x_l": (-0.2, 0.9),
     "foot_x_r": (-0.2, 0.9),
     "foot_z_l": (0.0, 0.55),

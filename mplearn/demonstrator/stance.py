@@ -53,15 +53,14 @@ class Stance:
         self._legs = [
             [7 + body.joint_names.index(f"{joint}_{side}") for joint in LEG] for side in "lr"
         ]
-        self.upper_limits: FloatArray = body.joint_limits[np.array(self._upper) - 7]
+        self._limits = np.vstack((np.full((7, 2), (-np.inf, np.inf)), body.joint_limits))
+        self.upper_limits: FloatArray = self._limits[self._upper]
 
     def solve(self, plan: FloatArray) -> FloatArray:
         """Return the postures, shape (T, 7 + n), of planned channels, shape (T, C)."""
         n = len(plan)
         q = np.zeros((n, self.body.nq))
-        q[:, self._upper] = np.clip(
-            plan[:, : len(UPPER_JOINTS)], self.upper_limits[:, 0], self.upper_limits[:, 1]
-        )
+        q[:, self._upper] = plan[:, : len(UPPER_JOINTS)]
         pelvis = _rotation(*(plan[:, INDEX[f"pelvis_{axis}"]] for axis in ("roll", "pitch", "yaw")))
         feet = [self._foot(plan, side) for side in range(2)]
         hips = np.einsum("tij,sj->tsi", pelvis, self._hips)  # (T, 2, 3) relative to the pelvis
@@ -75,7 +74,8 @@ class Stance:
             q[:, self._legs[side]] = self._leg(
                 base + hips[:, side], pelvis, ankle, rotation, lifted
             )
-        return q
+        # only a lifted leg, or sway and drift on top of a motion at its limit, can come this far
+        return np.clip(q, self._limits[:, 0], self._limits[:, 1])
 
     def _foot(self, plan: FloatArray, side: int) -> tuple[FloatArray, FloatArray]:
         """Return an ankle's positions (T, 3) and the foot's orientations (T, 3, 3)."""
