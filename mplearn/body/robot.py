@@ -10,10 +10,11 @@ used. The paper gives no link sizes, masses, joint limits or axis of the hip joi
 * Masses [kg]: pelvis 9, chest 22, head 4, upper arm 2.2, forearm 1.6, hand 0.5 and 0.05 a finger
   group, thigh 5.2, shank 3.0, foot 1.2, toes 0.15.
 * The hip joint turns the chest about the vertical (``waist_yaw``).
-* The first axis of the shoulder is tilted out of the lateral axis, as on many humanoids: an upper
-  arm along the first axis is the singular posture of the shoulder, and here it points back,
-  outwards and up (or forward, across the body and down), where arms rarely go. With a lateral axis
-  it would be the arm held out sideways, in the middle of every abduction.
+* The first two axes of the shoulder are turned by 40 deg about the vertical, and the first is raised by
+  10 deg, as on many humanoids (all three stay perpendicular at rest, so every posture can be reached). An
+  upper arm along the first axis is the singular posture of the shoulder; here it points back, outwards and
+  up, or forward, across the body and down, where arms rarely go. With the lateral axis it would be the
+  arm held out sideways, in the middle of every abduction.
 * Fingers and toes are held at zero. Only the soles collide: a box of 24 x 11 x 4 cm a foot.
 
 The model has no actuators, floor or lights: whoever simulates it adds them.
@@ -45,7 +46,7 @@ from .mjcf import (
 HEIGHT_M = 1.65
 HIP_HEIGHT_M = 0.885
 HELD = (*tuple(f"finger_{i}_{s}" for s in "lr" for i in (1, 2, 3)), "toe_l", "toe_r")
-SHOULDER_AXIS = (-0.6, 0.74, 0.3)  # left; the right one is its mirror image
+SHOULDER_TURN_DEG, SHOULDER_RAISE_DEG = 40.0, 10.0  # of the left one's axes; the right mirrors it
 
 _HIP, _ANKLE, _SHOULDER, _ELBOW, _WRIST = 0.15, 0.10, 0.03, 0.02, 0.01  # armatures
 
@@ -118,10 +119,16 @@ def _head(chest: Any) -> None:
 
 def _arm(chest: Any, side: str) -> None:
     out = 1.0 if side == "l" else -1.0
-    tilt = np.array(SHOULDER_AXIS) * (out, 1.0, out) / np.linalg.norm(SHOULDER_AXIS)
+    turn, rise = np.radians((SHOULDER_TURN_DEG, SHOULDER_RAISE_DEG))
+    pitch_axis = (
+        -out * np.sin(turn) * np.cos(rise),
+        np.cos(turn) * np.cos(rise),
+        out * np.sin(rise),
+    )
+    roll = (-75, 95) if side == "l" else (-95, 75)
     hinges = [
-        Hinge(f"shoulder_pitch_{side}", tilt, -215, 110, _SHOULDER),
-        Hinge(f"shoulder_roll_{side}", X, -120, 120, _SHOULDER),
+        Hinge(f"shoulder_pitch_{side}", pitch_axis, -230, 100, _SHOULDER),
+        Hinge(f"shoulder_roll_{side}", (np.cos(turn), out * np.sin(turn), 0), *roll, _SHOULDER),
         Hinge(f"shoulder_yaw_{side}", Z, -150, 150, _SHOULDER),
     ]
     arm = add_part(
