@@ -98,13 +98,13 @@ def test_legs_put_the_feet_exactly_where_they_are_planned():
         plan = as_vector(
             {
                 **STAND,
-                "crouch": rng.uniform(0.06, 0.12),
-                **{f"pelvis_{a}": rng.normal(0, 0.1) for a in ("roll", "pitch", "yaw")},
+                "crouch": rng.uniform(0.1, 0.18),
+                **{f"pelvis_{a}": rng.normal(0, 0.06) for a in ("roll", "pitch", "yaw")},
                 "pelvis_x": rng.normal(0, 0.04),
                 "pelvis_y": rng.normal(0, 0.04),
                 **{f"foot_{a}_{s}": rng.normal(0, 0.02) for a in "xy" for s in "lr"},
                 **{f"foot_yaw_{s}": rng.normal(0, 0.2) for s in "lr"},
-                "foot_z_l": rng.uniform(0.0, 0.1),
+                "foot_z_l": rng.uniform(0.0, 0.05),
                 "foot_pitch_l": rng.uniform(0.0, 0.3),
             }
         )
