@@ -19,7 +19,7 @@ class TooFewMarkersError(BodyError):
 TRUNK = ("pelvis", "abdomen", "chest", "clavicle_l", "clavicle_r", "head")
 LEAST_UPRIGHT = 0.35  # cosine of the trunk's lean
 SMALLEST, LARGEST = 0.35, 1.6  # size relative to the body
-MARKER_SIGMA_M, OUTLIER_M, REST_WEIGHT = 0.01, 0.15, 0.1
+MARKER_SIGMA_M, OUTLIER_M = 0.01, 0.15
 
 # where limbs may be in the first frame [deg], for the left; about x and z the right is mirrored
 ARM_STARTS: tuple[dict[str, float], ...] = (
@@ -177,7 +177,7 @@ def settle(
             limits[:, 0] - angles,
             limits[:, 1] - angles,
             follower.free,
-            np.maximum(follower.rest_weight, REST_WEIGHT),
+            follower.rest_weight,
             OUTLIER_M,
             10.0,
             0.5,

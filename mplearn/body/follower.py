@@ -56,8 +56,13 @@ class Follower:
 
     @cached_property
     def rest_weight(self) -> FloatArray:
-        """Weight of each slide's distance from its place, zero for hinges, shape (n,) [1/m^2]."""
-        return np.where(self.tree.slides, GIRDLE_SIGMA_M**-2, 0.0)
+        """Weight of each joint's distance from zero, shape (n,) [1/rad^2, for slides 1/m^2].
+
+        A joint's range is taken for four standard deviations of its angle.
+        """
+        sigma = np.ptp(self.tree.limits, axis=1) / 4
+        weight: FloatArray = np.where(self.tree.slides, GIRDLE_SIGMA_M, sigma) ** -2.0
+        return weight
 
 
 def follower(body: Body) -> Follower:

@@ -2,9 +2,11 @@
 
 The frame's cost, over postures q between their bounds, is
 
-    sum_m rho(|m - m(q)|) / sigma^2  +  sum_j (q_j - q_j(before))^2 / var_j  +  rest_j (q_j - q_j(rest))^2
+    sum_m rho(|m - m(q)|) / sigma^2  +  sum_j (q_j - q_j(before))^2 / var_j  +  r_j q_j^2
 
-with rho(r) = c^2 log(1 + r^2 / c^2) (Cauchy), so that a swapped or flying marker weighs nearly nothing.
+with rho(r) = c^2 log(1 + r^2 / c^2) (Cauchy), so that a swapped or flying marker weighs nearly nothing. The
+last term keeps joints that the markers determine badly near rest: r_j = w_j h_j / (w_j + h_j), where
+h_j is what the markers say about the joint alone, so that an occluded joint is held, not pulled to rest.
 It is the update step of an iterated extended Kalman filter with a diagonal covariance: `var` is what is
 known about the posture before the frame, and the inverse of the last normal matrix is what is known after.
 """
@@ -81,7 +83,7 @@ def solve_frame(
         low: Lower bounds of the step of each degree of freedom, shape (6 + n,).
         high: Upper bounds, shape (6 + n,).
         free: Which degrees of freedom may move, shape (6 + n,).
-        rest_weight: Weight of each hinge's distance from zero, shape (n,).
+        rest_weight: Weight w of each joint's distance from zero, shape (n,).
         outlier_m: The scale c of the Cauchy loss [m]; infinite for least squares.
         widening: Factor on c in the first iteration, when the posture is still the last frame's.
         largest_step: Longest step of one iteration in any degree of freedom [m, rad].
@@ -128,11 +130,12 @@ def solve_frame(
             jacobian, markers, points, residuals, bodies, weights, c, linkage, normal, gradient
         )
         for i in range(dofs):
+            if i >= 6 and normal[i, i] > 0.0:
+                pull = rest_weight[i - 6] * normal[i, i] / (rest_weight[i - 6] + normal[i, i])
+                normal[i, i] += pull
+                gradient[i] -= pull * q[i + 1]
             normal[i, i] += 1.0 / variance[i]
             gradient[i] -= moved[i] / variance[i]
-            if i >= 6:
-                normal[i, i] += rest_weight[i - 6]
-                gradient[i] -= rest_weight[i - 6] * q[i + 1]
         bounded_solve(normal, gradient, low - moved, high - moved, free, step)
         longest = np.max(np.abs(step))
         if longest > largest_step:

@@ -37,7 +37,6 @@ class IKConfig:
         base_drift: The same for the base's position [m / sqrt(s)].
         joint_speed: Fastest joint [rad/s]; nothing turns faster, whatever the markers do.
         base_speed: Fastest base [m/s].
-        rest_s: Time constant with which joints that no marker determines return to rest [s].
         most_uncertain: Bound on the uncertainty of a joint [rad] or the base [m].
         max_iterations: Gauss-Newton steps a frame.
         tolerance: Change below which a frame is solved [rad, m].
@@ -49,7 +48,6 @@ class IKConfig:
     base_drift: float = 1.5
     joint_speed: float = 17.0
     base_speed: float = 10.0
-    rest_s: float = 10.0
     most_uncertain: float = 0.7
     max_iterations: int = 6
     tolerance: float = 1e-3
@@ -198,7 +196,7 @@ class InverseKinematics:
                 low,
                 high,
                 self._follower.free,
-                self._follower.rest_weight + dt / config.rest_s / self._variance[6:],
+                self._follower.rest_weight,
                 config.outlier_m,
                 3.0,
                 0.5,

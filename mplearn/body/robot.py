@@ -102,7 +102,7 @@ def _chest(pelvis: Any) -> Any:
 def _head(chest: Any) -> None:
     hinges = [
         Hinge("neck_yaw", Z, -80, 80, _WRIST),
-        Hinge("neck_pitch", Y, -50, 55, _WRIST),
+        Hinge("neck_pitch", Y, -65, 60, _WRIST),
         Hinge("neck_roll", X, -40, 40, _WRIST),
     ]
     head = add_part(
@@ -153,7 +153,7 @@ def _arm(chest: Any, side: str) -> None:
     capsule(forearm, (0, 0, -0.045), (0, 0, -0.19), 0.036, "shell")
     cylinder(forearm, (0, 0, -0.20), (0, 0, -0.241), 0.026, "frame")
     hinges = [
-        Hinge(f"wrist_pitch_{side}", Y, -40, 40, _WRIST),
+        Hinge(f"wrist_pitch_{side}", Y, -45, 45, _WRIST),
         Hinge(f"wrist_roll_{side}", X, -80, 80, _WRIST),
     ]
     hand = add_part(
@@ -179,9 +179,9 @@ def _leg(pelvis: Any, side: str) -> None:
     out = 1.0 if side == "l" else -1.0
     roll = (-30, 60) if side == "l" else (-60, 30)
     hinges = [
-        Hinge(f"hip_yaw_{side}", Z, -50, 50, _HIP),
+        Hinge(f"hip_yaw_{side}", Z, -60, 60, _HIP),
         Hinge(f"hip_roll_{side}", X, *roll, _HIP),
-        Hinge(f"hip_pitch_{side}", Y, -130, 45, _HIP),
+        Hinge(f"hip_pitch_{side}", Y, -140, 45, _HIP),
     ]
     thigh = add_part(
         pelvis, f"thigh_{side}", (0, 0.09 * out, 0), hinges, 5.2, (0, 0, -0.17), (0.13, 0.13, 0.40)
