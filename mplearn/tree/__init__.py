@@ -1,0 +1,13 @@
+"""The incremental tree of motion primitives."""
+
+from .config import FormConfig as FormConfig
+from .config import TreeConfig as TreeConfig
+from .node import Node as Node
+from .placement import ROOT as ROOT
+from .placement import Match as Match
+from .placement import Merge as Merge
+from .placement import Placement as Placement
+from .placement import Split as Split
+from .recogniser import Recogniser as Recogniser
+from .recogniser import Recognition as Recognition
+from .tree import PrimitiveTree as PrimitiveTree

@@ -1,0 +1,202 @@
+"""The segments that the tree remembers, each with its model, and the distances between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ..hmm import fit
+from ..hmm.kernels import log_densities, log_likelihood
+from ..recording import FloatArray, IntArray
+from . import form
+from .config import TreeConfig
+
+
+class Exemplar(NamedTuple):
+    """A segment in the form in which it is compared, and its model; or many of them, stacked.
+
+    Attributes:
+        columns: Points, shape (D, P).
+        means: Shape (N, D).
+        variances: Shape (N, D).
+        log_norms: Shape (N, D).
+        log_stay: Shape (N,).
+        log_next: Shape (N,).
+        own: Log-likelihood of the points under the model, shape ().
+    """
+
+    columns: FloatArray
+    means: FloatArray
+    variances: FloatArray
+    log_norms: FloatArray
+    log_stay: FloatArray
+    log_next: FloatArray
+    own: FloatArray
+
+
+class ExemplarBank:
+    """Exemplars by number: points and a model each, in arrays that grow with need.
+
+    Args:
+        config: Rules of the tree.
+        n_channels: D.
+        floor: Smallest variance of each channel, shape (D,).
+    """
+
+    def __init__(self, config: TreeConfig, n_channels: int, floor: FloatArray) -> None:
+        self.config = config
+        self.n_channels = n_channels
+        self.floor = np.array(floor, dtype=np.float64)
+        self._weights = form.weights(config.form)
+        self._slots: dict[int, int] = {}
+        self._free: list[int] = []
+        self._rows = _empty(config, n_channels, 0)
+
+    def __contains__(self, number: int) -> bool:
+        """Whether the exemplar is remembered."""
+        return number in self._slots
+
+    def numbers(self) -> list[int]:
+        """Return the numbers of all exemplars, in the order of their arrival."""
+        return sorted(self._slots)
+
+    def __getitem__(self, number: int) -> Exemplar:
+        """Return an exemplar."""
+        slot = self._slots[number]
+        return Exemplar(*(rows[slot] for rows in self._rows))
+
+    def model(self, points: FloatArray) -> Exemplar:
+        """Model the points of a segment, shape (P, D); the bank does not remember it.
+
+        Raises:
+            ModelError: A channel is missing throughout.
+        """
+        model = fit(
+            [points],
+            self.config.n_states,
+            weights=[self._weights],
+            n_steps=1,
+            variance_floor=self.floor,
+        )
+        own = np.array(model.score(points, self._weights))
+        columns = np.ascontiguousarray(points.T)
+        parts = model.means, model.variances, model.log_norms, model.log_stay, model.log_next
+        return Exemplar(columns, *parts, own)
+
+    def add(self, number: int, exemplar: Exemplar) -> None:
+        """Remember an exemplar."""
+        if not self._free:
+            held = len(self._slots)
+            grown = _empty(self.config, self.n_channels, max(16, 2 * held))
+            for new, old in zip(grown, self._rows, strict=True):
+                new[:held] = old
+            self._rows = grown
+            self._free = list(range(len(grown.own) - 1, held - 1, -1))
+        slot = self._free.pop()
+        self._slots[number] = slot
+        self._write(slot, exemplar)
+
+    def drop(self, number: int) -> None:
+        """Forget an exemplar."""
+        self._free.append(self._slots.pop(number))
+
+    def refit(self, floor: FloatArray) -> None:
+        """Model all exemplars again, with another variance floor."""
+        self.floor = np.array(floor, dtype=np.float64)
+        for slot in self._slots.values():
+            self._write(slot, self.model(self._rows.columns[slot].T))
+
+    def profile(self, exemplar: Exemplar) -> FloatArray:
+        """Return the points times the root of their weights, shape (D * P,); 0 where missing."""
+        return np.asarray((np.nan_to_num(exemplar.columns) * np.sqrt(self._weights)).ravel())
+
+    def mean_profile(self, numbers: Sequence[int]) -> FloatArray:
+        """Return the mean profile of some exemplars, shape (D * P,)."""
+        return np.asarray(np.mean([self.profile(self[number]) for number in numbers], axis=0))
+
+    def distances(self, exemplar: Exemplar, others: Sequence[int]) -> FloatArray:
+        """Return the distance from an exemplar to others of the bank, shape (k,).
+
+        It is the symmetric likelihood distance [nat a frame] to the configured power.
+        """
+        raw = _distances(exemplar, self._rows, self._slots_of(others), self._weights)
+        return np.asarray(np.maximum(raw, 0.0) ** self.config.power)
+
+    def matrix(self, numbers: Sequence[int]) -> FloatArray:
+        """Return the distances among exemplars, shape (k, k)."""
+        matrix = np.zeros((len(numbers), len(numbers)))
+        for i, number in enumerate(numbers[1:], start=1):
+            matrix[i, :i] = matrix[:i, i] = self.distances(self[number], numbers[:i])
+        return matrix
+
+    def subset(self, numbers: Iterable[int]) -> ExemplarBank:
+        """Return a bank of some of the exemplars, sharing no memory."""
+        state = self.state()
+        keep = np.isin(state["numbers"], list(numbers))
+        part = {name: state[name][keep] for name in ("numbers", *Exemplar._fields)}
+        return ExemplarBank.from_state(self.config, {"floor": state["floor"], **part})
+
+    def state(self) -> dict[str, Any]:
+        """Return all exemplars as plain arrays."""
+        numbers = self.numbers()
+        slots = self._slots_of(numbers)
+        rows = {name: rows[slots] for name, rows in self._rows._asdict().items()}
+        return {"floor": self.floor.copy(), "numbers": np.array(numbers, np.int64), **rows}
+
+    @classmethod
+    def from_state(cls, config: TreeConfig, state: dict[str, Any]) -> ExemplarBank:
+        """Return the bank that `state` described."""
+        bank = cls(config, len(state["floor"]), state["floor"])
+        bank._rows = Exemplar(
+            *(np.array(state[name], dtype=np.float64) for name in Exemplar._fields)
+        )
+        bank._slots = {int(number): slot for slot, number in enumerate(state["numbers"])}
+        return bank
+
+    def _slots_of(self, numbers: Sequence[int]) -> IntArray:
+        return np.array([self._slots[number] for number in numbers], dtype=np.int64)
+
+    def _write(self, slot: int, exemplar: Exemplar) -> None:
+        for rows, value in zip(self._rows, exemplar, strict=True):
+            rows[slot] = value
+
+
+def _empty(config: TreeConfig, n_channels: int, n: int) -> Exemplar:
+    per_state = n, config.n_states, n_channels
+    per_transition = n, config.n_states
+    return Exemplar(
+        np.zeros((n, n_channels, config.form.n_points)),
+        np.zeros(per_state),
+        np.zeros(per_state),
+        np.zeros(per_state),
+        np.zeros(per_transition),
+        np.zeros(per_transition),
+        np.zeros(n),
+    )
+
+
+@njit(cache=True)
+def _score(columns: FloatArray, model: Any, weights: FloatArray) -> float:
+    means, variances, norms, stay, following = model
+    densities = log_densities(
+        columns, weights, 0, len(weights), means, variances, norms, len(means)
+    )
+    return log_likelihood(densities, stay, following, True)
+
+
+@njit(cache=True)
+def _distances(exemplar: Any, rows: Any, others: IntArray, weights: FloatArray) -> FloatArray:
+    """Return eq. 5 in both directions, averaged, per unit of weight."""
+    columns, means, variances, norms, stay, following, own = rows
+    mine = exemplar[1:6]
+    mass = weights.sum()
+    out = np.empty(len(others))
+    for k, other in enumerate(others):
+        theirs = (means[other], variances[other], norms[other], stay[other], following[other])
+        forth = exemplar[6].item() - _score(exemplar[0], theirs, weights)
+        back = own[other] - _score(columns[other], mine, weights)
+        out[k] = 0.5 * (forth + back) / mass
+    return out

@@ -1,0 +1,123 @@
+"""What the tree's rules are: our improved ones by default, or those that the paper prints."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+from ..errors import InvalidValueError
+
+
+@dataclass(frozen=True)
+class FormConfig:
+    """How a segment is put into the form in which segments are compared.
+
+    Neighbouring motions blend into each other, mostly into the start of a segment; where a person
+    stands differs more than how the person moves.
+
+    Attributes:
+        n_points: Points over the segment, whatever its duration.
+        head: Share of the segment's start that is left out.
+        ramp: Share over which the weight then rises to 1.
+        centring: Share of the mean posture that is taken away, in [0, 1].
+    """
+
+    n_points: int = 16
+    head: float = 0.3
+    ramp: float = 0.2
+    centring: float = 0.5
+
+    def __post_init__(self) -> None:
+        if self.n_points < 2:
+            raise InvalidValueError(f"n_points must be at least 2, not {self.n_points}")
+        if not (self.head >= 0 and self.ramp >= 0 and self.head + self.ramp < 1):
+            raise InvalidValueError(
+                f"head and ramp must be at least 0 and below 1 together, "
+                f"not {self.head} and {self.ramp}"
+            )
+        if not 0 <= self.centring <= 1:
+            raise InvalidValueError(f"centring must lie in [0, 1], not {self.centring}")
+
+
+@dataclass(frozen=True)
+class TreeConfig:
+    """Rules of the tree [Kulic2012, 2.2].
+
+    Attributes:
+        form: The form in which segments are compared.
+        n_states: States of the models.
+        variance_floor: Smallest standard deviation of a model, as a share of that of all motion
+            ever seen (of the channel's group).
+        power: Power of the likelihood distance [nat] that everything below is measured in; 1 is
+            eq. 5 itself, 0.5 makes it grow linearly with the difference of postures.
+        cutoff: K_cutoff of eq. 7: a cluster is formed below mu - cutoff * sigma.
+        local: Whether mu and sigma come from the node that grew, as printed, or from all segments
+            ever seen.
+        min_exemplars: Members from which on a cluster becomes a node.
+        reach: K_maxGD of eq. 6: a node's radius over the largest distance between its exemplars.
+        reach_cap: Largest radius over the median of that distance over all leaves.
+        n_nearest: A segment's distance to a node is the mean of that to so many exemplars.
+        split_ratio: A leaf is split when the distance between its two branches exceeds that inside
+            them by this; inf for never.
+        n_candidates: Leaves, by mean trajectory, that are looked at closely; 0 to search down from
+            the root, as printed.
+        max_exemplars: Exemplars kept by a node.
+        max_unplaced: Segments that wait in the root.
+        n_sampled: Segments, of all ever seen, that mu and sigma are taken over.
+        seed: Seed of the choice of those.
+    """
+
+    form: FormConfig = field(default_factory=FormConfig)
+    n_states: int = 8
+    variance_floor: float = 0.6
+    power: float = 0.5
+    cutoff: float = 2.0
+    local: bool = False
+    min_exemplars: int = 4
+    reach: float = 1.3
+    reach_cap: float = 1.5
+    n_nearest: int = 3
+    split_ratio: float = 2.0
+    n_candidates: int = 6
+    max_exemplars: int = 12
+    max_unplaced: int = 200
+    n_sampled: int = 128
+    seed: int = 0
+
+    @classmethod
+    def printed(cls) -> TreeConfig:
+        """Return the rules as the paper prints them."""
+        return replace(
+            cls(),
+            form=FormConfig(n_points=32, head=0.0, ramp=0.0, centring=0.0),
+            power=1.0,
+            cutoff=1.0,
+            local=True,
+            reach_cap=math.inf,
+            n_nearest=1_000,
+            split_ratio=math.inf,
+            n_candidates=0,
+        )
+
+    def __post_init__(self) -> None:
+        for name in ("variance_floor", "power", "reach", "reach_cap"):
+            if not getattr(self, name) > 0:
+                raise InvalidValueError(f"{name} must be positive, not {getattr(self, name)}")
+        lowest = {
+            "n_states": 1,
+            "min_exemplars": 2,
+            "n_nearest": 1,
+            "n_candidates": 0,
+            "max_exemplars": self.min_exemplars,
+            "max_unplaced": self.min_exemplars,
+            "n_sampled": 3,
+            "seed": 0,
+            "split_ratio": 1,
+        }
+        for name, low in lowest.items():
+            if not getattr(self, name) >= low:
+                raise InvalidValueError(f"{name} must be at least {low}, not {getattr(self, name)}")
+        if self.form.n_points < self.n_states:
+            raise InvalidValueError(
+                f"{self.n_states} states need n_points of at least that, not {self.form.n_points}"
+            )

@@ -1,0 +1,42 @@
+"""The form in which segments are compared: of one length, weighted, partly centred."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..recording import FloatArray
+from .config import FormConfig
+
+
+def resample(frames: FloatArray, at: FloatArray) -> FloatArray:
+    """Return frames (T, D) at fractional positions (P,), linearly; beside a gap, its edge."""
+    low = np.floor(at).astype(np.int64)
+    high = np.minimum(low + 1, len(frames) - 1)
+    share = (at - low)[:, None]
+    before, after = frames[low], frames[high]
+    points = before + share * (after - before)
+    missing = np.isnan(points)
+    if missing.any():
+        nearest = np.where(share < 0.5, before, after)
+        points = np.where(missing, nearest, points)
+    return np.asarray(points)
+
+
+def weights(config: FormConfig) -> FloatArray:
+    """Return the weight of each point, shape (P,), rising over the ramp; 1 at most."""
+    passed = np.arange(config.n_points) / (config.n_points - 1) * (1 - config.head)
+    if config.ramp == 0:
+        return np.ones(config.n_points)
+    return np.asarray(np.clip((passed + 0.01) / config.ramp, 0.0, 1.0))
+
+
+def points_of(frames: FloatArray, config: FormConfig) -> FloatArray:
+    """Return the P points of a segment (T, D) that are compared, not yet centred."""
+    return resample(frames, np.linspace(config.head, 1, config.n_points) * (len(frames) - 1))
+
+
+def centred(points: FloatArray, config: FormConfig) -> FloatArray:
+    """Return the points (P, D) less a share of their weighted mean."""
+    weight = np.where(np.isnan(points), 0.0, weights(config)[:, None])
+    mean = (weight * np.nan_to_num(points)).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-12)
+    return np.asarray(points - config.centring * mean)

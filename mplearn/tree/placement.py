@@ -1,0 +1,73 @@
+"""What the tree says about a segment."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+ROOT = 0
+
+
+class Match(NamedTuple):
+    """A node that a segment was compared with.
+
+    Attributes:
+        node: Its id.
+        distance: Symmetric likelihood distance [nat a frame] [Kulic2012, eq. 5].
+        ratio: Distance over radius, on the scale of the tree's rules; at most 1 inside.
+    """
+
+    node: int
+    distance: float
+    ratio: float
+
+
+class Split(NamedTuple):
+    """A leaf that turned out to hold several motions.
+
+    Attributes:
+        node: The leaf; it stays in the tree as the node above.
+        into: The new leaves, the larger one first.
+    """
+
+    node: int
+    into: tuple[int, ...]
+
+
+class Merge(NamedTuple):
+    """Two leaves that turned out to be one.
+
+    Attributes:
+        kept: The leaf that stays.
+        absorbed: The leaf that is gone.
+    """
+
+    kept: int
+    absorbed: int
+
+
+class Placement(NamedTuple):
+    """Where a segment was put, and what came of it.
+
+    Attributes:
+        number: The segment's number, counted from 0.
+        node_id: The node that it is in now; `ROOT` where nothing is like it.
+        recognised: Whether it was placed in a primitive that was known before it came.
+        distance: To the nearest primitive [nat a frame]; inf where there is none.
+        ratio: That over the primitive's radius; above 1 outside. An open-set score.
+        born: Ids of the primitives that its arrival formed, splits included.
+        splits: Leaves that its arrival split.
+        merges: Leaves that its arrival merged.
+        moved: Earlier segments that its arrival moved: number and new node.
+        refused: Why it was not taken up at all; empty where it was.
+    """
+
+    number: int
+    node_id: int
+    recognised: bool
+    distance: float
+    ratio: float
+    born: tuple[int, ...] = ()
+    splits: tuple[Split, ...] = ()
+    merges: tuple[Merge, ...] = ()
+    moved: tuple[tuple[int, int], ...] = ()
+    refused: str = ""

@@ -1,0 +1,127 @@
+"""Running statistics of all motion ever seen, in bounded memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..recording import FloatArray, IntArray
+from .bank import ExemplarBank
+
+
+class ChannelSpread:
+    """Running variance of each channel over the points of all segments.
+
+    Args:
+        groups: Group of each channel, shape (D,); a group shares one variance.
+    """
+
+    def __init__(self, groups: IntArray) -> None:
+        self.groups = groups
+        self._count = np.zeros(len(groups))
+        self._mean = np.zeros(len(groups))
+        self._squares = np.zeros(len(groups))
+
+    def update(self, points: FloatArray) -> None:
+        """Take the points of a segment, shape (P, D); NaN counts for nothing."""
+        seen = ~np.isnan(points)
+        count = seen.sum(axis=0)
+        total = self._count + count
+        some = np.maximum(count, 1)
+        mean = np.where(seen, points, 0.0).sum(axis=0) / some
+        squares = np.where(seen, (points - mean) ** 2, 0.0).sum(axis=0)
+        step = mean - self._mean
+        share = count / np.maximum(total, 1)
+        self._squares += squares + step**2 * self._count * share
+        self._mean += np.where(count > 0, step * share, 0.0)
+        self._count = total
+
+    def variances(self) -> FloatArray:
+        """Return the mean variance of each channel's group, shape (D,)."""
+        variance = self._squares / np.maximum(self._count, 1)
+        shared = np.bincount(self.groups, variance) / np.maximum(np.bincount(self.groups), 1)
+        return np.asarray(np.maximum(shared[self.groups], 1e-18))
+
+    def state(self) -> dict[str, Any]:
+        """Return everything as plain arrays."""
+        return {"count": self._count, "mean": self._mean.copy(), "squares": self._squares.copy()}
+
+    def load_state(self, state: dict[str, Any]) -> None:
+        """Resume from what `state` returned."""
+        self._count, self._mean, self._squares = (
+            np.array(state[name], dtype=np.float64) for name in ("count", "mean", "squares")
+        )
+
+
+class DistanceSample:
+    """A uniform sample of all segments ever seen, and the distances among them.
+
+    Args:
+        size: Segments in the sample.
+        seed: Seed of the choice.
+    """
+
+    def __init__(self, size: int, seed: int) -> None:
+        self.size = size
+        self.seed = seed
+        self.numbers: list[int] = []
+        self._matrix = np.zeros((size, size))
+
+    def place_for(self, n_seen: int) -> int | None:
+        """Return where in the sample the segment after ``n_seen`` others goes; None: nowhere."""
+        if len(self.numbers) < self.size:
+            return len(self.numbers)
+        place = int(np.random.default_rng((self.seed, n_seen)).integers(n_seen + 1))
+        return place if place < self.size else None
+
+    def put(self, number: int, place: int, bank: ExemplarBank) -> int | None:
+        """Put a segment at a place; return the number of the one that goes."""
+        gone = self.numbers[place] if place < len(self.numbers) else None
+        if gone is None:
+            self.numbers.append(number)
+        else:
+            self.numbers[place] = number
+        row = bank.distances(bank[number], self.numbers)
+        row[place] = 0.0
+        self._matrix[place, : len(row)] = self._matrix[: len(row), place] = row
+        return gone
+
+    def measure(self, bank: ExemplarBank) -> None:
+        """Measure all distances again."""
+        self._matrix[: len(self.numbers), : len(self.numbers)] = bank.matrix(self.numbers)
+
+    def moments(self) -> tuple[float, float]:
+        """Return mean and standard deviation of the distances; NaN below two segments."""
+        return moments(self._matrix[: len(self.numbers), : len(self.numbers)])
+
+    def state(self) -> dict[str, Any]:
+        """Return everything as plain arrays."""
+        n = len(self.numbers)
+        return {"numbers": np.array(self.numbers, np.int64), "matrix": self._matrix[:n, :n].copy()}
+
+    def load_state(self, state: dict[str, Any]) -> None:
+        """Resume from what `state` returned."""
+        self.numbers = [int(number) for number in state["numbers"]]
+        n = len(self.numbers)
+        self._matrix = np.zeros((self.size, self.size))
+        self._matrix[:n, :n] = state["matrix"]
+
+
+def moments(matrix: FloatArray) -> tuple[float, float]:
+    """Return mean and standard deviation of the distances in a matrix; NaN where there are none."""
+    distances = pairs(matrix)
+    if not len(distances):
+        return float("nan"), float("nan")
+    return float(distances.mean()), float(distances.std())
+
+
+def pairs(matrix: FloatArray) -> FloatArray:
+    """Return the distances of a symmetric matrix once each, as scipy's condensed form."""
+    return np.asarray(matrix[np.triu_indices(len(matrix), 1)])
+
+
+def without(matrix: FloatArray, gone: Sequence[int]) -> FloatArray:
+    """Return a matrix without some of its rows and columns."""
+    return np.delete(np.delete(matrix, gone, axis=0), gone, axis=1)
