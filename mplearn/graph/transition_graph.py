@@ -95,8 +95,8 @@ class TransitionGraph(TransitionCounts):
         goes on at a primitive drawn uniformly, which makes the answer unique on every graph
         (PageRank with damping 1 - restart).
         """
-        if not 0 < restart <= 1:
-            raise InvalidValueError(f"restart must lie in (0, 1], not {restart}")
+        if not 1e-4 <= restart <= 1:
+            raise InvalidValueError(f"restart must lie in [0.0001, 1], not {restart}")
         return stationary(*self._indexed_edges(), len(self), restart)
 
     # ---- finding the way
