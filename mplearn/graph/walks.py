@@ -28,7 +28,8 @@ def stationary(
         visits += lost @ before
         if np.abs(visits - before).sum() < 1e-14:
             break
-    return visits / visits.sum()
+    visits /= visits.sum()
+    return visits
 
 
 class WalkSampler:
