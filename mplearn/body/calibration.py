@@ -1,10 +1,11 @@
 """Fitting a body to a person: sizes of the segments, places of the markers, the floor.
 
-Half a second of any motion is enough. Postures (given the sizes) and sizes with marker places (given the
-postures) are estimated in turn; with the bodies' orientations known, the second is linear least squares.
-Priors keep what the markers do not tell at its anthropometric value. The paper scaled the markers'
-heights to the robot's ([Kulic2012], 4.2); here the robot's links take the person's lengths instead, so
-that the angles need no compromise, and the base is scaled by the ratio of the legs.
+Half a second of any motion is enough. Postures (given the sizes) and sizes with marker places
+(given the postures) are estimated in turn; with the bodies' orientations known, the second is
+linear least squares. Priors keep what the markers do not tell at its anthropometric value. The
+paper scaled the markers' heights to the robot's ([Kulic2012], 4.2); here the robot's links take
+the person's lengths instead, so that the angles need no compromise, and the base is scaled by the
+ratio of the legs.
 """
 
 from __future__ import annotations
@@ -162,9 +163,10 @@ def _choose(frames: FloatArray, names: Sequence[str]) -> FloatArray:
         raise TooFewMarkersError(
             f"none of the {len(names)} markers is seen in any of {len(frames)} frames"
         )
-    good = np.flatnonzero(seen.sum(axis=1) >= 0.8 * seen.any(axis=0).sum())
-    if seen.any(axis=0).mean() < 0.6 or not len(good):
-        unseen = [name for name, ever in zip(names, seen.any(axis=0), strict=True) if not ever]
+    ever = np.atleast_1d(seen.any(axis=0))
+    good = np.flatnonzero(seen.sum(axis=1) >= 0.8 * ever.sum())
+    if ever.mean() < 0.6 or not len(good):
+        unseen = [names[i] for i in np.flatnonzero(~ever)]
         raise TooFewMarkersError(
             f"too few markers to calibrate: in the best of {len(frames)} frames "
             f"{seen.sum(axis=1).max()} of {len(names)} are seen; never seen: {unseen[:8]}"

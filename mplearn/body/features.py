@@ -1,6 +1,7 @@
 """What the learner sees of a posture: base height, roll and pitch, and the driven joint angles.
 
-Position on the floor and heading are left out: a motion is the same motion wherever it is performed.
+Position on the floor and heading are left out: a motion is the same motion wherever it is
+performed.
 """
 
 from __future__ import annotations
@@ -102,7 +103,8 @@ def foot_clearance(features: FloatArray, body: Body | None = None) -> FloatArray
         tree.site_offset[soles],
         left,
     )
-    return lowest - lowest.min(axis=1, keepdims=True)
+    clearance: FloatArray = lowest - lowest.min(axis=1, keepdims=True)
+    return clearance
 
 
 @njit(cache=True)

@@ -1,4 +1,4 @@
-"""The first posture of all, with nothing to start from: trunk by rigid fit, limbs from several starts."""
+"""The first posture of all: the trunk by a rigid fit, the limbs from several starts."""
 
 from __future__ import annotations
 
@@ -82,8 +82,8 @@ def place_trunk(
         )
     if not SMALLEST < size < LARGEST:
         raise BodyError(
-            f"the trunk is {size:.3g} times as large as {follower.body.name!r}'s; {SMALLEST} to {LARGEST} "
-            f"are people, in metres"
+            f"the trunk is {size:.3g} times as large as {follower.body.name!r}'s; {SMALLEST} to "
+            f"{LARGEST} are people, in metres"
         )
     if turn[2, 2] < LEAST_UPRIGHT:
         lean = np.degrees(np.arccos(np.clip(turn[2, 2], -1, 1)))
@@ -105,7 +105,7 @@ def first_posture(
     start: FloatArray,
     frame: FloatArray,
 ) -> FloatArray:
-    """Find the posture of a single frame from the trunk's place: each limb's best of several starts.
+    """Find the posture of one frame from the trunk's place, with each limb's best of several starts.
 
     Args:
         follower: The body as the solver sees it.
@@ -137,7 +137,8 @@ def first_posture(
             effort = (postures[:, 7 + hinges] ** 2).sum(axis=1)
             best[7 + hinges] = postures[np.argmin(errors + effort)][7 + hinges]
     settle(follower, tree, bodies, offsets, best[None], frame[None])
-    return best
+    found: FloatArray = best
+    return found
 
 
 def settle(

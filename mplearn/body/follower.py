@@ -1,8 +1,9 @@
 """The tree that follows the markers: the body's own, with what a person's shoulders do besides.
 
-A person's shoulder joint rises by several centimetres with the arm, and the robot's does not. Where a
-body has no clavicles, the follower gets some that only slide: they take up the shoulder's path, so that
-it bends neither the trunk nor the arm, while the arm's orientation stays that of the body's own hinges.
+A person's shoulder joint rises by several centimetres with the arm, and the robot's does not.
+Where a body has no clavicles, the follower gets some that only slide: they take up the shoulder's
+path, so that it bends neither the trunk nor the arm, while the arm's orientation stays that of the
+body's own hinges.
 """
 
 from __future__ import annotations

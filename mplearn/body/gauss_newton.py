@@ -4,11 +4,12 @@ The frame's cost, over postures q between their bounds, is
 
     sum_m rho(|m - m(q)|) / sigma^2  +  sum_j (q_j - q_j(before))^2 / var_j  +  r_j q_j^2
 
-with rho(r) = c^2 log(1 + r^2 / c^2) (Cauchy), so that a swapped or flying marker weighs nearly nothing. The
-last term keeps joints that the markers determine badly near rest: r_j = w_j h_j / (w_j + h_j), where
-h_j is what the markers say about the joint alone, so that an occluded joint is held, not pulled to rest.
-It is the update step of an iterated extended Kalman filter with a diagonal covariance: `var` is what is
-known about the posture before the frame, and the inverse of the last normal matrix is what is known after.
+with rho(r) = c^2 log(1 + r^2 / c^2) (Cauchy), so that a swapped or flying marker weighs nearly
+nothing. The last term keeps joints that the markers determine badly near rest: r_j = w_j h_j /
+(w_j + h_j), where h_j is what the markers say about the joint alone, so that an occluded joint is
+held, not pulled to rest. It is the update step of an iterated extended Kalman filter with a
+diagonal covariance: `var` is what is known about the posture before the frame, and the inverse of
+the last normal matrix is what is known after.
 """
 
 from __future__ import annotations
@@ -89,7 +90,8 @@ def solve_frame(
         largest_step: Longest step of one iteration in any degree of freedom [m, rad].
         max_iterations: When to stop at the latest.
         tolerance: Stop when no degree of freedom moved further [m, rad].
-        residuals: Distance of each marker from its place, shape (M,) [m], filled; NaN where missing.
+        residuals: Distance of each marker from its place, shape (M,) [m], filled; NaN where
+            missing.
 
     Returns:
         The number of iterations.
@@ -242,7 +244,7 @@ def bounded_solve(
     free: BoolArray,
     step: FloatArray,
 ) -> None:
-    """Minimise the quadratic model between bounds: what runs into a bound is fixed there, and so on.
+    """Minimise the quadratic model between bounds, fixing what runs into one, until nothing does.
 
     Args:
         normal: Symmetric positive definite, its lower triangle, shape (d, d).

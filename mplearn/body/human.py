@@ -36,8 +36,8 @@ def human_body(height_m: float = 1.75, proportions: Mapping[str, float] | None =
     Args:
         height_m: Stature [m], in (0.5, 2.6). It is met exactly, whatever the proportions.
         proportions: Factors on the average proportions, by the names in `PROPORTIONS`: 1.1 for
-            "thigh" is a thigh a tenth longer than the average person's of the same build. Mass follows
-            the volume of each segment.
+            "thigh" is a thigh a tenth longer than the average person's of the same build. Mass
+            follows the volume of each segment.
 
     Raises:
         BodyError: The stature or a factor is out of range, or a proportion has an unknown name.
@@ -66,8 +66,8 @@ def _scaled_human(height_m: float, proportions: tuple[tuple[str, float], ...]) -
     factors = np.ones_like(reference.tree.offset)
     for name, factor in proportions:
         bodies, axes = PROPORTIONS[name]
-        rows = [reference.tree.body(body) for body in bodies]
-        factors[np.ix_(rows, np.flatnonzero(axes))] *= factor
+        for body in bodies:
+            factors[reference.tree.body(body), np.flatnonzero(axes)] *= factor
     factors *= height_m / _stature(reference, factors)
     tree = reference.tree.scaled(factors)
     named = dict(zip(tree.body_names, factors, strict=True))

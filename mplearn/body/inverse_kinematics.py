@@ -1,8 +1,9 @@
 """On-line inverse kinematics: one frame of markers in, one posture out.
 
-[Kulic2012] computes joint angles on-line from 34 markers ([Yamane2003]). Here each frame is a few damped
-Gauss-Newton steps from the last posture (`gauss_newton`), on a body whose segments and marker places were
-fitted to the person (`calibration`). The angles are the body's own, robot or human, without a detour.
+[Kulic2012] computes joint angles on-line from 34 markers ([Yamane2003]). Here each frame is a few
+damped Gauss-Newton steps from the last posture (`gauss_newton`), on a body whose segments and
+marker places were fitted to the person (`calibration`). The angles are the body's own, robot or
+human, without a detour.
 """
 
 from __future__ import annotations
@@ -63,8 +64,8 @@ class InverseKinematics:
 
     Args:
         body: The body whose angles are wanted.
-        marker_names: Names of the M markers of every frame; names that the set does not know are ignored.
-        rate_hz: Frames per second [1/s].
+        marker_names: Names of the M markers of every frame; names that the set does not know are
+        ignored. rate_hz: Frames per second [1/s].
         config: Assumptions of the solver.
         markers: Where the markers sit; found by their names where not given.
 
@@ -221,7 +222,8 @@ class InverseKinematics:
         It stays small while the markers determine a joint, and grows while they do not.
         """
         own = self._follower.own
-        return np.sqrt(self._variance[np.concatenate((np.arange(6), own[7:] - 1))])
+        sigma: FloatArray = np.sqrt(self._variance[np.concatenate((np.arange(6), own[7:] - 1))])
+        return sigma
 
     def state(self) -> dict[str, Any]:
         """Return what `load_state` needs to resume bit for bit."""

@@ -114,7 +114,7 @@ def segment_factors(tree: KinematicTree, reference: KinematicTree) -> FloatArray
 
 
 def plain_name(name: str) -> str:
-    """Return a marker's name without its subject's prefix and in capitals: ``Male:lfhd`` -> ``LFHD``."""
+    """Return a name without its subject's prefix, in capitals: ``Male:lfhd`` -> ``LFHD``."""
     return name.rsplit(":", 1)[-1].strip().upper()
 
 
@@ -154,7 +154,7 @@ def find_marker_set(marker_names: Sequence[str]) -> MarkerSet:
     best = max(TABLES, key=lambda name: (known[name], -len(TABLES[name])))
     if known[best] < max(LEAST_SHARE * len(plain), 6):
         raise BodyError(
-            f"no marker set knows the markers {list(marker_names)[:6]}...: {best!r} comes closest with "
-            f"{known[best]} of {len(plain)}; there are {', '.join(TABLES)}"
+            f"no marker set knows the markers {list(marker_names)[:6]}...: {best!r} comes closest "
+            f"with {known[best]} of {len(plain)}; there are {', '.join(TABLES)}"
         )
     return marker_set(best)

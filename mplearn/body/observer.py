@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,10 +11,13 @@ from mplearn.errors import FrameError, InvalidValueError
 from mplearn.recording import FloatArray
 
 from .body import Body
-from .calibration import TooFewMarkersError
 from .features import feature_channels, features_of
+from .first_posture import TooFewMarkersError
 from .inverse_kinematics import IKConfig, InverseKinematics
 from .robot import robot_body
+
+if TYPE_CHECKING:
+    from mplearn.mocap.gaps import GapTracker
 
 PATIENCE = 5  # times the calibration's length that a stream may take to show its markers
 
@@ -22,8 +25,9 @@ PATIENCE = 5  # times the calibration's length that a stream may take to show it
 class MotionObserver:
     """Watches a person: marker frames in, features of the robot's posture out.
 
-    The first frames are gathered until the person's size is known; then all of them come out at once,
-    and from there on one for each frame. Features are finite and continuous, whatever is missing.
+    The first frames are gathered until the person's size is known; then all of them come out at
+    once, and from there on one for each frame. Features are finite and continuous, whatever is
+    missing.
 
     Args:
         marker_names: Names of the M markers of every frame.
@@ -31,6 +35,7 @@ class MotionObserver:
         body: The body to see the person as; the robot where not given.
         calibration_s: How long to gather before the first features [s].
         config: Assumptions of the inverse kinematics.
+        fill_gaps: Whether markers are followed through their gaps first (`GapTracker`).
 
     Attributes:
         channels: Names of the features; see `feature_channels`.
@@ -48,6 +53,7 @@ class MotionObserver:
         *,
         calibration_s: float = 0.6,
         config: IKConfig | None = None,
+        fill_gaps: bool = True,
     ) -> None:
         if not 0.05 <= calibration_s <= 10:
             raise InvalidValueError(f"calibration_s must lie in [0.05, 10] s, not {calibration_s}")
@@ -57,6 +63,12 @@ class MotionObserver:
         self.calibration_s = calibration_s
         self.ik = InverseKinematics(self.body, marker_names, rate_hz=rate_hz, config=config)
         self.channels = feature_channels(self.body)
+        self.fill_gaps = fill_gaps
+        self._gaps: GapTracker | None = None
+        if fill_gaps:
+            from mplearn.mocap.gaps import GapTracker
+
+            self._gaps = GapTracker(len(self.marker_names), self.rate_hz)
         self._gathered: list[FloatArray] = []
         self._last_roll = 0.0
 
@@ -96,7 +108,7 @@ class MotionObserver:
             return np.empty((0, len(self.channels)))
 
     def flush(self) -> FloatArray:
-        """Return the features of what is still gathered, as at the end of a short stream, shape (k, D).
+        """Return the features of what is gathered, as at the end of a short stream, shape (k, D).
 
         Raises:
             BodyError: The gathered frames are no calibration, with the reason.
@@ -115,6 +127,8 @@ class MotionObserver:
         return np.concatenate(parts)
 
     def _follow(self, frames: FloatArray) -> FloatArray:
+        if self._gaps is not None:
+            frames = np.array([self._gaps.update(markers) for markers in frames])
         features = features_of(np.array([self.ik.update(markers) for markers in frames]), self.body)
         for row in features:  # the roll is an angle of the whole circle: keep it continuous
             row[1] += 2 * np.pi * np.round((self._last_roll - row[1]) / (2 * np.pi))
@@ -125,6 +139,7 @@ class MotionObserver:
         """Return what `load_state` needs to resume bit for bit."""
         return {
             "ik": self.ik.state(),
+            "gaps": None if self._gaps is None else self._gaps.state(),
             "gathered": np.array(self._gathered).reshape(-1, len(self.marker_names), 3),
             "last_roll": self._last_roll,
         }
@@ -132,5 +147,7 @@ class MotionObserver:
     def load_state(self, state: dict[str, Any]) -> None:
         """Resume from what `state` returned."""
         self.ik.load_state(state["ik"])
+        if self._gaps is not None:
+            self._gaps.load_state(state["gaps"])
         self._gathered = list(np.array(state["gathered"], dtype=np.float64))
         self._last_roll = float(state["last_roll"])

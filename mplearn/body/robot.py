@@ -10,11 +10,11 @@ used. The paper gives no link sizes, masses, joint limits or axis of the hip joi
 * Masses [kg]: pelvis 9, chest 22, head 4, upper arm 2.2, forearm 1.6, hand 0.5 and 0.05 a finger
   group, thigh 5.2, shank 3.0, foot 1.2, toes 0.15.
 * The hip joint turns the chest about the vertical (``waist_yaw``).
-* The first two axes of the shoulder are turned by 40 deg about the vertical, and the first is raised by
-  10 deg, as on many humanoids (all three stay perpendicular at rest, so every posture can be reached). An
-  upper arm along the first axis is the singular posture of the shoulder; here it points back, outwards and
-  up, or forward, across the body and down, where arms rarely go. With the lateral axis it would be the
-  arm held out sideways, in the middle of every abduction.
+* The first two axes of the shoulder are turned by 40 deg about the vertical, and the first is
+  raised by 10 deg, as on many humanoids (all three stay perpendicular at rest, so every posture
+  can be reached). An upper arm along the first axis is the singular posture of the shoulder; here
+  it points back, outwards and up, or forward, across the body and down, where arms rarely go. With
+  the lateral axis it would be the arm held out sideways, in the middle of every abduction.
 * Fingers and toes are held at zero. Only the soles collide: a box of 24 x 11 x 4 cm a foot.
 
 The model has no actuators, floor or lights: whoever simulates it adds them.

@@ -1,9 +1,9 @@
 """The kinematics of a body as plain arrays: postures, point positions, their Jacobian.
 
 MuJoCo's conventions throughout, so that `mj_kinematics` and `mj_jacSite` are exact oracles. A
-posture q has MuJoCo's qpos layout (free base, then hinges and slides). A velocity has the layout of qvel:
-base velocity in the world's axes, base angular velocity in the base's own axes, then the joint
-rates.
+posture q has MuJoCo's qpos layout (free base, then hinges and slides). A velocity has the layout
+of qvel: base velocity in the world's axes, base angular velocity in the base's own axes, then the
+joint rates.
 """
 
 from __future__ import annotations
@@ -61,7 +61,8 @@ class KinematicTree:
         """Extract the kinematics of a compiled model.
 
         Raises:
-            BodyError: The model is not one tree with a free root, or has joints other than hinges and slides.
+            BodyError: The model is not one tree with a free root, or has joints other than hinges
+                and slides.
         """
         import mujoco
 
@@ -112,8 +113,7 @@ class KinematicTree:
         return self.body_names.index(name)
 
     def scaled(self, factors: FloatArray) -> KinematicTree:
-        """Return the tree with each body's own lengths multiplied, factors (B, 3) in its frame's
-        axes.
+        """Return the tree with each body's lengths multiplied, factors (B, 3) along its own axes.
 
         A body's factors move what is attached to it: its children, joints and sites. The root's
         rest height follows, so that the soles stay on the floor.
@@ -158,10 +158,11 @@ class KinematicTree:
             offsets: Points in their body's frame, shape (M, 3) [m].
         """
         pos, mat = self.forward(q)
-        return pos[bodies] + np.einsum("mij,mj->mi", mat[bodies], offsets)
+        points: FloatArray = pos[bodies] + np.einsum("mij,mj->mi", mat[bodies], offsets)
+        return points
 
     def jacobian(self, q: FloatArray, bodies: IntArray, offsets: FloatArray) -> FloatArray:
-        """Return the Jacobian of body-fixed points, shape (M, 3, 6 + n); arguments as in `points`."""
+        """Return the Jacobian of points, shape (M, 3, 6 + n); arguments as in `points`."""
         pos, mat, axes, anchors = self._forward(q)
         points = pos[bodies] + np.einsum("mij,mj->mi", mat[bodies], offsets)
         out = np.zeros((len(bodies), 3, self.n_dofs))
@@ -219,7 +220,7 @@ def quaternion_matrix(q: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def turn(mat: FloatArray, axis: FloatArray, angle: float) -> None:
-    """Multiply a rotation matrix, in place and from the right, by the rotation about a local axis."""
+    """Turn a rotation matrix, in place, about an axis of its own frame."""
     s, c = np.sin(angle), np.cos(angle)
     x, y, z = axis[0], axis[1], axis[2]
     v = 1.0 - c
@@ -303,7 +304,7 @@ def point_jacobian(
     first: IntArray,
     out: FloatArray,
 ) -> None:
-    """Fill the Jacobian (M, 3, 6 + n) of world points; `out` must be zero where a joint has no part."""
+    """Fill the Jacobian (M, 3, 6 + n) of world points; `out` is zero where a joint has no part."""
     for m in range(len(points)):
         x, y, z = points[m, 0], points[m, 1], points[m, 2]
         for k in range(3):
@@ -329,7 +330,7 @@ def point_jacobian(
 
 @njit(cache=True)
 def integrate(q: FloatArray, step: FloatArray) -> None:
-    """Move a posture, in place, along a velocity times time: (6 + n,) [m, rad], as mj_integratePos."""
+    """Move a posture, in place, by a step (6 + n,) [m, rad], as `mj_integratePos` does."""
     for i in range(3):
         q[i] += step[i]
     angle = np.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
