@@ -24,7 +24,7 @@ from ..errors import LibraryError
 FORMAT = "mplearn-library"
 SCHEMA = 1
 _MARK = "$array"
-_DTYPES = ("<i2", "<i4", "<i8", "<f4", "<f8", "|b1")
+_DTYPES = ("<i2", "<i4", "<i8", "<f2", "<f4", "<f8", "|b1")
 _MAX_BYTES = 1 << 30
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # a fixed date: equal libraries are equal files
 

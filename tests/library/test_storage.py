@@ -6,10 +6,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from library_examples import example_library
+from library_examples import CHANNELS, RATE, demonstrations, example_library
 
 from mplearn.errors import LibraryError
-from mplearn.library import PrimitiveLibrary, storage
+from mplearn.graph import TransitionGraph
+from mplearn.hmm import fit
+from mplearn.library import Primitive, PrimitiveLibrary, storage
+from mplearn.tree import PrimitiveTree, TreeConfig
 
 LIBRARY = example_library().rename(0, "Bögen: hoch")
 
@@ -42,6 +45,30 @@ def test_what_is_loaded_is_what_was_saved(saved):
         np.testing.assert_array_equal(
             loaded.generate(walk, style=style).frames, LIBRARY.generate(walk, style=style).frames
         )
+
+
+def test_a_recogniser_decides_the_same_after_loading(tmp_path):
+    tree = PrimitiveTree(TreeConfig(), len(CHANNELS), RATE)
+    pairs = ((0, 1), (1, 2), (2, 3), (3, 0))
+    motions = [list(demonstrations(*pair, seed=k, n=9)) for k, pair in enumerate(pairs)]
+    for turn in zip(*motions, strict=True):
+        for frames in turn:
+            tree.insert(frames)
+    recogniser = tree.recogniser()
+    assert recogniser.primitives
+    primitives = [
+        Primitive.from_exemplars(id, fit(motions[0], 8), motions[0], RATE)
+        for id in recogniser.primitives
+    ]
+    library = PrimitiveLibrary(
+        tuple(primitives), TransitionGraph(), CHANNELS, RATE, recogniser=recogniser
+    )
+    loaded = PrimitiveLibrary.load(library.save(tmp_path / "r.mplearn"))
+    assert loaded.version == library.version
+    for k, pair in enumerate(pairs):
+        unseen = next(demonstrations(*pair, seed=100 + k))
+        assert loaded.recognise(unseen) == library.recognise(unseen)
+    assert loaded.recognise(unseen).primitive in loaded
 
 
 def test_equal_libraries_are_equal_files(saved, tmp_path):
