@@ -17,11 +17,12 @@ from __future__ import annotations
 
 import csv
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from ..recording import LabelledSegment, Recording
+from ..recording import IntArray, LabelledSegment, Recording
 from .clock import frame_numbers
 from .files import bad_file, read_text, stem
 from .numbers import numbers
@@ -81,11 +82,11 @@ class CSVReader(Reader):
             person=people[0],
             labels=_segments(texts, index, people[0]),
         )
-        if recording.is_markers:
-            points = recording.markers
-            points[:] = points @ file_axes(hints.up_axis, "z", "x").T * (hints.unit_m or 1.0)
-            checked_markers(path, points, recording.marker_names)
-        return recording
+        if not recording.is_markers:
+            return recording
+        points = recording.markers @ file_axes(hints.up_axis, "z", "x").T * (hints.unit_m or 1.0)
+        checked_markers(path, points, recording.marker_names)
+        return replace(recording, frames=points.reshape(frames.shape))
 
 
 def _table(path: Path) -> tuple[list[str], list[list[str]], list[int]]:
@@ -119,7 +120,7 @@ def _is_number(text: str) -> bool:
 
 
 def _segments(
-    texts: dict[str, list[str]], index: np.ndarray, person: str
+    texts: dict[str, list[str]], index: IntArray, person: str
 ) -> tuple[LabelledSegment, ...]:
     labels = texts.get("label", [])
     marks = texts.get("segment", labels)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -89,6 +90,75 @@ def test_c3d_round_trip(tmp_path: Path) -> None:
     assert recording.marker_names == tuple(f"P{i}" for i in range(7))
     assert np.array_equal(np.isnan(recording.markers), np.isnan(points))
     assert recording.markers == pytest.approx(points, abs=1e-6, nan_ok=True)  # stored as float32
+
+
+def other_machines(data: bytes, n_points: int, processor: int, scale: float | None) -> bytes:
+    """Rewrite a small C3D file of a PC with reals, as a DEC or an SGI, or with integers."""
+    order = ">" if processor == 86 else "<"
+
+    def real(value: float) -> bytes:
+        if processor != 85:
+            return struct.pack(order + "f", value)
+        low, high = struct.unpack("<2H", struct.pack("<f", 4.0 * value))
+        return struct.pack("<2H", high, low)
+
+    out = bytearray(data)
+    for at in range(2, 24, 2):
+        if at not in (12, 14, 20, 22):
+            struct.pack_into(order + "H", out, at, *struct.unpack_from("<H", data, at))
+    for at in (12, 20):
+        out[at : at + 4] = real(*struct.unpack_from("<f", data, at))
+    if scale is not None:
+        out[12:16] = real(scale)
+    at = 516
+    out[515] = processor
+    while data[at]:
+        link = at + 2 + abs(struct.unpack_from("b", data, at)[0])
+        (step,) = struct.unpack_from("<h", data, link)
+        struct.pack_into(order + "h", out, link, step)
+        if data[at + 1] < 128:
+            kind, n_dimensions = struct.unpack_from("bB", data, link + 2)
+            begin = link + 4 + n_dimensions
+            for i in range(int(np.prod([*data[link + 4 : begin]]))):
+                if kind == 2:
+                    value = struct.unpack_from("<h", data, begin + 2 * i)
+                    struct.pack_into(order + "h", out, begin + 2 * i, *value)
+                elif kind == 4:
+                    (number,) = struct.unpack_from("<f", data, begin + 4 * i)
+                    if scale is not None and data[at + 2 : link] == b"SCALE":
+                        number = scale
+                    out[begin + 4 * i : begin + 4 * i + 4] = real(number)
+        at = link + step
+    start = 512 * (struct.unpack_from("<H", data, 16)[0] - 1)
+    count = 4 * n_points * (1 + struct.unpack_from("<2H", data, 6)[1] - data[6])
+    reals = struct.unpack_from(f"<{count}f", data, start)
+    if scale is None:
+        return bytes(out[:start]) + b"".join(map(real, reals))
+    whole = [v if i % 4 == 3 else v / scale for i, v in enumerate(reals)]
+    return bytes(out[:start]) + b"".join(struct.pack(order + "h", round(v)) for v in whole)
+
+
+@pytest.mark.parametrize("scale", [None, 0.1])
+@pytest.mark.parametrize("processor", [84, 85, 86])
+def test_c3d_of_every_machine(tmp_path: Path, processor: int, scale: float | None) -> None:
+    points = person(20, 5)
+    path = write_c3d(tmp_path / "a.c3d", points, rate_hz=120.0)
+    path.write_bytes(other_machines(path.read_bytes(), 5, processor, scale))
+    recording = open_recording(path)
+    assert recording.rate_hz == 120.0
+    assert recording.markers == pytest.approx(points, abs=1e-6 if scale is None else 6e-5)
+    if processor == 84:
+        import ezc3d
+
+        theirs = np.moveaxis(ezc3d.c3d(str(path))["data"]["points"][:3], 0, -1).swapaxes(0, 1)
+        assert recording.markers == pytest.approx(theirs / 1000.0, abs=1e-9)
+
+
+def test_c3d_cut_off(tmp_path: Path) -> None:
+    path = write_c3d(tmp_path / "a.c3d", person(300, 20))
+    path.write_bytes(path.read_bytes()[:-2000])
+    with pytest.raises(RecordingError, match=r"300 frames.*bytes"):
+        open_recording(path)
 
 
 @pytest.mark.parametrize(("units", "scale"), [("m", 1.0), ("cm", 100.0), ("mm", 1000.0)])

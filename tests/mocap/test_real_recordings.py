@@ -108,7 +108,11 @@ def test_wrong_performances_are_read_too() -> None:
 
 
 def test_c3d_markers_are_a_persons() -> None:
+    import ezc3d
+
     recording = open_recording(FOLDER / "c3d")
+    theirs = ezc3d.c3d(str(FOLDER / "c3d" / "85_12.c3d"))["data"]["points"][:3]
+    assert recording.markers == pytest.approx(theirs.transpose(2, 1, 0) / 1000.0, abs=1e-9)
     assert (recording.name, recording.rate_hz) == ("85_12", 120.0)
     assert recording.frames.shape == (4499, 123)
     assert not any(":" in name for name in recording.marker_names)
