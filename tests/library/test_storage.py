@@ -48,7 +48,7 @@ def test_what_is_loaded_is_what_was_saved(saved):
 
 
 def test_a_recogniser_decides_the_same_after_loading(tmp_path):
-    tree = PrimitiveTree(TreeConfig(), len(CHANNELS), RATE)
+    tree = PrimitiveTree(TreeConfig(cutoff=0.7), len(CHANNELS), RATE)
     pairs = ((0, 1), (1, 2), (2, 3), (3, 0))
     motions = [list(demonstrations(*pair, seed=k, n=9)) for k, pair in enumerate(pairs)]
     for turn in zip(*motions, strict=True):
