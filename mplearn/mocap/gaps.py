@@ -92,11 +92,12 @@ class GapTracker:
         measured = np.asarray(markers, dtype=np.float64)
         if measured.shape != (self.n_markers, 3):
             raise FrameError(f"markers must have shape ({self.n_markers}, 3), not {measured.shape}")
-        if np.isinf(measured).any():
+        seen = np.isfinite(measured).all(axis=1)
+        if not seen.all() and np.isinf(measured).any():
             raise FrameError("a marker's position is infinite; a missing one is NaN")
 
         tracked = ~np.isnan(self._last[:, 0])
-        seen = ~np.isnan(measured).any(axis=1) & (~tracked | self._within_reach(measured))
+        seen &= ~tracked | self._within_reach(measured)
         begun, held = seen & ~tracked, tracked & ~seen
         filled = np.where(seen[:, None], measured, np.nan)
         guesses = self._neighbours.update(filled, held)

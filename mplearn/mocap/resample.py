@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
 
 from ..errors import InvalidValueError
 from ..recording import BoolArray, FloatArray, LabelledSegment, Recording
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 _ZERO_CROSSINGS = 24  # of the sinc on each side: a transition band of 10 % of the Nyquist frequency
 _KAISER_BETA = 8.0  # about 80 dB of stop-band attenuation
@@ -54,6 +57,8 @@ def resample(recording: Recording, rate_hz: float) -> Recording:
 
 def _kernel(places: FloatArray, n_old: int, cutoff: float) -> sparse.csr_array:
     """Return the filter at fractional places, shape (len(places), n_old); rows sum to 1."""
+    from scipy import sparse
+
     reach = _ZERO_CROSSINGS / cutoff
     taps = np.ceil(places - reach).astype(np.int64)[:, None] + np.arange(int(2 * reach) + 1)
     away = taps - places[:, None]

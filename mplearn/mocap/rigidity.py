@@ -51,15 +51,14 @@ class RigidNeighbours:
         Returns:
             Positions of the lost markers, shape (K, 3) [m]; NaN where fewer than three others help.
         """
-        which = np.flatnonzero(lost)
-        if len(which):
-            just = which[~np.isnan(self._before[which, 0])]
-            self._as_last_seen[just] = self._before
+        before, self._before = self._before, positions.copy()
         if self._frames % self._every_frames == 0:
             self._look(positions)
         self._frames += 1
-        self._before = positions.copy()
-        return self._predict(which, positions)
+        if not lost.any():
+            return np.empty((0, 3))
+        self._as_last_seen[lost & ~np.isnan(before[:, 0])] = before
+        return self._predict(np.flatnonzero(lost), positions)
 
     def state(self) -> dict[str, Any]:
         """Return the whole state as plain values and arrays."""
@@ -89,8 +88,6 @@ class RigidNeighbours:
         self._variance = (1.0 - share) * (self._variance + share * change**2)
 
     def _predict(self, which: IntArray, positions: FloatArray) -> FloatArray:
-        if not len(which):
-            return np.empty((0, 3))
         then = self._as_last_seen[which]  # (K, M, 3)
         helps = ~np.isnan(then[:, :, 0]) & ~np.isnan(positions[None, :, 0])  # (K, M)
         own = then[np.arange(len(which)), which]  # (K, 3)
