@@ -166,7 +166,7 @@ def _choose(frames: FloatArray, names: Sequence[str]) -> FloatArray:
     ever = np.atleast_1d(seen.any(axis=0))
     good = np.flatnonzero(seen.sum(axis=1) >= 0.8 * ever.sum())
     if ever.mean() < 0.6 or not len(good):
-        unseen = [names[i] for i in np.flatnonzero(~ever)]
+        unseen = [names[int(i)] for i in np.flatnonzero(~ever)]
         raise TooFewMarkersError(
             f"too few markers to calibrate: in the best of {len(frames)} frames "
             f"{seen.sum(axis=1).max()} of {len(names)} are seen; never seen: {unseen[:8]}"

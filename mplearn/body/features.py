@@ -14,8 +14,8 @@ from mplearn.recording import BoolArray, FloatArray, IntArray
 
 from .body import Body
 from .gauss_newton import Linkage
+from .kinematics import forward_kinematics
 from .robot import robot_body
-from .tree import forward_kinematics
 
 BASE_CHANNELS = ("base_height", "base_roll", "base_pitch")
 

@@ -105,7 +105,7 @@ def first_posture(
     start: FloatArray,
     frame: FloatArray,
 ) -> FloatArray:
-    """Find the posture of one frame from the trunk's place, with each limb's best of several starts.
+    """Find one frame's posture from the trunk's place: each limb's best of several starts.
 
     Args:
         follower: The body as the solver sees it.

@@ -21,7 +21,9 @@ from numba import njit
 
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
-from .tree import KinematicTree, first_joints, forward_kinematics, integrate, point_jacobian
+from .bounded import bounded_solve, inverse_diagonal
+from .kinematics import first_joints, forward_kinematics, integrate, point_jacobian
+from .tree import KinematicTree
 
 
 class Linkage(NamedTuple):
@@ -233,103 +235,3 @@ def normal_equations(
                 normal[i, j] += (
                     x * jacobian[m, 0, j] + y * jacobian[m, 1, j] + z * jacobian[m, 2, j]
                 )
-
-
-@njit(cache=True)
-def bounded_solve(
-    normal: FloatArray,
-    gradient: FloatArray,
-    low: FloatArray,
-    high: FloatArray,
-    free: BoolArray,
-    step: FloatArray,
-) -> None:
-    """Minimise the quadratic model between bounds, fixing what runs into one, until nothing does.
-
-    Args:
-        normal: Symmetric positive definite, its lower triangle, shape (d, d).
-        gradient: Descent direction at zero, shape (d,).
-        low: Lower bounds, shape (d,).
-        high: Upper bounds, shape (d,).
-        free: Unknowns that may move at all, shape (d,).
-        step: The solution, shape (d,), filled.
-    """
-    d = len(gradient)
-    fixed = ~free
-    step[:] = 0.0
-    factor = np.empty_like(normal)
-    solution = np.empty(d)
-    while True:
-        for i in range(d):
-            solution[i] = step[i]
-            if fixed[i]:
-                factor[i, :i] = 0.0
-                factor[i, i] = 1.0
-                continue
-            value = gradient[i]
-            for j in range(d):
-                if fixed[j]:
-                    value -= (normal[i, j] if j < i else normal[j, i]) * step[j]
-                    if j < i:
-                        factor[i, j] = 0.0
-                elif j <= i:
-                    factor[i, j] = normal[i, j]
-            solution[i] = value
-        cholesky(factor)
-        cholesky_solve(factor, solution)
-        hit = False
-        for i in range(d):
-            if not fixed[i] and not low[i] <= solution[i] <= high[i]:
-                solution[i] = min(max(solution[i], low[i]), high[i])
-                fixed[i] = True
-                hit = True
-        step[:] = solution
-        if not hit:
-            return
-
-
-@njit(cache=True)
-def cholesky(a: FloatArray) -> None:
-    """Factor a symmetric positive definite matrix in place, lower triangle."""
-    for i in range(len(a)):
-        for j in range(i + 1):
-            value = a[i, j]
-            for k in range(j):
-                value -= a[i, k] * a[j, k]
-            a[i, j] = np.sqrt(value) if i == j else value / a[j, j]
-
-
-@njit(cache=True)
-def cholesky_solve(factor: FloatArray, x: FloatArray) -> None:
-    """Solve L L' x = b in place."""
-    d = len(x)
-    for i in range(d):
-        value = x[i]
-        for k in range(i):
-            value -= factor[i, k] * x[k]
-        x[i] = value / factor[i, i]
-    for i in range(d - 1, -1, -1):
-        x[i] /= factor[i, i]
-        for k in range(i):
-            x[k] -= factor[i, k] * x[i]
-
-
-@njit(cache=True)
-def inverse_diagonal(normal: FloatArray, free: BoolArray, out: FloatArray) -> None:
-    """Fill the diagonal of the inverse of the free part of a matrix, given its lower triangle."""
-    rows = np.flatnonzero(free)
-    factor = np.empty((len(rows), len(rows)))
-    for i in range(len(rows)):
-        for j in range(i + 1):
-            factor[i, j] = normal[rows[i], rows[j]]
-    cholesky(factor)
-    column = np.empty(len(rows))
-    for k in range(len(rows)):  # the inverse's diagonal: squared columns of L^-1
-        for i in range(k, len(rows)):
-            value = 1.0 if i == k else 0.0
-            for j in range(k, i):
-                value -= factor[i, j] * column[j]
-            column[i] = value / factor[i, i]
-        out[rows[k]] = 0.0
-        for i in range(k, len(rows)):
-            out[rows[k]] += column[i] ** 2

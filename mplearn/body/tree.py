@@ -12,10 +12,13 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 
 from mplearn.errors import BodyError
 from mplearn.recording import BoolArray, FloatArray, IntArray
+
+from .kinematics import first_joints, point_jacobian
+from .kinematics import forward_kinematics as forward_kinematics
+from .kinematics import quaternion_matrix as quaternion_matrix
 
 if TYPE_CHECKING:
     import mujoco
@@ -193,157 +196,3 @@ class KinematicTree:
             self.slides,
         )
         return pos, mat, axes, anchors
-
-
-def first_joints(joint_body: IntArray, n_bodies: int) -> IntArray:
-    """Return, for each body, its first joint; body b has joints [first[b], first[b + 1])."""
-    return np.searchsorted(joint_body, np.arange(n_bodies + 1)).astype(np.int64)
-
-
-@njit(cache=True)
-def quaternion_matrix(q: FloatArray) -> FloatArray:
-    """Return the rotation matrix (3, 3) of a quaternion (w, x, y, z), which need not be normal."""
-    norm = np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    w, x, y, z = q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm
-    m = np.empty((3, 3))
-    m[0, 0] = 1 - 2 * (y * y + z * z)
-    m[0, 1] = 2 * (x * y - w * z)
-    m[0, 2] = 2 * (x * z + w * y)
-    m[1, 0] = 2 * (x * y + w * z)
-    m[1, 1] = 1 - 2 * (x * x + z * z)
-    m[1, 2] = 2 * (y * z - w * x)
-    m[2, 0] = 2 * (x * z - w * y)
-    m[2, 1] = 2 * (y * z + w * x)
-    m[2, 2] = 1 - 2 * (x * x + y * y)
-    return m
-
-
-@njit(cache=True)
-def turn(mat: FloatArray, axis: FloatArray, angle: float) -> None:
-    """Turn a rotation matrix, in place, about an axis of its own frame."""
-    s, c = np.sin(angle), np.cos(angle)
-    x, y, z = axis[0], axis[1], axis[2]
-    v = 1.0 - c
-    r00, r01, r02 = c + x * x * v, x * y * v - z * s, x * z * v + y * s
-    r10, r11, r12 = y * x * v + z * s, c + y * y * v, y * z * v - x * s
-    r20, r21, r22 = z * x * v - y * s, z * y * v + x * s, c + z * z * v
-    for i in range(3):
-        a, b, d = mat[i, 0], mat[i, 1], mat[i, 2]
-        mat[i, 0] = a * r00 + b * r10 + d * r20
-        mat[i, 1] = a * r01 + b * r11 + d * r21
-        mat[i, 2] = a * r02 + b * r12 + d * r22
-
-
-@njit(cache=True)
-def forward_kinematics(
-    q: FloatArray,
-    parent: IntArray,
-    offset: FloatArray,
-    rotation: FloatArray,
-    joint_body: IntArray,
-    axis: FloatArray,
-    anchor: FloatArray,
-    pos: FloatArray,
-    mat: FloatArray,
-    axes: FloatArray,
-    anchors: FloatArray,
-    slides: BoolArray | None = None,
-) -> None:
-    """Fill body positions and orientations, and each joint's axis and anchor in the world.
-
-    All joints are hinges where `slides` is not given.
-    """
-    pos[0] = q[:3]
-    mat[0] = quaternion_matrix(q[3:7])
-    j = 0
-    for b in range(len(parent)):
-        if b > 0:
-            p = parent[b]
-            for i in range(3):
-                at = pos[p, i]
-                for k in range(3):
-                    at += mat[p, i, k] * offset[b, k]
-                    mat[b, i, k] = (
-                        mat[p, i, 0] * rotation[b, 0, k]
-                        + mat[p, i, 1] * rotation[b, 1, k]
-                        + mat[p, i, 2] * rotation[b, 2, k]
-                    )
-                pos[b, i] = at
-        while j < len(joint_body) and joint_body[j] == b:
-            for i in range(3):
-                at, along = pos[b, i], 0.0
-                for k in range(3):
-                    at += mat[b, i, k] * anchor[j, k]
-                    along += mat[b, i, k] * axis[j, k]
-                anchors[j, i] = at
-                axes[j, i] = along
-            if slides is not None and slides[j]:
-                for i in range(3):
-                    pos[b, i] += axes[j, i] * q[7 + j]
-                j += 1
-                continue
-            turn(mat[b], axis[j], q[7 + j])
-            for i in range(3):
-                at = anchors[j, i]
-                for k in range(3):
-                    at -= mat[b, i, k] * anchor[j, k]
-                pos[b, i] = at
-            j += 1
-
-
-@njit(cache=True)
-def point_jacobian(
-    points: FloatArray,
-    bodies: IntArray,
-    base_pos: FloatArray,
-    base_mat: FloatArray,
-    axes: FloatArray,
-    anchors: FloatArray,
-    slides: BoolArray,
-    parent: IntArray,
-    first: IntArray,
-    out: FloatArray,
-) -> None:
-    """Fill the Jacobian (M, 3, 6 + n) of world points; `out` is zero where a joint has no part."""
-    for m in range(len(points)):
-        x, y, z = points[m, 0], points[m, 1], points[m, 2]
-        for k in range(3):
-            out[m, k, k] = 1.0
-            rx, ry, rz = x - base_pos[0], y - base_pos[1], z - base_pos[2]
-            ax, ay, az = base_mat[0, k], base_mat[1, k], base_mat[2, k]
-            out[m, 0, 3 + k] = ay * rz - az * ry
-            out[m, 1, 3 + k] = az * rx - ax * rz
-            out[m, 2, 3 + k] = ax * ry - ay * rx
-        b = bodies[m]
-        while b >= 0:
-            for j in range(first[b], first[b + 1]):
-                if slides[j]:
-                    for k in range(3):
-                        out[m, k, 6 + j] = axes[j, k]
-                    continue
-                rx, ry, rz = x - anchors[j, 0], y - anchors[j, 1], z - anchors[j, 2]
-                out[m, 0, 6 + j] = axes[j, 1] * rz - axes[j, 2] * ry
-                out[m, 1, 6 + j] = axes[j, 2] * rx - axes[j, 0] * rz
-                out[m, 2, 6 + j] = axes[j, 0] * ry - axes[j, 1] * rx
-            b = parent[b]
-
-
-@njit(cache=True)
-def integrate(q: FloatArray, step: FloatArray) -> None:
-    """Move a posture, in place, by a step (6 + n,) [m, rad], as `mj_integratePos` does."""
-    for i in range(3):
-        q[i] += step[i]
-    angle = np.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
-    if angle > 0.0:
-        s = np.sin(0.5 * angle) / angle
-        rw, rx, ry, rz = np.cos(0.5 * angle), s * step[3], s * step[4], s * step[5]
-        w, x, y, z = q[3], q[4], q[5], q[6]
-        q[3] = w * rw - x * rx - y * ry - z * rz
-        q[4] = w * rx + x * rw + y * rz - z * ry
-        q[5] = w * ry - x * rz + y * rw + z * rx
-        q[6] = w * rz + x * ry - y * rx + z * rw
-        norm = np.sqrt(q[3] ** 2 + q[4] ** 2 + q[5] ** 2 + q[6] ** 2)
-        for i in range(3, 7):
-            q[i] /= norm
-    for i in range(6, len(step)):
-        q[1 + i] += step[i]
