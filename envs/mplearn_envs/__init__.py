@@ -1,4 +1,7 @@
-"""Gymnasium environments whose actions are motion primitives: ``gym.make("mplearn/PrimitiveHumanoid-v0")``."""
+"""Gymnasium environments whose actions are motion primitives.
+
+``gym.make("mplearn/PrimitiveHumanoid-v0")``, after ``import mplearn_envs``.
+"""
 
 from gymnasium.envs.registration import register
 

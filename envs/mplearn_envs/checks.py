@@ -36,8 +36,10 @@ def check_action_mask(
 ) -> MaskReport:
     """Check the convention of ``info["action_mask"]`` (and ``info["transition_prior"]``, if given).
 
-    * The action space is ``Discrete(n)`` from 0; `reset` and `step` both return the mask in ``info``.
-    * The mask has shape (n,), dtype int8 (what ``Discrete.sample(mask)`` takes), values 0 and 1, and
+    * The action space is ``Discrete(n)`` from 0; `reset` and `step` both return the mask in
+    ``info``.
+    * The mask has shape (n,), dtype int8 (what ``Discrete.sample(mask)`` takes), values 0 and 1,
+    and
       at least one 1. It equals ``env.unwrapped.action_masks()`` and ``observation["action_mask"]``
       where there are such.
     * Arrays are fresh: later steps do not change what was returned, nor does the environment depend
@@ -155,7 +157,9 @@ def _check_prior(info: dict[str, Any], mask: np.ndarray[Any, Any], where: str) -
         )
 
 
-def _check_pickling(env: gymnasium.Env[Any, Any], space: gymnasium.spaces.Discrete, seed: int) -> None:
+def _check_pickling(
+    env: gymnasium.Env[Any, Any], space: gymnasium.spaces.Discrete, seed: int
+) -> None:
     _, info = env.reset(seed=seed)
     twin = pickle.loads(pickle.dumps(env.unwrapped))
     action = space.dtype.type(np.flatnonzero(info["action_mask"])[-1])

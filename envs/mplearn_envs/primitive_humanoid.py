@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.resources import files
 from pathlib import Path
-from typing import Any, ClassVar, Literal, SupportsFloat
+from typing import Any, Literal, SupportsFloat
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from mplearn.errors import InvalidValueError, LibraryError
+from mplearn.errors import InvalidValueError
 from mplearn.generation import StyleName
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import FloatArray
@@ -20,12 +19,11 @@ from mplearn.recording import FloatArray
 from .control.planner import Plan, Planner, PlannerConfig
 from .control.reference import rest_reference
 from .feasibility import FeasibilityConfig
-from .repertoire import HOLD, Choices, Repertoire
+from .observation import Observation, observation_limits, observation_space, observe
+from .repertoire import HOLD, Repertoire, open_library
 from .robot import Robot, humanoid
 from .simulation import Performance, Simulation
 from .tasks import Choice, Task, make_task
-
-Observation = dict[str, Any]
 
 
 class PrimitiveHumanoidEnv(gymnasium.Env[Observation, np.int64]):
@@ -38,37 +36,42 @@ class PrimitiveHumanoidEnv(gymnasium.Env[Observation, np.int64]):
     ## Action space
 
     ``Discrete(capacity)``. Action 0 is hold: keep the posture for ``hold_s``. Action k performs the
-    primitive in slot k; primitives take slots in the order of their ids. Free slots are never legal.
+    primitive in slot k; primitives take slots in the order of their ids. Free slots are never
+    legal.
 
     ## Observation space
 
     A ``Dict`` (n = 30 joints, in the order of ``env.unwrapped.robot.joint_names``):
 
-    ================== ==== ==================================== ======= ====== ========
-    key                num  meaning                              min     max    unit
-    ================== ==== ==================================== ======= ====== ========
-    posture            0    height of the base                   -inf    inf    m
-    posture            1    roll of the base                     -pi     pi     rad
-    posture            2    pitch of the base                    -pi/2   pi/2   rad
-    posture            3..  joint angles                         -inf    inf    rad
-    velocity           0-2  linear, x along the heading          -inf    inf    m/s
-    velocity           3-5  angular, base's frame                -inf    inf    rad/s
-    velocity           6..  joint velocities                     -inf    inf    rad/s
-    cog                0-2  COG from the middle of the soles     -inf    inf    m
-    support_margin     0    COG to edge of the support polygon   -inf    inf    m
-    current_primitive       slot performed last; 0: none         0       cap-1  slot
-    action_mask        0..  1 where an action is legal           0       1      -
-    transition_prior   0..  probability of each action           0       1      -
-    ================== ==== ==================================== ======= ====== ========
+    ================== ==== ==================================== ======= ======= =====
+    key                num  meaning                              min     max     unit
+    ================== ==== ==================================== ======= ======= =====
+    posture            0    height of the base                   -10     10      m
+    posture            1    roll of the base                     -pi     pi      rad
+    posture            2    pitch of the base                    -pi/2   pi/2    rad
+    posture            3..  joint angles                         -2 pi   2 pi    rad
+    velocity           0-2  linear, x along the heading          -100    100     m/s
+    velocity           3-5  angular, base's frame                -100    100     rad/s
+    velocity           6..  joint velocities                     -100    100     rad/s
+    cog                0-2  COG from the middle of the soles     -10     10      m
+    support_margin     0    COG to edge of the support polygon   -10     10      m
+    current_primitive       slot performed last; 0: none         0       cap-1   slot
+    action_mask        0..  1 where an action is legal           0       1       -
+    transition_prior   0..  probability of each action           0       1       -
+    ================== ==== ==================================== ======= ======= =====
+
+    What lies outside the bounds (in a wild fall) is cut off. A support margin is negative where the
+    COG is outside, and -1 where fewer than three corners of the soles touch the floor.
 
     ## Legal actions, and the prior
 
-    Hold is always legal. After a primitive, those are legal that were observed to follow it and that
-    the robot can perform (`Feasibility`). The prior is their observed frequency; hold has probability
-    0 as long as there is another choice. Holding changes nothing in that: the same successors stay
-    legal. At a dead end only hold is legal, with probability 1; it makes an *entry*: as at the start
-    of an episode, those primitives are legal that start near the present posture, or else the nearest
-    one, with their observed frequency as prior. So a walk by the prior goes on for ever::
+    Hold is always legal. After a primitive, those are legal that were observed to follow it and
+    that the robot can perform (`Feasibility`). The prior is their observed frequency; hold has
+    probability 0 as long as there is another choice. Holding changes nothing in that: the same
+    successors stay legal. At a dead end only hold is legal, with probability 1; it makes an
+    *entry*: as at the start of an episode, those primitives are legal that start near the present
+    posture, or else the nearest one, with their observed frequency as prior. So a walk by the prior
+    goes on for ever::
 
         action = env.action_space.sample(probability=info["transition_prior"])
 
@@ -88,10 +91,11 @@ class PrimitiveHumanoidEnv(gymnasium.Env[Observation, np.int64]):
 
     ## Info
 
-    ``action_mask`` (int8), ``transition_prior`` (float64), ``infeasible`` (slot: reasons, of what the
-    demonstrator might have chosen here), ``dead_end``, ``library_version``, ``primitive`` (id or None),
-    ``primitive_name``; after a step also ``duration_s``, ``discount``, ``reward_terms``, ``illegal``,
-    ``fallen``, ``speed``, ``tracking_rmse_rad``, ``cog_deviation_m`` (largest), ``zmp_margin_m`` (least).
+    ``action_mask`` (int8), ``transition_prior`` (float64), ``infeasible`` (slot: reasons, of what
+    the demonstrator might have chosen here), ``dead_end``, ``library_version``, ``primitive`` (id
+    or None), ``primitive_name``; after a step also ``duration_s``, ``discount``, ``reward_terms``,
+    ``illegal``, ``fallen``, ``speed``, ``tracking_rmse_rad``, ``cog_deviation_m`` (largest),
+    ``zmp_margin_m`` (least).
 
     ## Arguments
 
@@ -123,7 +127,10 @@ class PrimitiveHumanoidEnv(gymnasium.Env[Observation, np.int64]):
     * v0: first.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 25}
+    metadata: dict[str, Any] = {  # noqa: RUF012 (gymnasium declares it so)
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 25,
+    }
 
     def __init__(
         self,
@@ -152,7 +159,7 @@ class PrimitiveHumanoidEnv(gymnasium.Env[Observation, np.int64]):
         _require("frame_rate_hz", frame_rate_hz, 0.0 < frame_rate_hz <= 250.0)
         _require("illegal", illegal, illegal in ("hold", "raise"))
         _require("render_mode", render_mode, render_mode in (None, "human", "rgb_array"))
-        self.library = _library(library)
+        self.library = open_library(library)
         self.robot = robot or humanoid()
         self.task = make_task(task)
         self.speed = speed
@@ -178,7 +185,8 @@ class PrimitiveHumanoidEnv(gymnasium.Env[Observation, np.int64]):
         )
         self.capacity = self.repertoire.capacity
         self.action_space = spaces.Discrete(self.capacity)
-        self.observation_space = _observation_space(len(self.robot.joint_names), self.capacity)
+        self._limits = observation_limits(len(self.robot.joint_names))
+        self.observation_space = observation_space(self._limits, self.capacity)
         self._frame_steps = max(1, round(1.0 / (frame_rate_hz * period_s)))
         self._picture: Any = None
         self._running = False
@@ -241,7 +249,7 @@ class PrimitiveHumanoidEnv(gymnasium.Env[Observation, np.int64]):
         """Return which actions are legal, shape (capacity,): the convention of sb3-contrib."""
         return self._choices.mask.astype(np.bool_)
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """Return a picture, shape (height, width, 3), or show the window.
 
         Raises:
@@ -303,17 +311,8 @@ class PrimitiveHumanoidEnv(gymnasium.Env[Observation, np.int64]):
         return terms
 
     def _observation(self) -> Observation:
-        simulation, choices = self.simulation, self._choices
-        cog, margin = simulation.balance()
-        return {
-            "posture": simulation.posture(),
-            "velocity": simulation.velocity(),
-            "cog": cog,
-            "support_margin": np.array([margin]),
-            "current_primitive": np.int64(self._current_slot()),
-            "action_mask": choices.mask.copy(),
-            "transition_prior": choices.prior.copy(),
-        }
+        slot = HOLD if self._current is None else self.repertoire.slots[self._current]
+        return observe(self._limits, self.simulation, slot, self._choices)
 
     def _info(self) -> dict[str, Any]:
         choices, current = self._choices, self._current
@@ -326,9 +325,6 @@ class PrimitiveHumanoidEnv(gymnasium.Env[Observation, np.int64]):
             "primitive": current,
             "primitive_name": "" if current is None else self.library[current].name,
         }
-
-    def _current_slot(self) -> int:
-        return HOLD if self._current is None else self.repertoire.slots[self._current]
 
     def _frame(self) -> None:
         if self.frame_callback is not None:
@@ -359,34 +355,3 @@ def _require(name: str, value: object, holds: bool | np.bool_) -> None:
             "render_mode": "None, 'human' or 'rgb_array'",
         }
         raise InvalidValueError(f"{name} must be {allowed[name]}, not {value!r}")
-
-
-def _library(library: PrimitiveLibrary | str | Path | None) -> PrimitiveLibrary:
-    if library is None:
-        return PrimitiveLibrary.load(Path(str(files(__package__) / "data" / "default.mplearn")))
-    if isinstance(library, (str, Path)):
-        return PrimitiveLibrary.load(library)
-    if not isinstance(library, PrimitiveLibrary):
-        raise LibraryError(
-            f"library must be a PrimitiveLibrary, a file or None, not {type(library).__name__}"
-        )
-    return library
-
-
-def _observation_space(n_joints: int, capacity: int) -> spaces.Dict:
-    def box(size: int) -> spaces.Box:
-        return spaces.Box(-np.inf, np.inf, (size,), np.float64)
-
-    low, high = np.full(3 + n_joints, -np.inf), np.full(3 + n_joints, np.inf)
-    low[1:3], high[1:3] = (-np.pi, -np.pi / 2), (np.pi, np.pi / 2)
-    return spaces.Dict(
-        {
-            "posture": spaces.Box(low, high, dtype=np.float64),
-            "velocity": box(6 + n_joints),
-            "cog": box(3),
-            "support_margin": box(1),
-            "current_primitive": spaces.Discrete(capacity),
-            "action_mask": spaces.MultiBinary(capacity),
-            "transition_prior": spaces.Box(0.0, 1.0, (capacity,), np.float64),
-        }
-    )

@@ -50,7 +50,9 @@ class Renderer:
                 f"MUJOCO_GL=egl, or libosmesa6 and MUJOCO_GL=osmesa ({error})"
             ) from error
         except ValueError as error:
-            raise InvalidValueError(f"pictures of {width} x {height} cannot be drawn: {error}") from error
+            raise InvalidValueError(
+                f"pictures of {width} x {height} cannot be drawn: {error}"
+            ) from error
         self.camera = mujoco.MjvCamera()
         self.camera.azimuth = azimuth_deg
         self.camera.elevation = -8.0
@@ -124,7 +126,9 @@ def add_person(scene: mujoco.MjvScene, posture: FloatArray, place: FloatArray) -
     model, data = _person_model()
     posture = np.asarray(posture, dtype=np.float64)
     if posture.shape != (model.nq,) or not np.isfinite(posture).all():
-        raise InvalidValueError(f"a person's posture is {model.nq} finite values, not {posture.shape}")
+        raise InvalidValueError(
+            f"a person's posture is {model.nq} finite values, not {posture.shape}"
+        )
     data.qpos[:] = posture
     data.qpos[:2] = place[:2]
     mujoco.mj_kinematics(model, data)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.resources import files
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -97,7 +99,7 @@ class Repertoire:
         return self.ids[slot - 1] if 1 <= slot <= len(self.ids) else None
 
     def frames(self, id: int) -> tuple[FloatArray, float]:
-        """Return a primitive's motion in the robot's channels, shape (T, 3 + n), and its rate [1/s]."""
+        """Return a primitive's motion in the robot's channels, (T, 3 + n), and its rate [1/s]."""
         if id not in self._frames:
             motion = self.library.generate([id], style=self.style)
             frames = motion.frames[:, self._columns]
@@ -193,3 +195,20 @@ def _require_fit(library: PrimitiveLibrary, planner: Planner) -> None:
             f"robot {robot.name!r} needs {len(robot.channels)} channels"
             + (f" and misses {missing[:4]}" if missing else "")
         )
+
+
+def open_library(library: PrimitiveLibrary | str | Path | None) -> PrimitiveLibrary:
+    """Return a library, the one of a file, or the built-in one.
+
+    Raises:
+        LibraryError: The file is missing or damaged, or this is no library.
+    """
+    if library is None:
+        return PrimitiveLibrary.load(Path(str(files(__package__) / "data" / "default.mplearn")))
+    if isinstance(library, (str, Path)):
+        return PrimitiveLibrary.load(library)
+    if not isinstance(library, PrimitiveLibrary):
+        raise LibraryError(
+            f"library must be a PrimitiveLibrary, a file or None, not {type(library).__name__}"
+        )
+    return library

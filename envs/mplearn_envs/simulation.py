@@ -24,11 +24,12 @@ _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
 class Performance(NamedTuple):
-    """What happened while a plan was performed, sampled at its S reference postures (fewer after a fall).
+    """What happened while a plan was performed, at its S reference postures (fewer after a fall).
 
     Attributes:
         time_s: Time since the start, shape (S,) [s].
-        tracking_error_rad: Root mean square over the joints of actual minus wanted angle, (S,) [rad].
+        tracking_error_rad: Root mean square over the joints of actual minus wanted angle, (S,)
+            [rad].
         cog_deviation_m: Distance of the COG's projection from the middle of the soles, (S,) [m].
         zmp_margin_m: Distance of the zero-moment point from the edge of the soles, (S,) [m].
         fallen: Whether the robot fell; the last sample is when.
@@ -128,7 +129,7 @@ class Simulation:
         moment = np.einsum("kij,kj->ki", turn, ground[:, 3:])  # free joints turn in their own frame
         zmp = zero_moment_point(ground[:, :3], moment, q[:, :3])
         soles = self.soles()[..., :2].reshape(-1, 2)
-        time = (np.arange(len(q)) + 1) * plan.knot_s
+        time = np.arange(1.0, len(q) + 1.0) * plan.knot_s
         error = q[:, 7:] - plan.q[1 : len(q) + 1, 7:]
         return Performance(
             time,
@@ -147,27 +148,29 @@ class Simulation:
         )
 
     def posture(self) -> FloatArray:
-        """Return base height [m], roll and pitch [rad], and the joint angles [rad], shape (3 + n,)."""
+        """Return base height [m], roll, pitch and the joint angles [rad], shape (3 + n,)."""
         w, x, y, z = self.data.qpos[3:7]
         roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
         pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
         return np.concatenate(([self.data.qpos[2], roll, pitch], self.data.qpos[7:]))
 
     def velocity(self) -> FloatArray:
-        """Return linear velocity [m/s] along the heading, angular velocity [rad/s] in the base's frame,
-        and joint velocities [rad/s], shape (6 + n,).
-        """  # fmt: skip
+        """Return velocities, shape (6 + n,).
+
+        Linear [m/s], x along the heading; angular [rad/s], base's frame; joints' [rad/s].
+        """
         out = self.data.qvel.copy()
         out[:2] = self._heading() @ out[:2]
-        return out
+        return np.asarray(out)
 
     def balance(self) -> tuple[FloatArray, float]:
         """Return how the COG stands over the feet.
 
         Returns:
-            The COG from the middle of the soles, x along the heading, shape (3,) [m]; and the distance
-            of its projection from the edge of the support polygon [m], negative outside. Those corners
-            of the soles support that are less than 1.5 cm above the floor; -1 if fewer than three do.
+            The COG from the middle of the soles, x along the heading, shape (3,) [m]; and the
+            distance of its projection from the edge of the support polygon [m], negative outside.
+            Those corners of the soles support that are less than 1.5 cm above the floor; -1 if
+            fewer than three do.
         """
         corners = self.soles().reshape(8, 3)
         cog = self.data.subtree_com[1].copy()
@@ -179,14 +182,14 @@ class Simulation:
         return cog, margin
 
     def _heading(self) -> FloatArray:
-        """Return the matrix that turns vectors of the floor into the base's heading, shape (2, 2)."""
+        """Return the (2, 2) matrix that turns vectors of the floor into the base's heading."""
         w, x, y, z = self.data.qpos[3:7]
         yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
         c, s = np.cos(yaw), np.sin(yaw)
         return np.array([[c, s], [-s, c]])
 
     def _has_fallen(self, wanted: FloatArray) -> bool:
-        """Whether the base tilts or hangs far from where it should (also where it is not finite)."""
+        """Whether the base is far from upright or from its height, or not finite."""
         upright = _up(self.data.qpos) @ _up(wanted) > np.cos(FALL_TILT_RAD)
         return not (upright and self.data.qpos[2] > wanted[2] - FALL_DROP_M)
 

@@ -1,9 +1,10 @@
 """Balance with both feet down: COG, hip height and base orientation by velocity IK.
 
 [Kulic2012] 4.2.1, after Ott et al. (2008): gradient descent on the COG's and on the orientation's
-error gives a desired COG velocity and a desired angular velocity of the base, which a velocity-based
-inverse kinematics executes with the legs of a reference robot whose feet are fixed. Pure gradient
-descent lags behind a moving target (5 degrees in a bow), so the wanted velocities are fed forward.
+error gives a desired COG velocity and a desired angular velocity of the base, which a
+velocity-based inverse kinematics executes with the legs of a reference robot whose feet are fixed.
+Pure gradient descent lags behind a moving target (5 degrees in a bow), so the wanted velocities are
+fed forward.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from mplearn.recording import FloatArray
+from mplearn_envs.robot import Robot
 
-from ..robot import Robot
 from .kinematics import forward
 from .reference import Reference, base_rotation, reference_robot
 from .velocity_ik import COG, FEET, HEIGHT, ORIENTATION, advance, errors, rates

@@ -73,7 +73,7 @@ class CogFilter:
         return np.array(kalman.x)
 
     def zmp(self) -> FloatArray:
-        """Return the zero-moment point of the estimated motion, shape (2,) [m] (inverted pendulum)."""
+        """Return the inverted pendulum's zero-moment point, shape (2,) [m]."""
         if self._filter is None:
             raise FrameError("the COG filter has not been given a measurement yet")
         return pendulum_zmp(self._filter.x[0], self._filter.x[2])

@@ -8,8 +8,8 @@ import numpy as np
 
 from mplearn.errors import FrameError
 from mplearn.recording import FloatArray
+from mplearn_envs.robot import BASE_CHANNELS, Robot
 
-from ..robot import BASE_CHANNELS, Robot
 from .balance import BalanceController
 from .reference import Reference, reference_robot, rest_reference
 from .upper_body import UpperBodyTracker, servo_commands
@@ -73,7 +73,7 @@ class StandingController(Controller):
         after = self._balance.update(before, target, self.period_s)
         self._reference = after
         rate = (after.q - before.q)[7:] / self.period_s
-        return servo_commands(self.robot, after.q[None, 7:], rate[None])[0]
+        return np.asarray(servo_commands(self.robot, after.q[None, 7:], rate[None])[0])
 
 
 def tracked_columns(robot: Robot) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

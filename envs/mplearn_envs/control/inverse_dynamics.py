@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mplearn.recording import FloatArray
-
-from ..robot import Robot
 from mplearn.body.tree import quaternion_matrix
+from mplearn.recording import FloatArray
+from mplearn_envs.robot import Robot
 
 from .kinematics import forward
 from .reference import reference_robot, soles

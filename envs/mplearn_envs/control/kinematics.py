@@ -50,7 +50,8 @@ class Pose(NamedTuple):
         rotation: Body orientations, shape (B, 3, 3).
         anchor: A point of every hinge axis, shape (J, 3) [m].
         axis: Hinge axes, shape (J, 3).
-        moment: Mass times centre of mass of each body with all that it carries, shape (B, 3) [kg m].
+        moment: Mass times centre of mass of each body with all that it carries, shape (B, 3) [kg
+            m].
         carried: Mass of each body with all that it carries, shape (B,) [kg].
     """
 
@@ -102,7 +103,7 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def forward(tree: MassTree, q: FloatArray) -> Pose:
-    """Return the pose of every body and hinge for ``q`` = position (3), quaternion (4), angles (J,)."""
+    """Return where bodies and hinges are, for ``q`` in the layout of qpos, shape (7 + J,)."""
     n_bodies, n_hinges = tree.parent.shape[0], tree.axis.shape[0]
     position, rotation = np.empty((n_bodies, 3)), np.empty((n_bodies, 3, 3))
     anchor, axis = np.empty((n_hinges, 3)), np.empty((n_hinges, 3))
@@ -147,7 +148,8 @@ def rotation_error(wanted: FloatArray, actual: FloatArray) -> FloatArray:
     cosine = 0.5 * (r[0, 0] + r[1, 1] + r[2, 2] - 1.0)
     if s < 1e-9:
         return sine
-    return sine * (np.arctan2(s, cosine) / s)
+    sine *= np.arctan2(s, cosine) / s
+    return sine
 
 
 @njit(cache=True)
@@ -166,4 +168,5 @@ def rotate_quaternion(quaternion: FloatArray, vector: FloatArray) -> FloatArray:
             a * z + b * y - c * x + d * w,
         ]
     )
-    return out / np.sqrt(np.sum(out * out))
+    out /= np.sqrt(np.sum(out * out))
+    return out

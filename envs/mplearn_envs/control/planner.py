@@ -1,8 +1,9 @@
 """From a primitive's trajectory to servo commands for the whole robot: a pure function.
 
-With both feet down no measurement is fed back ([Kulic2012] 4.2.1 balances a kinematic reference), so
-what is commanded depends on the reference posture at the start, the motion and the speed alone. Plans
-are therefore cached, exactly: their ends are kept on a grid of 1e-6, so the same posture recurs.
+With both feet down no measurement is fed back ([Kulic2012] 4.2.1 balances a kinematic reference),
+so what is commanded depends on the reference posture at the start, the motion and the speed alone.
+Plans are therefore cached, exactly: their ends are kept on a grid of 1e-6, so the same posture
+recurs.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from numba import njit
 
 from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray
+from mplearn_envs.robot import Robot
 
-from ..robot import Robot
 from .reference import N_BASE, Reference, ReferenceRobot, base_rotation, reference_robot
 from .upper_body import limit_velocity, servo_commands
 from .velocity_ik import settle
@@ -143,31 +144,28 @@ class Planner:
     def hold(self, start: Reference, duration_s: float) -> Plan:
         """Return the commands that come to rest in the present posture."""
         here = np.clip(start.target, *self._reference.limits.T)
-        return self.plan(start, Motion(np.stack((here, here)), 1.0 / duration_s), 1.0, "hold")
+        return self.plan(
+            start, Motion(np.stack((here, here)), 1.0 / duration_s), 1.0, ("hold", duration_s)
+        )
 
     def _plan(self, start: Reference, motion: Motion, speed: float) -> Plan:
         knot_s = self.config.period_s * self.config.knot_steps
         for _ in range(4):
             targets = self._targets(start, motion, speed, knot_s)
             q, error = balanced_path(self._reference, targets, start.q)
-            velocity = np.diff(np.column_stack((np.vstack((start.target, targets))[:, :3], q[:, 7:])),
-                               axis=0) / knot_s  # (K, 3 + n)  # fmt: skip
+            tracked = np.vstack((start.target, targets))
+            path = np.hstack((tracked[:, :N_BASE], q[:, 7:]))  # (K + 1, 3 + n)
+            velocity = np.diff(path, axis=0) / knot_s
             excess = float(np.max(np.abs(velocity) / self._velocity))
             if excess <= 1.0:
                 break
             speed /= 1.02 * excess
-        end = Reference(
-            *(
-                np.round(part, GRID_DECIMALS)
-                for part in (targets[-1], (targets[-1] - targets[-2]) / knot_s, q[-1])
-            )
-        )
+        last = (targets[-1], (targets[-1] - targets[-2]) / knot_s, q[-1])
+        end = Reference(*(np.round(part, GRID_DECIMALS) for part in last))
         position, rate = refine(q[:, 7:], knot_s, self.config.knot_steps)
         return Plan(servo_commands(self.robot, position, rate), q, knot_s, error, end, speed)
 
-    def _targets(
-        self, start: Reference, motion: Motion, speed: float, knot_s: float
-    ) -> FloatArray:
+    def _targets(self, start: Reference, motion: Motion, speed: float, knot_s: float) -> FloatArray:
         """Return the tracked coordinates at the knots after the start, shape (K, U)."""
         limits, velocity = self._reference.limits, self._reference.velocity
         frames = np.clip(motion.frames, limits[:, 0], limits[:, 1])
@@ -179,7 +177,7 @@ class Planner:
         wait_s = max(0.0, blend_s - 0.6 * motion.duration_s / speed)
         ramp_s = 0.3 if wait_s > 0 else 0.0
         n_knots = max(2, round((wait_s + 0.5 * ramp_s + motion.duration_s / speed) / knot_s))
-        time = np.arange(1, n_knots + 1) * knot_s
+        time = np.arange(1.0, n_knots + 1.0) * knot_s
         progress = _progress(time, wait_s, ramp_s)
         at = progress / progress[-1] * (len(frames) - 1)  # in frames
         low = np.minimum(at.astype(np.int64), len(frames) - 2)
@@ -188,11 +186,11 @@ class Planner:
         first = (frames[1] - frames[0]) * motion.rate_hz * speed if wait_s == 0 else 0.0
         path += _fading(time, blend_s, gap, start.velocity - first)
         path = np.clip(path, limits[:, 0], limits[:, 1])
-        return limit_velocity(path, start.target, velocity * knot_s)
+        return np.asarray(limit_velocity(path, start.target, velocity * knot_s))
 
 
 def _progress(time: FloatArray, wait_s: float, ramp_s: float) -> FloatArray:
-    """Return the integral of a speed that is 0 for ``wait_s``, rises smoothly in ``ramp_s`` to 1."""
+    """Integrate a speed that is 0 for ``wait_s`` and then rises smoothly to 1 in ``ramp_s``."""
     if ramp_s == 0:
         return time
     x = (time - wait_s) / ramp_s
@@ -204,7 +202,7 @@ def _fading(time: FloatArray, over_s: float, gap: FloatArray, rate: FloatArray) 
     """Return the quintic that starts at ``gap`` with velocity ``rate`` and ends at rest in zero."""
     x = np.minimum(time / over_s, 1.0)[:, None]
     left = 1.0 - x
-    return left**3 * (gap * (1 + 3 * x + 6 * x**2) + rate * over_s * x * (1 + 3 * x))
+    return np.asarray(left**3 * (gap * (1 + 3 * x + 6 * x**2) + rate * over_s * x * (1 + 3 * x)))
 
 
 @njit(cache=True)
@@ -219,8 +217,8 @@ def balanced_path(
         start: Posture before them, shape (7 + n,).
 
     Returns:
-        The postures, shape (K + 1, 7 + n), start included, and the largest error that is left in each,
-        shape (K + 1,) [m, rad].
+        The postures, shape (K + 1, 7 + n), start included, and the largest error that is left in
+        each, shape (K + 1,) [m, rad].
     """
     n_knots = targets.shape[0]
     out = np.empty((n_knots + 1, start.shape[0]))
@@ -236,7 +234,7 @@ def balanced_path(
             q[7 + robot.upper[u]] = targets[k, 3 + u]
         orientation = base_rotation(targets[k, 1], targets[k, 2])
         out[k + 1], worst[k + 1] = settle(
-            robot.tree, robot.stance, q, targets[k, 0] + offset, orientation, 1e-8, 12
+            robot.tree, robot.stance, q, targets[k, 0] + offset, orientation, TOLERANCE, 12
         )
     return out, worst
 

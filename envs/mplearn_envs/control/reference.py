@@ -10,8 +10,8 @@ from numba import njit
 
 from mplearn.errors import RobotError
 from mplearn.recording import FloatArray, IntArray
+from mplearn_envs.robot import Robot
 
-from ..robot import Robot
 from .kinematics import MassTree, forward, mass_tree
 from .velocity_ik import Stance, settle
 
@@ -19,7 +19,9 @@ N_BASE = 3  # base height, roll, pitch
 
 
 class ReferenceRobot(NamedTuple):
-    """A robot as the kernels need it: U tracked coordinates are base height, roll, pitch, then joints.
+    """A robot as the kernels need it.
+
+    Its U tracked coordinates are base height, roll and pitch, then all joints but the legs'.
 
     Attributes:
         tree: Kinematics and masses.
@@ -112,7 +114,9 @@ def reference_robot(robot: Robot) -> ReferenceRobot:
     guess[[7 + k for k in knees]] = robot.stance_knee_rad
     rest, worst = settle(tree, stance, guess, stance_height, np.eye(3), 1e-10, 50)
     if worst > 1e-6:
-        raise RobotError(f"robot {robot.name!r} cannot stand: its feet or COG miss by {worst:.3g} m")
+        raise RobotError(
+            f"robot {robot.name!r} cannot stand: its feet or COG miss by {worst:.3g} m"
+        )
     upper = robot.upper_joints
     lowest = 0.45 * straight[2]
     base_limits = np.array([[lowest, straight[2]], [-0.6, 0.6], [-0.6, 1.6]])
@@ -153,9 +157,7 @@ def soles(robot: Robot, q: FloatArray) -> FloatArray:
     pose = forward(mass_tree(model), q)
     feet = [model.body(n).id - 1 for n in robot.feet]
     local = sole_corners(robot)
-    return np.stack(
-        [local[s] @ pose.rotation[f].T + pose.position[f] for s, f in enumerate(feet)]
-    )
+    return np.stack([local[s] @ pose.rotation[f].T + pose.position[f] for s, f in enumerate(feet)])
 
 
 def lowest_sole(robot: Robot, q: FloatArray) -> float:
@@ -176,9 +178,7 @@ def sole_heights(robot: Robot, frames: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
-def _lowest(
-    tree: MassTree, feet: IntArray, corners: FloatArray, frames: FloatArray
-) -> FloatArray:
+def _lowest(tree: MassTree, feet: IntArray, corners: FloatArray, frames: FloatArray) -> FloatArray:
     out = np.full((frames.shape[0], 2), np.inf)
     q = np.zeros(4 + frames.shape[1])
     for t in range(frames.shape[0]):
@@ -200,4 +200,4 @@ def _lowest(
 
 def sole_centre(robot: Robot, q: FloatArray) -> FloatArray:
     """Return the middle of both soles on the floor, shape (2,) [m]."""
-    return soles(robot, q)[..., :2].mean(axis=(0, 1))
+    return np.asarray(soles(robot, q)[..., :2].mean(axis=(0, 1)))

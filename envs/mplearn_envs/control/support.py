@@ -28,7 +28,7 @@ def convex_hull(points: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def _chain(points: FloatArray) -> FloatArray:
-    """Return the hull's corners by Andrew's monotone chain: sorted by x, then lower and upper half."""
+    """Andrew's monotone chain: sort by x, then make the lower and the upper half."""
     order = np.argsort(points[:, 1], kind="mergesort")
     order = order[np.argsort(points[order, 0], kind="mergesort")]
     n = points.shape[0]
@@ -60,8 +60,8 @@ def support_margin(hull: FloatArray, point: FloatArray) -> FloatArray:
         point: One or many points, shape (..., 2) [m].
 
     Returns:
-        Margins, shape (...) [m]. Outside, it is the distance to the most violated edge's line, which
-        at most equals the distance to the polygon.
+        Margins, shape (...) [m]. Outside, it is the distance to the most violated edge's line,
+        which at most equals the distance to the polygon.
     """
     points = np.ascontiguousarray(point, dtype=np.float64)
     return _margins(hull, points.reshape(-1, 2)).reshape(points.shape[:-1])

@@ -7,8 +7,7 @@ from numba import njit
 
 from mplearn.errors import FrameError, InvalidValueError
 from mplearn.recording import FloatArray
-
-from ..robot import Robot
+from mplearn_envs.robot import Robot
 
 
 @njit(cache=True)
@@ -58,7 +57,8 @@ class UpperBodyTracker:
         if wanted.shape != here.shape or not np.isfinite(wanted).all():
             raise FrameError(f"wanted positions must be {here.shape[0]} finite values")
         wanted = np.clip(wanted, self.limits[:, 0], self.limits[:, 1])
-        return limit_velocity(wanted[None], here, self.velocity * self.period_s)[0]
+        path: FloatArray = limit_velocity(wanted[None], here, self.velocity * self.period_s)
+        return np.asarray(path[0])
 
 
 def servo_commands(robot: Robot, q: FloatArray, dq: FloatArray) -> FloatArray:

@@ -41,7 +41,8 @@ class Stance(NamedTuple):
         thighs: Bodies whose origins are the hips, shape (2,).
         foot_position: Where the feet stand, shape (2, 3) [m].
         foot_rotation: How they stand, shape (2, 3, 3).
-        reach: Longest distance from hip to ankle that the straight-knee guard allows, shape (2,) [m].
+        reach: Longest distance from hip to ankle that the straight-knee guard allows, shape (2,)
+            [m].
         cog: Where the horizontal COG shall stay, shape (2,) [m].
     """
 
@@ -58,7 +59,7 @@ class Stance(NamedTuple):
 
 @njit(cache=True)
 def solve_damped(jacobian: FloatArray, rows: FloatArray, damping: float) -> FloatArray:
-    """Return argmin |J x - rows|^2 + damping^2 |x|^2 by Cholesky's factors of the normal equations."""
+    """Return argmin |J x - rows|^2 + damping^2 |x|^2 (normal equations, Cholesky)."""
     m, n = jacobian.shape
     a = np.empty((n, n))
     x = np.empty(n)
@@ -139,7 +140,7 @@ def add_leg_columns(tree: MassTree, stance: Stance, pose: Pose, out: FloatArray)
 
 @njit(cache=True)
 def errors(stance: Stance, pose: Pose, height: float, orientation: FloatArray) -> FloatArray:
-    """Return wanted minus actual of the 18 rows [m, rad], the height guarded against straight knees.
+    """Return wanted minus actual of the 18 rows [m, rad], guarded against straight knees.
 
     Straight knees are the failure of leg kinematics: near them the legs cannot make the base rise
     and no small rate mends an error. So the wanted height bends smoothly off (over 1 cm) below the
@@ -173,7 +174,7 @@ def rates(tree: MassTree, stance: Stance, pose: Pose, rows: FloatArray) -> Float
 
 @njit(cache=True)
 def advance(stance: Stance, q: FloatArray, step: FloatArray) -> FloatArray:
-    """Return the posture ``q`` moved by base displacement and leg angles, within the legs' limits."""
+    """Return the posture moved by base displacement and leg angles, within the legs' limits."""
     out = q.copy()
     out[:3] += step[:3]
     out[3:7] = rotate_quaternion(q[3:7], step[3:6])

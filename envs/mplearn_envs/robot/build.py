@@ -1,6 +1,6 @@
-"""Build the robots' simulation models: ``python -m mplearn_envs.robot.build`` writes ``models/*.xml``.
+"""Build the robots' simulation models: ``python -m mplearn_envs.robot.build``.
 
-Only this module needs dm_control; what it writes is committed and loaded as text.
+It writes ``models/*.xml``, which is committed and loaded as text: only here dm_control is needed.
 """
 
 from __future__ import annotations
@@ -39,28 +39,63 @@ def _add_surroundings(root: Any) -> None:
     root.visual.quality.shadowsize = 2048
     root.visual.map.znear = 0.05
     root.asset.add(
-        "texture", type="skybox", builtin="gradient", rgb1=[0.78, 0.85, 0.93], rgb2=[0.96, 0.97, 0.98],
-        width=64, height=384,
-    )  # fmt: skip
+        "texture",
+        type="skybox",
+        builtin="gradient",
+        rgb1=[0.78, 0.85, 0.93],
+        rgb2=[0.96, 0.97, 0.98],
+        width=64,
+        height=384,
+    )
     root.asset.add(
-        "texture", name="tiles", type="2d", builtin="checker", mark="edge", width=300, height=300,
-        rgb1=[0.86, 0.87, 0.88], rgb2=[0.82, 0.83, 0.85], markrgb=[0.74, 0.75, 0.77],
-    )  # fmt: skip
+        "texture",
+        name="tiles",
+        type="2d",
+        builtin="checker",
+        mark="edge",
+        width=300,
+        height=300,
+        rgb1=[0.86, 0.87, 0.88],
+        rgb2=[0.82, 0.83, 0.85],
+        markrgb=[0.74, 0.75, 0.77],
+    )
     root.asset.add(
-        "material", name="floor", texture="tiles", texrepeat=[1, 1], texuniform=True, reflectance=0.08
+        "material",
+        name="floor",
+        texture="tiles",
+        texrepeat=[1, 1],
+        texuniform=True,
+        reflectance=0.08,
     )
     root.worldbody.add(
-        "geom", name="floor", type="plane", size=[0, 0, 1], material="floor", contype=1, conaffinity=1,
-        condim=3, friction=[1.0, 0.005, 0.0001], group=0,
-    )  # fmt: skip
+        "geom",
+        name="floor",
+        type="plane",
+        size=[0, 0, 1],
+        material="floor",
+        contype=1,
+        conaffinity=1,
+        condim=3,
+        friction=[1.0, 0.005, 0.0001],
+        group=0,
+    )
     root.worldbody.add(
-        "light", name="sun", pos=[1.5, 1.5, 4.0], dir=[-0.35, -0.3, -0.9], directional=True,
-        diffuse=[0.55, 0.54, 0.52], specular=[0.3, 0.3, 0.3], castshadow=True,
-    )  # fmt: skip
+        "light",
+        name="sun",
+        pos=[1.5, 1.5, 4.0],
+        dir=[-0.35, -0.3, -0.9],
+        directional=True,
+        diffuse=[0.55, 0.54, 0.52],
+        specular=[0.3, 0.3, 0.3],
+        castshadow=True,
+    )
     root.worldbody.add(
-        "camera", name="front", pos=[3.0, 1.1, 1.25], xyaxes=[-0.345, 0.939, 0, -0.12, -0.044, 0.992],
+        "camera",
+        name="front",
+        pos=[3.0, 1.1, 1.25],
+        xyaxes=[-0.345, 0.939, 0, -0.12, -0.044, 0.992],
         fovy=42,
-    )  # fmt: skip
+    )
 
 
 def _add_servos(root: Any) -> None:

@@ -41,8 +41,8 @@ class JointGroup:
 class Robot:
     """A standing robot: its simulation model and the roles of its joints.
 
-    The model has one free base and hinges; every hinge has one position servo of the same name. Roles
-    are told by names: the hinges of ``legs`` balance, all others track.
+    The model has one free base and hinges; every hinge has one position servo of the same name.
+    Roles are told by names: the hinges of ``legs`` balance, all others track.
 
     Attributes:
         name: Name of the body whose features the robot can perform.
@@ -51,7 +51,8 @@ class Robot:
         legs: Joints of the left and of the right leg, from hip to foot.
         knees: The left and the right knee; they count positive when flexed.
         thighs: Bodies whose origin is the hip joint, left and right.
-        feet: Bodies of the feet, whose origin is the ankle; the sole is geom ``sole_l``, ``sole_r``.
+        feet: Bodies of the feet, whose origin is the ankle; the sole is geom ``sole_l``,
+            ``sole_r``.
         stance_knee_rad: Knee flexion when standing [rad].
         guard_knee_rad: The knees are never made straighter than about this [rad].
         base_velocity: Velocity limits of base height [m/s], roll and pitch [rad/s].

@@ -1,10 +1,10 @@
 """The humanoid of the experiments: what drives the body that `mplearn.body.robot` draws.
 
-[Kulic2012] (4.2) gives its degrees of freedom only. Assumed here: position servos on every joint with
-the gains and torque limits below, rotor inertias as in the body's model, and velocity limits of a
-strong human-sized machine. Gains follow one rule: stiff against gravity (an ankle must exceed m g h =
-460 N m/rad by far) and about critically damped. Hands and toes hold their rest shape rigidly: the
-eight joints "were not used during these experiments".
+[Kulic2012] (4.2) gives its degrees of freedom only. Assumed here: position servos on every joint
+with the gains and torque limits below, rotor inertias as in the body's model, and velocity limits
+of a strong human-sized machine. Gains follow one rule: stiff against gravity (an ankle must exceed
+m g h = 460 N m/rad by far) and about critically damped. Hands and toes hold their rest shape
+rigidly: the eight joints "were not used during these experiments".
 """
 
 from __future__ import annotations

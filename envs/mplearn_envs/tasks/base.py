@@ -6,8 +6,7 @@ from abc import ABC, abstractmethod
 from typing import NamedTuple
 
 from mplearn.recording import FloatArray
-
-from ..simulation import Performance
+from mplearn_envs.simulation import Performance
 
 
 class Choice(NamedTuple):
@@ -29,8 +28,8 @@ class Choice(NamedTuple):
 class Task(ABC):
     """A reward.
 
-    A macro step pays the bonuses at its start, and the rates integrated over its duration T with the
-    discount gamma per second: R = sum of bonuses + integral over [0, T] of gamma^t rates(t) dt.
+    A macro step pays the bonuses at its start, and the rates integrated over its duration T with
+    the discount gamma per second: R = sum of bonuses + integral over [0, T] of gamma^t rates(t) dt.
     Bonuses of a fall are discounted by gamma^T.
     """
 

@@ -1,4 +1,4 @@
-"""Move freely: stay upright, do what the demonstrator would likely do, and do not repeat yourself."""
+"""Move freely: stay upright, do what is likely, and do not repeat yourself."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mplearn.recording import FloatArray
+from mplearn_envs.simulation import Performance
 
-from ..simulation import Performance
 from .base import Choice, Task
 
 
