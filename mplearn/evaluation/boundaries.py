@@ -1,7 +1,7 @@
 """How well the boundaries of a segmentation agree with the truth.
 
-A boundary lies between two motions. Where they follow each other it is an instant; where a pause lies
-between them it is the whole pause, and any instant within is right. Truth and segmentation are
+A boundary lies between two motions. Where they follow each other it is an instant; where a pause
+lies between them it is the whole pause, and any instant within is right. Truth and segmentation are
 treated alike: a pause of the truth is a gap between its labels, one of the segmentation a segment
 with ``still=True``. Boundaries are matched one to one, as many as possible within a tolerance.
 """
@@ -24,7 +24,7 @@ class Boundary:
 
     Attributes:
         start: Frame at which the motion before it ends.
-        end: Frame at which the motion after it starts; equal to ``start`` where no pause lies between.
+        end: Frame at which the motion after it starts; ``start`` again where no pause lies between.
         delay_frames: How long after ``start`` this was decided.
     """
 

@@ -59,7 +59,7 @@ def without_gaps(frames: FloatArray, name: str = "") -> FloatArray:
         return frames
     if missing.all(axis=0).any():
         raise RecordingError(
-            f"recording {name!r}: column {int(np.argmax(missing.all(axis=0)))} is missing throughout"
+            f"recording {name!r}: column {np.argmax(missing.all(axis=0))} is missing throughout"
         )
     filled = frames.copy()
     at = np.arange(len(frames))
@@ -130,9 +130,9 @@ def find_limb(recording: Recording, frames: FloatArray) -> Limb:
         return Limb("", "body")
     points = frames.reshape(len(frames), -1, 3)
     for part, stem in _MARKERS.items():
-        ends = [_marker(recording, points, f"{side}{stem}") for side in "LR"]
-        if ends[0] is not None and ends[1] is not None:
-            side = _farther(_spread(ends[0]), _spread(ends[1]), least=TRAVEL_M)
+        left_end, right_end = (_marker(recording, points, f"{side}{stem}") for side in "LR")
+        if left_end is not None and right_end is not None:
+            side = _farther(_spread(left_end), _spread(right_end), least=TRAVEL_M)
             if side:
                 return Limb(side, part)
     return Limb(_leaned_to(recording, points), "body")
@@ -141,8 +141,8 @@ def find_limb(recording: Recording, frames: FloatArray) -> Limb:
 def split_repetitions(takes: Sequence[Recording]) -> tuple[Recording, ...]:
     """Label the primitives inside the repetitions of a person's takes.
 
-    The first repetition of a take is dropped: it starts in the middle of a motion. The others become
-    two primitives, ``"m02L-out"`` and ``"m02L-back"`` for class ``m02`` done on the left.
+    The first repetition of a take is dropped: it starts in the middle of a motion. The others are
+    two primitives each, ``"m02L-out"`` and ``"m02L-back"`` for class ``m02`` done on the left.
 
     Args:
         takes: Recordings of one person whose labels are repetitions, markers or features.
@@ -232,12 +232,13 @@ def _marker(recording: Recording, points: FloatArray, name: str) -> FloatArray |
 
 def _leaned_to(recording: Recording, points: FloatArray) -> str:
     """Return the side of the foot that the pelvis moves over, and away from the other's."""
-    feet = [_marker(recording, points, name) for name in ("LANK", "RANK")]
-    hips = [_marker(recording, points, name) for name in ("LASI", "RASI")]
-    if any(part is None for part in (*feet, *hips)):
+    left, right, hip_l, hip_r = (
+        _marker(recording, points, name) for name in ("LANK", "RANK", "LASI", "RASI")
+    )
+    if left is None or right is None or hip_l is None or hip_r is None:
         return ""
-    left, right, pelvis = feet[0], feet[1], 0.5 * (hips[0] + hips[1])  # type: ignore[operator]
-    between = (left - right)[:, :2]  # type: ignore[operator]
+    pelvis = 0.5 * (hip_l + hip_r)
+    between = (left - right)[:, :2]
     apart = np.maximum(np.linalg.norm(between, axis=1), 1e-6)
     place = ((pelvis - right)[:, :2] * between).sum(axis=1) / apart**2  # 0 over right, 1 over left
     low, high = np.percentile(place, [5, 95])

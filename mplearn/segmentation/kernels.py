@@ -51,7 +51,7 @@ def smooth_velocity(frame: FloatArray, c: FloatArray, memory: FloatArray, first:
         frame: The new measurement, shape (D,).
         c: `LowPass.coefficients`.
         memory: Two delay lines, the last filtered frame and the velocity, shape (4, D).
-        first: Whether this is the first frame; the filter then starts as if it had always been there.
+        first: Whether this is the first frame; the filter starts as if it had always been there.
     """
     b0, b1, b2, a1, a2, rate = c[0], c[1], c[2], c[3], c[4], c[5]
     total = 0.0

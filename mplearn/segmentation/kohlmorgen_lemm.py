@@ -1,14 +1,14 @@
 """Kohlmorgen-Lemm segmentation: windows of the stream as states of a hidden Markov model.
 
 The distance between windows is the integrated square error of their densities (`windows`); the
-cheapest sequence of states is found as the windows come in (`viterbi`), and every change of state is
-a candidate for a boundary. [Kulic2012], section 2.1; [KohlmorgenLemm2001]; first in, first out after
-[Janus2006].
+cheapest sequence of states is found as the windows come in (`viterbi`), and every change of state
+is a candidate for a boundary. [Kulic2012], section 2.1; [KohlmorgenLemm2001]; first in, first out
+after [Janus2006].
 
 What the densities are taken over decides what is found. Over *postures*, as the paper has it, the
-distribution changes most in the middle of a movement. Over the *direction of motion*, a unit vector,
-it changes where people see a boundary: at the turn. There a change of state is taken as evidence,
-and the boundary is set, and confirmed, by the minimum of the speed.
+distribution changes most in the middle of a movement. Over the *direction of motion*, a unit
+vector, it changes where people see a boundary: at the turn. There a change of state is taken as
+evidence, and the boundary is set, and confirmed, by the minimum of the speed.
 """
 
 from __future__ import annotations
@@ -174,7 +174,7 @@ class KohlmorgenLemm(SpeedSegmenter):
         self._arrays.update(path_arrays(size))
         self._arrays["history"] = np.zeros((span, self.n_channels))
         self._arrays["speeds"] = np.zeros(speeds)
-        self._arrays["spread"] = np.zeros(3)  # running mean, mean square; the sigma in use
+        self._arrays["spread"] = np.zeros(3)  # running mean, mean root; the sigma in use
         self._arrays["matrix"] = np.zeros((size, size) if self.config.exact else (1, 1))
 
     def _step(self, frame: FloatArray) -> int:

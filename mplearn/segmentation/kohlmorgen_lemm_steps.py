@@ -1,4 +1,4 @@
-"""The compiled steps of Kohlmorgen-Lemm segmentation, over directions of motion and over postures."""
+"""The compiled steps of Kohlmorgen-Lemm segmentation, over directions and over postures."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def step_direction(
 def _update_sigma(q: Any, t: int, squared: FloatArray, spread: FloatArray) -> bool:
     """Take point t into the running distance to nearest neighbours; True if sigma has to change.
 
-    The running distance is a contraharmonic mean, which pauses hardly move.
+    The running distance is averaged as `running_speed` is, so that pauses hardly lower it.
     """
     size = squared.shape[0]
     known = min(t, size - 1)
@@ -109,12 +109,14 @@ def _update_sigma(q: Any, t: int, squared: FloatArray, spread: FloatArray) -> bo
     for i in range(n):
         mean += math.sqrt(nearest[i])
     mean /= n
+    if spread[2] > 0.0:
+        mean = min(mean, 20.0 * spread[2] / q.sigma)  # a jump of the signal is no spread
     weight = max(q.forget, 1.0 / t)
     spread[0] += weight * (mean - spread[0])
-    spread[1] += weight * (mean * mean - spread[1])
-    if spread[0] <= 0.0:
+    spread[1] += weight * (math.sqrt(mean) - spread[1])
+    if spread[1] <= 0.0:
         return False
-    wanted = q.sigma * spread[1] / spread[0]
+    wanted = q.sigma * (spread[0] / spread[1]) ** 2
     if spread[2] > 0.0 and 0.8 * spread[2] < wanted < 1.25 * spread[2]:
         return False
     spread[2] = wanted
@@ -199,4 +201,4 @@ def _certainty(t: int, change: int, q: Any, path: Any) -> float:
     for s in range(_oldest(t, q.window, size), t + 1):
         if entered[s % size] < change:
             without = min(without, costs[s % size])
-    return min(1.0, max(0.0, (without - best_costs[t % size]) / q.cost))
+    return float(min(1.0, max(0.0, (without - best_costs[t % size]) / q.cost)))

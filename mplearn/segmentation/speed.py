@@ -1,9 +1,9 @@
 """Rests and reversals of a stream, found in its speed as it arrives.
 
-One state machine over the speed of the whole body. While something moves, it looks for a reversal (a
-local minimum far below the peaks on both sides) or a pause (a low speed that lasts); while nothing
-moves, for the rise that ends the pause. What is low is measured against the running speed of the
-moving part, so that the unit of the channels does not matter.
+One state machine over the speed of the whole body. While something moves, it looks for a reversal
+(a local minimum far below the peaks on both sides) or a pause (a low speed that lasts); while
+nothing moves, for the rise that ends the pause. What is low is measured against the running speed
+of the moving part, so that the unit of the channels does not matter.
 """
 
 from __future__ import annotations
@@ -147,9 +147,9 @@ def _watch_motion(m: Any, p: Any, s: float, low: float, hysteresis: float, out: 
     elif s < m.valley:
         m.valley = s
         m.valley_frame = t
-    if s >= low:
+    if s >= 1.5 * low:
         m.dip_frame = -1
-    elif m.dip_frame < 0:
+    elif s < low and m.dip_frame < 0:
         m.dip_frame = t
     n = 0
     if m.dip_frame >= 0 and t - m.dip_frame >= p.still:
@@ -176,14 +176,14 @@ def _watch_pause(m: Any, p: Any, s: float, low: float, out: FloatArray) -> int:
     t = m.frames - 1
     if m.mode == OPENING:  # no motion has been seen yet: the rest itself is the only measure
         low = 2.0 * m.rest
-    if s < low or m.mode == OPENING:
+    if s <= low or m.mode == OPENING:
         m.rest_frames += 1
         m.rest += (s - m.rest) / m.rest_frames
-    if s < low:
+    if s <= low:
         m.dip_frame = -1
     elif m.dip_frame < 0:
         m.dip_frame = t
-    if s < max(2.0 * low, 4.0 * m.rest) or m.dip_frame - m.start < p.still:
+    if s <= max(2.0 * low, 4.0 * m.rest) or m.dip_frame - m.start < p.still:
         return 0
     n = close(m, p, m.dip_frame, 1.0 - low / s, True, out)
     m.mode = MOVING

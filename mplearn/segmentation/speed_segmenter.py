@@ -1,4 +1,4 @@
-"""What the segmenters that watch the speed have in common: one compiled step over a set of arrays."""
+"""What segmenters that watch the speed share: one compiled step over a set of arrays."""
 
 from __future__ import annotations
 

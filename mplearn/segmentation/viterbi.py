@@ -1,7 +1,7 @@
-"""The cheapest sequence of window states for a stream of windows: on-line, or exactly over the FIFO.
+"""The cheapest sequence of window states: on-line, or exactly over the FIFO.
 
-Every window is a state. Being in state s while window t is observed costs d(s, t); a change of state
-costs C. With eq. 3-4 of [Kulic2012], C = 2 zeta^2 ln k; nothing else of zeta and k matters.
+Every window is a state. Being in state s while window t is observed costs d(s, t); a change of
+state costs C. With eq. 3-4 of [Kulic2012], C = 2 zeta^2 ln k; nothing else of zeta and k matters.
 Times and states share one ring of P slots: time t, and the state born at t, lie at ``t % P``.
 """
 

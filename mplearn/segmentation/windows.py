@@ -1,4 +1,4 @@
-"""Distances between sliding windows of data, each seen as a Parzen density, kept up to date cheaply.
+"""Distances between sliding windows of data, each seen as a Parzen density, kept up to date.
 
 The integrated square error between two densities of Gaussian kernels, eq. 1-2 of [Kulic2012], has
 a closed form. With k(x, y) = exp(-|x - y|^2 / 4 sigma^2) and G(s, t) the sum of k over all pairs of
