@@ -117,10 +117,12 @@ def test_the_path_to_a_goal_is_the_best_of_all_paths(prefer, seed):
 
 
 def test_a_goal_out_of_reach_is_said():
-    graph, rows = graph_of([[0, 1, 0], [1, 0, 0], [1, 0, 0]])
-    with pytest.raises(NoPathError, match=r"\[1\] leads to 2"):
-        PathToGoal(graph, goal=2).act(None, make_info(rows[0]))
-    with pytest.raises(UnknownPrimitiveError, match=r"goal 7 .* \[0, 1, 2\]"):
+    graph, rows = graph_of([[0, 1, 1, 0], [1, 0, 0, 0], [1, 0, 0, 0], [1, 0, 0, 0]])
+    policy = PathToGoal(graph, goal=3)
+    with pytest.raises(NoPathError, match=r"\[1, 2\] leads to 3"):
+        policy.act(None, make_info(rows[0]))
+    assert policy.act(None, make_info(rows[1])) == 0  # there is no choice
+    with pytest.raises(UnknownPrimitiveError, match=r"goal 7 .* \[0, 1, 2, 3\]"):
         PathToGoal(graph, goal=7)
     with pytest.raises(InvalidValueError, match="'cheap'"):
         PathToGoal(graph, goal=1, prefer="cheap")

@@ -69,11 +69,12 @@ def run(args: argparse.Namespace) -> None:
         f"{result.falls} falls"
     )
     if args.video:
-        from mplearn_agents.film import film
+        from mplearn_agents.film import film, with_captions
         from mplearn_agents.video import write_video
 
         robot = env.unwrapped.robot  # type: ignore[attr-defined]
         names = [step.name for step in result.steps]
-        n_pictures = write_video(args.video, film(result, robot.xml, names), result.rate_hz)
+        pictures = with_captions(film(result, robot.xml), result, names)
+        n_pictures = write_video(args.video, pictures, result.rate_hz)
         print(f"film of {n_pictures} pictures written to {args.video}")
     env.close()

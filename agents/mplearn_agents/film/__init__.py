@@ -4,4 +4,6 @@ from .backend import choose_backend as choose_backend
 from .captions import captioned as captioned
 from .duet import accompany as accompany
 from .film import film as film
+from .film import middle_pictures as middle_pictures
+from .film import with_captions as with_captions
 from .stage import Stage as Stage

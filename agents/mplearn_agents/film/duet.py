@@ -21,7 +21,7 @@ def accompany(
     truth: Sequence[LabelledSegment],
     steps: Sequence[tuple[str, int]],
 ) -> FloatArray:
-    """Return postures of a person who performs the steps, taken from her own demonstrations.
+    """Return postures of a person who performs the steps, taken from the demonstrations.
 
     Of all demonstrations of a step's class, the one that starts nearest to where the last step
     ended is shown, stretched to the step's length. Where a class was never demonstrated, the
@@ -29,7 +29,7 @@ def accompany(
 
     Args:
         body: The person.
-        postures: What she did, shape (T, 7 + n), in MuJoCo's qpos layout.
+        postures: What the person did, shape (T, 7 + n), in MuJoCo's qpos layout.
         truth: Which class was performed when, in frames of ``postures``.
         steps: The class and the number of pictures of each step.
 
@@ -63,11 +63,17 @@ def _stretched(frames: FloatArray, n: int) -> FloatArray:
 
 
 def _centred(body: Body, frames: FloatArray) -> FloatArray:
-    """Move a motion so that its first posture has the feet about the origin."""
-    feet = [body.tree.body(f"foot_{side}") for side in "lr"]
+    """Move a motion so that its first posture stands about the origin and looks along x."""
+    left, right = (body.tree.body(f"foot_{side}") for side in "lr")
     places, _ = body.tree.forward(frames[0])
+    across = places[left, :2] - places[right, :2]
+    half = 0.5 * np.arctan2(across[0], across[1])  # of the turn that brings the left foot to +y
+    c, s = np.cos(2 * half), np.sin(2 * half)
     moved = frames.copy()
-    moved[:, :2] -= places[feet, :2].mean(axis=0)
+    moved[:, :2] = (frames[:, :2] - places[[left, right], :2].mean(axis=0)) @ [[c, s], [-s, c]]
+    w, x, y, z = frames[:, 3:7].T
+    c, s = np.cos(half), np.sin(half)
+    moved[:, 3:7] = np.stack([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w], axis=1)
     return moved
 
 

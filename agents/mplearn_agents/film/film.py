@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,16 +21,14 @@ if TYPE_CHECKING:
 def film(
     walk: WalkResult,
     robot_xml: str,
-    names: Sequence[str],
     person: tuple[Body, FloatArray] | None = None,
-    size: tuple[int, int] = (640, 440),
+    size: tuple[int, int] = (640, 420),
 ) -> Iterator[NDArray[np.uint8]]:
-    """Yield a captioned picture, shape (H, W, 3), for each recorded posture of a walk.
+    """Yield a picture, shape (H, W, 3), for each recorded posture of a walk.
 
     Args:
         walk: A walk with postures.
         robot_xml: The robot's model.
-        names: What each step of the walk is called.
         person: A body and its posture for each picture, shape (F, 7 + n), to stand beside.
         size: Width and height of the pictures [pixels].
 
@@ -40,7 +38,30 @@ def film(
     bodies = [robot_xml] if person is None else [robot_xml, person[0].xml]
     with Stage(bodies, size) as stage:
         for k, posture in enumerate(walk.postures):
-            postures = [posture] if person is None else [posture, person[1][k]]
-            step = int(walk.step_of[k])
-            note = f"{step + 1} / {len(walk.steps)}   {(k + 1) / walk.rate_hz:.1f} s"
-            yield captioned(stage.picture(postures), names[step], note)
+            yield stage.picture([posture] if person is None else [posture, person[1][k]])
+
+
+def with_captions(
+    pictures: Iterable[NDArray[np.uint8]], walk: WalkResult, names: Sequence[str]
+) -> Iterator[NDArray[np.uint8]]:
+    """Write what is performed, and when, on the pictures of a film.
+
+    Args:
+        pictures: One for each recorded posture of the walk.
+        walk: The walk.
+        names: What each of its steps is called.
+    """
+    for k, picture in enumerate(pictures):
+        step = int(walk.step_of[k])
+        note = f"{step + 1} / {len(walk.steps)}   {(k + 1) / walk.rate_hz:.1f} s"
+        yield captioned(picture, names[step], note)
+
+
+def middle_pictures(walk: WalkResult) -> dict[int, int]:
+    """Return, for each step that performs a primitive, the index of the picture in its middle."""
+    middles = {}
+    for k, step in enumerate(walk.steps):
+        shown = np.flatnonzero(walk.step_of == k)
+        if step.primitive is not None and len(shown):
+            middles[k] = int(shown[int(0.55 * len(shown))])
+    return middles

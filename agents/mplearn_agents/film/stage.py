@@ -42,8 +42,8 @@ class Stage:
         self._starts = np.flatnonzero(self._model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
         self._starts = self._model.jnt_qposadr[self._starts]
         self._camera = mujoco.MjvCamera()
-        self._camera.lookat[:] = (0.0, 0.0, 1.02)
-        self._camera.distance = 3.25
+        self._camera.lookat[:] = (0.0, 0.0, 1.0)
+        self._camera.distance = 3.0
         self._camera.azimuth, self._camera.elevation = 170.0, -9.0
         try:
             self._renderer = mujoco.Renderer(self._model, height=size[1], width=size[0])
@@ -112,4 +112,6 @@ def _scene(bodies: Sequence[str]) -> mujoco.MjModel:
                 contype=0,
                 conaffinity=0,
             )
-    return scene.compile()
+    model = scene.compile()
+    model.vis.quality.numslices, model.vis.quality.numstacks = 20, 10  # a third faster than 28, 16
+    return model

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from mplearn.library import PrimitiveLibrary
-    from mplearn.recording import FloatArray
 
 CAPTIONS = {
     "curves": (
@@ -46,7 +45,6 @@ _PANELS = 12
 def library_figures(
     library: PrimitiveLibrary,
     labels: Mapping[int, str],
-    exemplars: Mapping[int, Sequence[FloatArray]] | None = None,
     folder: Path | None = None,
 ) -> dict[str, Shown]:
     """Draw the curves, the tree and the graph.
@@ -54,7 +52,6 @@ def library_figures(
     Args:
         library: What was learned.
         labels: What each primitive is called in the figures.
-        exemplars: More demonstrations of a primitive than the library keeps, each (L, D).
         folder: Where PNG files of the figures go; None writes none.
     """
     if not len(library):
@@ -64,7 +61,7 @@ def library_figures(
         PrimitiveCurves(
             title=labels[primitive.id],
             channels=library.channels,
-            exemplars=tuple((exemplars or {}).get(primitive.id) or primitive.exemplars),
+            exemplars=primitive.exemplars,
             generated=library.generate([primitive.id]).frames,
             duration_s=primitive.mean_duration_s,
         )
