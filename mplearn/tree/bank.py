@@ -51,6 +51,7 @@ class ExemplarBank:
         self.n_channels = n_channels
         self.floor = np.array(floor, dtype=np.float64)
         self._weights = form.weights(config.form)
+        self._roots = np.sqrt(self._weights)
         self._slots: dict[int, int] = {}
         self._free: list[int] = []
         self._rows = _empty(config, n_channels, 0)
@@ -111,11 +112,17 @@ class ExemplarBank:
 
     def profile(self, exemplar: Exemplar) -> FloatArray:
         """Return the points times the root of their weights, shape (D * P,); 0 where missing."""
-        return np.asarray((np.nan_to_num(exemplar.columns) * np.sqrt(self._weights)).ravel())
+        columns = exemplar.columns
+        if np.isnan(columns.sum()):
+            columns = np.nan_to_num(columns)
+        return np.asarray((columns * self._roots).ravel())
 
     def mean_profile(self, numbers: Sequence[int]) -> FloatArray:
         """Return the mean profile of some exemplars, shape (D * P,)."""
-        return np.asarray(np.mean([self.profile(self[number]) for number in numbers], axis=0))
+        columns = self._rows.columns[self._slots_of(numbers)].mean(axis=0)
+        if np.isnan(columns.sum()):
+            columns = np.nan_to_num(self._rows.columns[self._slots_of(numbers)]).mean(axis=0)
+        return np.asarray((columns * self._roots).ravel())
 
     def distances(self, exemplar: Exemplar, others: Sequence[int]) -> FloatArray:
         """Return the distance from an exemplar to others of the bank, shape (k,).

@@ -23,7 +23,7 @@ class FormConfig:
     """
 
     n_points: int = 16
-    head: float = 0.3
+    head: float = 0.2
     ramp: float = 0.2
     centring: float = 0.5
 
@@ -74,8 +74,8 @@ class TreeConfig:
     cutoff: float = 2.0
     local: bool = False
     min_exemplars: int = 4
-    reach: float = 1.3
-    reach_cap: float = 1.5
+    reach: float = 1.5
+    reach_cap: float = 1.75
     n_nearest: int = 3
     split_ratio: float = 2.0
     n_candidates: int = 6

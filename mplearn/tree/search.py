@@ -79,9 +79,8 @@ class NodeIndex:
         matches = []
         first = 0
         for k, group in zip(places, members, strict=True):
-            nearest = np.sort(row[first : first + len(group)])[: self.config.n_nearest]
+            distance = float(mean_nearest(row[first : first + len(group)], self.config.n_nearest))
             first += len(group)
-            distance = float(nearest.mean())
             ratio = distance / max(float(radii[k]), 1e-12)
             matches.append(Match(int(self.ids[k]), distance ** (1 / self.config.power), ratio))
         return sorted(matches, key=lambda match: (match.ratio, match.node))
@@ -124,3 +123,8 @@ class NodeIndex:
         if means:
             index.means = np.stack(means)
         return index
+
+
+def mean_nearest(distances: FloatArray, n_nearest: int) -> FloatArray:
+    """Return the mean of the smallest distances along the last axis, (..., k) -> (...)."""
+    return np.asarray(np.sort(distances, axis=-1)[..., :n_nearest].mean(axis=-1))

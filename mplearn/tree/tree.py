@@ -19,7 +19,7 @@ from .config import TreeConfig
 from .node import Node
 from .placement import ROOT, Placement, Split
 from .recogniser import Recogniser, refusal
-from .search import NodeIndex
+from .search import NodeIndex, mean_nearest
 from .spread import ChannelSpread, DistanceSample, moments
 
 _SHORTEST_S = 0.1
@@ -210,11 +210,13 @@ class PrimitiveTree:
             if not groups:
                 return tuple(born), (), tuple(moved)
             members = [node.members[loose[i]] for i in groups[0]]
+            rest = np.delete(np.arange(len(node.members)), [loose[i] for i in groups[0]])
+            apart = node.matrix[np.ix_(rest, [loose[i] for i in groups[0]])]
             child = self._child(node, members)
             born.append(child.id)
             moved += [(number, child.id) for number in members]
             if node.id == ROOT and not self.config.local:
-                moved += self._reassign()
+                moved += self._reassign(child, mean_nearest(apart, self.config.n_nearest))
 
     def _child(self, parent: Node, members: Sequence[int]) -> Node:
         """Form a node below another from some of its exemplars."""
@@ -236,17 +238,14 @@ class PrimitiveTree:
         self._reindex()
         return child
 
-    def _reassign(self) -> list[tuple[int, int]]:
-        """Move what waits in the root and now belongs to a leaf."""
+    def _reassign(self, leaf: Node, row: FloatArray) -> list[tuple[int, int]]:
+        """Move what waits in the root, ``row`` from a leaf that was just formed, into it."""
         root = self._nodes[ROOT]
-        moved = []
-        for number in list(root.members):
-            matches = self._index.search(self._bank[number], self._bank)
-            if matches and matches[0].ratio <= 1:
-                self._add(self._nodes[matches[0].node], number)
-                self._release(*root.remove([root.members.index(number)]))
-                moved.append((number, matches[0].node))
-        return moved
+        inside = [root.members[i] for i in np.flatnonzero(row <= self.radius(leaf.id))]
+        for number in inside:
+            self._add(leaf, number)
+            self._release(*root.remove([root.members.index(number)]))
+        return [(number, leaf.id) for number in inside]
 
     def _split(
         self, leaf: Node
