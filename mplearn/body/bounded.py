@@ -17,7 +17,10 @@ def bounded_solve(
     free: BoolArray,
     step: FloatArray,
 ) -> None:
-    """Minimise the quadratic model between bounds, fixing what runs into one, until nothing does.
+    """Minimise the quadratic model between bounds by an active set.
+
+    What runs into a bound is fixed there. Once nothing does, what a bound holds against its own
+    slope is released, each unknown at most twice, so that the search ends.
 
     Args:
         normal: Symmetric positive definite, its lower triangle, shape (d, d).
@@ -29,6 +32,7 @@ def bounded_solve(
     """
     d = len(gradient)
     fixed = ~free
+    releases = np.zeros(d, dtype=np.int64)
     step[:] = 0.0
     factor = np.empty_like(normal)
     solution = np.empty(d)
@@ -57,7 +61,19 @@ def bounded_solve(
                 fixed[i] = True
                 hit = True
         step[:] = solution
-        if not hit:
+        if hit:
+            continue
+        done = True
+        for i in range(d):
+            if fixed[i] and free[i] and releases[i] < 2:
+                slope = gradient[i]
+                for j in range(d):
+                    slope -= (normal[i, j] if j <= i else normal[j, i]) * step[j]
+                if (step[i] >= high[i] and slope < 0.0) or (step[i] <= low[i] and slope > 0.0):
+                    fixed[i] = False
+                    releases[i] += 1
+                    done = False
+        if done:
             return
 
 

@@ -9,9 +9,10 @@ import pytest
 from mplearn.body import PROPORTIONS, human_body, robot_body
 from mplearn.errors import BodyError
 
-HUMAN_JOINTS = (
-    "lumbar_pitch lumbar_roll lumbar_yaw thorax_pitch thorax_roll neck_pitch neck_roll neck_yaw"
-).split() + [
+HUMAN_JOINTS = [
+    *("lumbar_pitch", "lumbar_roll", "lumbar_yaw", "thorax_pitch", "thorax_roll"),
+    *("neck_pitch", "neck_roll", "neck_yaw"),
+] + [
     f"{name}_{side}"
     for names in (
         "clavicle_elevation clavicle_protraction shoulder_pitch shoulder_roll shoulder_yaw elbow "

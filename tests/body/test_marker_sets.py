@@ -8,11 +8,12 @@ from mplearn.body import find_marker_set, human_body, marker_set, robot_body
 from mplearn.body.marker_tables import TABLES
 from mplearn.errors import BodyError
 
-UI_PRMD = (
-    "LFHD RFHD LBHD RBHD C7 T10 CLAV STRN RBAK LSHO LUPA LELB LFRM LWRA LWRB LFIN RSHO RUPA RELB "
-    "RFRM RWRA RWRB RFIN LASI RASI LPSI RPSI LTHI LKNE LTIB LANK LHEE LTOE RTHI RKNE RTIB RANK "
-    "RHEE RTOE"
-).split()
+UI_PRMD = [
+    *("LFHD", "RFHD", "LBHD", "RBHD", "C7", "T10", "CLAV", "STRN", "RBAK", "LSHO"),
+    *("LUPA", "LELB", "LFRM", "LWRA", "LWRB", "LFIN", "RSHO", "RUPA", "RELB", "RFRM"),
+    *("RWRA", "RWRB", "RFIN", "LASI", "RASI", "LPSI", "RPSI", "LTHI", "LKNE", "LTIB"),
+    *("LANK", "LHEE", "LTOE", "RTHI", "RKNE", "RTIB", "RANK", "RHEE", "RTOE"),
+]
 
 
 def test_sizes_and_order():

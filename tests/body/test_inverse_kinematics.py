@@ -1,0 +1,274 @@
+"""Inverse kinematics: against scipy's optimum, on synthetic truth, and when markers go missing."""
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from mplearn.body import IKConfig, InverseKinematics, human_body, marker_set, robot_body
+from mplearn.body.bounded import bounded_solve, inverse_diagonal
+from mplearn.body.calibration import Calibration
+from mplearn.body.follower import follower
+from mplearn.body.gauss_newton import Linkage, solve_frame
+from mplearn.body.kinematics import integrate
+from mplearn.errors import BodyError, FrameError, InvalidValueError
+
+NAMES = marker_set("plug_in_gait39").names
+
+
+def smooth_motion(body, n_frames, rate_hz, seed, amplitude=0.25):
+    """Random smooth motion of all driven joints around standing, shape (T, 7 + n)."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(n_frames) / rate_hz
+    q = np.tile(body.rest, (n_frames, 1))
+    for j, (name, (low, high)) in enumerate(zip(body.joint_names, body.joint_limits, strict=True)):
+        if name in body.held:
+            continue
+        reach = amplitude * min(high - low, np.pi)
+        wave = sum(rng.normal() * np.sin(2 * np.pi * f * t + rng.uniform(0, 6)) for f in (0.2, 0.5))
+        q[:, 7 + j] = np.clip(0.3 * (low + high) / 2 + reach * wave / 2, 0.9 * low, 0.9 * high)
+    q[:, :2] += 0.2 * np.stack((np.sin(t), np.cos(0.7 * t)), axis=1)
+    q[:, 3:7] = Rotation.from_euler(
+        "ZYX", np.stack((0.8 * np.sin(0.5 * t), 0.2 * np.sin(t), 0.1 * np.cos(t)), axis=1)
+    ).as_quat(scalar_first=True)
+    return q
+
+
+def markers_of(body, postures, names=NAMES, set_name="plug_in_gait39"):
+    bodies, offsets = marker_set(set_name).select(names).attach(body.tree)
+    return np.array([body.tree.points(q, bodies, offsets) for q in postures])
+
+
+def turned_by(before, after):
+    """Rotation vector of the base from one posture to the other, in the base's own axes."""
+    first, second = (Rotation.from_quat(q[3:7], scalar_first=True) for q in (before, after))
+    return (first.inv() * second).as_rotvec()
+
+
+def known(body, posture, names=NAMES, **config):
+    """Inverse kinematics of a body whose sizes and marker places are known exactly."""
+    ik = InverseKinematics(body, names, config=IKConfig(**config))
+    seen = follower(body)
+    start = np.zeros(len(seen.tree.rest))
+    start[seen.own] = posture
+    offsets = marker_set("plug_in_gait39").select(names).attach(seen.tree)[1]
+    ik.load_state(
+        {
+            "calibration": Calibration(
+                factors=np.ones_like(seen.tree.offset),
+                offsets=offsets,
+                scale=1.0,
+                floor_m=0.0,
+                height_m=body.height_m,
+                residual_m=0.0,
+                posture=start,
+            ).state(),
+            "posture": start,
+            "variance": np.full(seen.tree.n_dofs, 0.01),
+            "fresh": False,
+        }
+    )
+    return ik
+
+
+@pytest.mark.parametrize("body", [human_body(), robot_body()], ids=["human", "robot"])
+@pytest.mark.parametrize("outlier_m", [np.inf, 0.05])
+def test_a_frame_is_solved_to_scipys_optimum(body, outlier_m):
+    rng = np.random.default_rng(5)
+    tree = body.tree
+    bodies, offsets = marker_set("plug_in_gait39").attach(follower(body).tree)
+    tree = follower(body).tree
+    free = follower(body).free
+    truth = tree.rest
+    truth[7:] = rng.uniform(*(0.4 * tree.limits.T))
+    truth[7:][~free[6:]] = 0.0
+    markers = tree.points(truth, bodies, offsets) + rng.normal(0, 0.01, (39, 3))
+    markers[3] = np.nan
+    markers[7] += (0.3, -0.2, 0.1)
+    before = truth.copy()
+    before[7:][free[6:]] += rng.normal(0, 0.05, free[6:].sum())
+    before[7:] = np.clip(before[7:], *tree.limits.T)
+    dofs, variance = tree.n_dofs, rng.uniform(0.01, 0.1, tree.n_dofs)
+    limits = np.concatenate((np.tile((-1.0, 1.0), (6, 1)), tree.limits - before[7:, None]))
+    limits[8:12, 1] = np.minimum(limits[8:12, 1], 0.01)  # bounds that bite
+    weights = rng.uniform(0.5, 2.0, 39) * 1e4
+    q, after, residuals = before.copy(), variance.copy(), np.empty(39)
+    n = solve_frame(
+        q, after, markers, bodies, offsets, weights, Linkage.of(tree), limits[:, 0], limits[:, 1],
+        free, np.zeros(dofs - 6), outlier_m, 1.0, 0.5, 200, 1e-9, residuals,
+    )  # fmt: skip
+    assert n < 200
+    seen = np.isfinite(markers[:, 0])
+
+    def errors(moves):
+        step = np.zeros(dofs)
+        step[free] = moves
+        posture = before.copy()
+        integrate(posture, step)
+        gap = (tree.points(posture, bodies, offsets) - markers)[seen]
+        if np.isfinite(outlier_m):
+            far = np.linalg.norm(gap, axis=1, keepdims=True)
+            gap = gap * outlier_m * np.sqrt(np.log1p((far / outlier_m) ** 2)) / far
+        gap = np.sqrt(weights[seen, None]) * gap
+        return np.concatenate((gap.ravel(), step / np.sqrt(variance)))
+
+    moved = np.concatenate((q[:3] - before[:3], turned_by(before, q), q[7:] - before[7:]))[free]
+    inside = np.clip(moved, limits[free, 0] + 1e-6, limits[free, 1] - 1e-6)
+    found = least_squares(errors, inside, bounds=limits[free].T, xtol=1e-12, ftol=1e-12)
+    assert (errors(moved) ** 2).sum() < (errors(found.x) ** 2).sum() * (1 + 1e-4)
+    step = np.zeros(dofs)
+    step[free] = found.x
+    best = before.copy()
+    integrate(best, step)
+    assert (errors(found.x) ** 2).sum() > 10.0
+    # the kernel sums its base rotation's steps; the difference is of second order in them
+    np.testing.assert_allclose(q, best, atol=2e-3)
+    assert np.isnan(residuals[3]) and residuals[7] > (0.3 if np.isfinite(outlier_m) else 0.1)
+
+
+def test_bounded_least_squares_satisfies_the_optimality_conditions():
+    rng = np.random.default_rng(6)
+    for _ in range(300):
+        d = int(rng.integers(2, 12))
+        a = rng.normal(size=(d + 3, d))
+        normal, gradient = a.T @ a, rng.normal(size=d) * 3
+        low, high = -rng.uniform(0, 1, d), rng.uniform(0, 1, d)
+        free, step = rng.random(d) > 0.2, np.empty(d)
+        bounded_solve(np.tril(normal), gradient, low, high, free, step)
+        assert ((low <= step) & (step <= high)).all() and not step[~free].any()
+        slope = gradient - normal @ step
+        inner = free & (step > low) & (step < high)
+        np.testing.assert_allclose(slope[inner], 0, atol=1e-8)
+        assert (slope[free & (step <= low)] <= 1e-8).all()
+        assert (slope[free & (step >= high)] >= -1e-8).all()
+        out = np.empty(d)
+        inverse_diagonal(np.tril(normal), free, out)
+        np.testing.assert_allclose(
+            out[free], np.diag(np.linalg.inv(normal[np.ix_(free, free)])), rtol=1e-6
+        )
+
+
+def test_known_bodies_are_followed_exactly():
+    for body in (human_body(), robot_body()):
+        truth = smooth_motion(body, 150, 100.0, seed=1)
+        ik = known(body, truth[0], joint_drift=20.0, tolerance=1e-7, max_iterations=20)
+        ik._follower.rest_weight[:] = 1e-9  # no prior: the markers alone
+        found = np.array([ik.update(frame) for frame in markers_of(body, truth)])
+        places = markers_of(body, found) - markers_of(body, truth)
+        assert np.abs(places).max() < 2e-3
+
+
+def test_joint_angles_of_the_human_under_noise():
+    body = human_body()
+    truth = smooth_motion(body, 300, 100.0, seed=2, amplitude=0.15)
+    noise = np.random.default_rng(0).normal(0, 0.002, (300, 39, 3))
+    ik = known(body, truth[0])
+    found = np.array([ik.update(frame) for frame in markers_of(body, truth) + noise])
+    error = np.degrees(np.sqrt(((found - truth)[30:, 7:] ** 2).mean(axis=0)))
+    undetermined = {"toe_l", "toe_r"}  # no marker moves with the toes
+    loose = {  # one marker, or markers close to the axis
+        name for name in body.joint_names if name.startswith(("clavicle", "wrist", "ankle_roll"))
+    } | {"thorax_pitch", "lumbar_pitch", "thorax_roll", "lumbar_roll"}
+    for name, value in zip(body.joint_names, error, strict=True):
+        if name not in undetermined:
+            assert value < (9.0 if name in loose else 4.0), (name, value)
+
+
+def test_a_hidden_limb_is_held_and_said_to_be_uncertain():
+    body = robot_body()
+    truth = smooth_motion(body, 200, 100.0, seed=3)
+    frames = markers_of(body, truth)
+    hidden = [
+        i
+        for i, name in enumerate(NAMES)
+        if name in ("LELB", "LUPA", "LFRM", "LWRA", "LWRB", "LFIN")
+    ]
+    frames[80:140, hidden] = np.nan
+    ik = known(body, truth[0])
+    arm = [
+        7 + j
+        for j, name in enumerate(body.joint_names)
+        if name.startswith(("elbow_l", "wrist_yaw_l"))
+    ]
+    postures, sigma = [], []
+    for frame in frames:
+        postures.append(ik.update(frame))
+        sigma.append(ik.uncertainty)
+    postures, sigma = np.array(postures), np.array(sigma)
+    np.testing.assert_allclose(postures[135, arm], postures[80, arm], atol=1e-6)
+    elbow = 6 + body.joint_names.index("elbow_l")
+    assert sigma[135, elbow] > 5 * sigma[79, elbow]
+    assert np.abs(np.diff(postures[:, 7:], axis=0)).max() <= 17.0 / 100 + 1e-9
+    assert np.abs(markers_of(body, postures[190:]) - markers_of(body, truth[190:])).max() < 0.01
+
+
+def test_nothing_seen_holds_the_posture():
+    body = robot_body()
+    ik = known(body, body.rest)
+    first = ik.update(markers_of(body, body.rest[None])[0])
+    blind = np.full((39, 3), np.nan)
+    blind[:2] = 1.0
+    for _ in range(50):
+        np.testing.assert_array_equal(ik.update(blind), first)
+    assert ik.iterations == 0 and np.isfinite(ik.uncertainty).all()
+    assert ik.uncertainty[6] > 0.5
+
+
+def test_a_flying_and_a_swapped_marker_hardly_matter():
+    body = robot_body()
+    truth = smooth_motion(body, 60, 100.0, seed=4)
+    frames = markers_of(body, truth)
+    wrong = frames.copy()
+    a, b = NAMES.index("LWRA"), NAMES.index("RWRA")
+    wrong[30:40, [a, b]] = wrong[30:40, [b, a]]
+    wrong[30:40, NAMES.index("LKNE")] += (0.4, 0.3, 0.5)
+    right, disturbed = known(body, truth[0]), known(body, truth[0])
+    gap = [
+        np.abs(right.update(x) - disturbed.update(y))[7:]
+        for x, y in zip(frames, wrong, strict=True)
+    ]
+    assert np.degrees(np.max(gap)) < 18.0  # the knee's own; without the robust loss: 60
+    assert np.nanmax(disturbed.residual_m) < 0.02
+
+
+def test_limits_hold():
+    body = robot_body()
+    ik = known(body, body.rest)
+    human = human_body(1.65)
+    q = human.rest
+    q[7 + human.joint_names.index("knee_l")] = -0.09  # farther back than the robot's knee goes
+    for _ in range(20):
+        found = ik.update(markers_of(human, q[None])[0])
+        assert (found[7:] >= body.joint_limits[:, 0] - 1e-12).all()
+        assert (found[7:] <= body.joint_limits[:, 1] + 1e-12).all()
+
+
+def test_the_same_frames_give_the_same_postures_and_the_state_resumes():
+    body = robot_body()
+    frames = markers_of(body, smooth_motion(body, 60, 100.0, seed=5))
+    first, second = known(body, body.rest), known(body, body.rest)
+    expected = [first.update(frame) for frame in frames]
+    for frame in frames[:30]:
+        second.update(frame)
+    third = InverseKinematics(body, NAMES)
+    third.load_state(second.state())
+    for frame, q in zip(frames[30:], expected[30:], strict=True):
+        np.testing.assert_array_equal(third.update(frame), q)
+
+
+def test_bad_frames():
+    body = robot_body()
+    ik = InverseKinematics(body, NAMES)
+    with pytest.raises(BodyError, match="calibrate"):
+        ik.update(np.zeros((39, 3)))
+    ik = known(body, body.rest)
+    with pytest.raises(FrameError, match="shape"):
+        ik.update(np.zeros((38, 3)))
+    with pytest.raises(FrameError, match="infinite"):
+        ik.update(np.full((39, 3), np.inf))
+    with pytest.raises(FrameError, match="shape"):
+        ik.calibrate(np.zeros((39, 3)))
+    with pytest.raises(InvalidValueError, match="rate_hz"):
+        InverseKinematics(body, NAMES, rate_hz=0.0)
+    with pytest.raises(InvalidValueError, match="outlier_m"):
+        IKConfig(outlier_m=-1.0)
