@@ -67,7 +67,7 @@ class KohlmorgenLemmConfig:
     neighbours_s: float = 0.1
     exact: bool = False
     still_direction: float = 0.05
-    hysteresis_turned: float = 0.4
+    hysteresis_turned: float = 0.35
     tolerance_s: float = 0.15
     zero_velocity: ZeroVelocityConfig = field(
         default_factory=lambda: ZeroVelocityConfig(hysteresis=0.25)

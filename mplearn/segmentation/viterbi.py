@@ -135,7 +135,7 @@ def exact_path(distances: FloatArray, cost: float, states: IntArray) -> float:
         states[t] = state
         if t > 0 and changed[t, state]:
             state = best[t - 1]
-    return total
+    return float(total)
 
 
 @njit(cache=True)
