@@ -22,6 +22,7 @@ def most_active(primitive: Primitive, channels: Sequence[str], k: int = 3) -> tu
 
 def primitive_table(library: PrimitiveLibrary) -> Table:
     """Return a row for each primitive."""
+    from rich.markup import escape
     from rich.table import Table
 
     table = Table(title="primitives", title_justify="left")
@@ -32,7 +33,7 @@ def primitive_table(library: PrimitiveLibrary) -> Table:
     for primitive in library.primitives:
         table.add_row(
             str(primitive.id),
-            primitive.name,
+            escape(primitive.name),
             str(primitive.n_exemplars),
             f"{primitive.mean_duration_s:.2f} s",
             ", ".join(most_active(primitive, library.channels)),
@@ -42,6 +43,7 @@ def primitive_table(library: PrimitiveLibrary) -> Table:
 
 def transition_table(library: PrimitiveLibrary) -> Table:
     """Return a row for each primitive: what followed it, the most frequent first."""
+    from rich.markup import escape
     from rich.table import Table
 
     graph = library.graph.to_networkx()
@@ -52,15 +54,17 @@ def transition_table(library: PrimitiveLibrary) -> Table:
         out = sorted(
             graph.out_edges(primitive.id, data=True), key=lambda e: (-e[2]["probability"], e[1])
         )
-        following = ", ".join(
-            f"{library[after].name} {100 * edge['probability']:.0f} %" for _, after, edge in out
+        following = "; ".join(
+            f"{escape(library[after].name)} {100 * edge['probability']:.0f} %"
+            for _, after, edge in out
         )
-        table.add_row(primitive.name, following or "[dim]nothing was seen to follow[/dim]")
+        table.add_row(escape(primitive.name), following or "[dim]nothing was seen to follow[/dim]")
     return table
 
 
 def primitive_tree(library: PrimitiveLibrary) -> Tree:
     """Return the tree that the primitives were learned in."""
+    from rich.markup import escape
     from rich.tree import Tree
 
     below: dict[int | None, list[int]] = {}
@@ -70,7 +74,7 @@ def primitive_tree(library: PrimitiveLibrary) -> Tree:
 
     def grow(branch: Tree, parent: int | None) -> None:
         for id in below.get(parent, ()):
-            name = library[id].name if id in library else f"node {id}"
+            name = escape(library[id].name) if id in library else f"node {id}"
             grow(branch.add(f"{name} [dim]{counts[id]} demonstrations[/dim]"), id)
 
     tree = Tree("tree")

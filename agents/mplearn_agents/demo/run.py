@@ -66,7 +66,7 @@ def run_demo(out: Path, minutes: float, steps: int, seed: int, console: Console)
     learner = MotionLearner(LearnerConfig(recording.channels, recording.rate_hz))
     log = learn(learner, [recording], console)
     library = learner.snapshot()
-    score = score_learning(log, demonstration.truth, library.ids, recording.rate_hz)
+    score = score_learning(log, demonstration.truth, library.ids)
     library = _named(library, score.classes)
     library.save(out / "library.mplearn")
 
@@ -101,10 +101,10 @@ def tables(page: Page) -> Iterator[Table]:
     from rich.table import Table
 
     learned = Table(title="what was learned, against the truth", title_justify="left")
-    for column in page.primitive_columns:
+    for column in page.primitive_columns[:-1]:
         learned.add_column(column.name, justify="right" if column.numeric else "left")
     for row in page.primitives:
-        learned.add_row(*map(escape, row.cells), style="dim" if row.absent else None)
+        learned.add_row(*map(escape, row.cells[:-1]), style="dim" if row.absent else None)
     yield learned
     rates = Table(title="against the paper", title_justify="left")
     rates.add_column("measure")

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from mplearn.recording import LabelledSegment
+from mplearn.recording import LabelledSegment, Segment
 from mplearn_agents.learning import LearningLog
 
 
@@ -43,8 +43,6 @@ def score_learning(
     log: LearningLog,
     truth: Sequence[LabelledSegment],
     ids: Collection[int],
-    rate_hz: float,
-    tolerance_s: float = 0.25,
 ) -> Score:
     """Hold a log against the truth.
 
@@ -52,15 +50,12 @@ def score_learning(
         log: What the learner said.
         truth: What was performed.
         ids: The primitives that are known in the end.
-        rate_hz: Frames per second [1/s].
-        tolerance_s: How far both ends of a found segment may lie from a true one's [s].
     """
-    tolerance = tolerance_s * rate_hz
     truth_of = {}
     for segment in log.moving:
-        for t in truth:
-            if abs(t.start - segment.start) <= tolerance and abs(t.end - segment.end) <= tolerance:
-                truth_of[segment.start] = t.label
+        label = overlapping_class(segment, truth)
+        if label:
+            truth_of[segment.start] = label
     votes: dict[int, Counter[str]] = {}
     for start, primitive in log.recognised.items():
         if start in truth_of:
@@ -86,3 +81,13 @@ def score_learning(
         false_negative=0.0,
         coverage=n_right / max(1, len(truth)),
     )
+
+
+def overlapping_class(segment: Segment, truth: Sequence[LabelledSegment]) -> str:
+    """Return the class that a segment mostly shows: one that covers half of what both cover."""
+    for t in truth:
+        common = min(t.end, segment.end) - max(t.start, segment.start)
+        union = max(t.end, segment.end) - min(t.start, segment.start)
+        if 2 * common >= union:
+            return t.label
+    return ""

@@ -12,22 +12,23 @@ from mplearn_agents.extras import require
 
 
 def captioned(picture: NDArray[np.uint8], text: str, note: str = "") -> NDArray[np.uint8]:
-    """Return the picture with a line at its foot and a smaller note at its right.
+    """Return the picture with a line in its upper left and a smaller note in its upper right.
+
+    The foot of a picture is left free: there a player shows its buttons.
 
     Raises:
         MissingDependencyError: pillow, which matplotlib brings, is not installed.
     """
     image = require("PIL.Image", "report").fromarray(picture)
     draw = require("PIL.ImageDraw", "report").Draw(image, "RGBA")
-    height = image.height
-    size = max(11, height // 19)
-    top = height - round(1.9 * size)
-    draw.rectangle((0, top, image.width, height), fill=(18, 28, 42, 205))
-    line = top + round(0.38 * size)
-    draw.text((0.9 * size, line), text, font=_font(size), fill=(255, 255, 255, 255))
-    small = _font(round(0.75 * size))
-    right = image.width - 0.9 * size - draw.textlength(note, font=small)
-    draw.text((right, line + 0.14 * size), note, font=small, fill=(190, 202, 216, 255))
+    size = max(11, image.height // 20)
+    edge, small = round(0.8 * size), _font(round(0.75 * size))
+    width = draw.textlength(text, font=_font(size))
+    box = (edge, edge, edge + width + 1.2 * size, edge + 1.9 * size)
+    draw.rounded_rectangle(box, radius=0.5 * size, fill=(18, 28, 42, 215))
+    middle = edge + 0.95 * size
+    draw.text((edge + 0.6 * size, middle), text, font=_font(size), fill="white", anchor="lm")
+    draw.text((image.width - edge, middle), note, font=small, fill=(70, 84, 102), anchor="rm")
     return np.asarray(image)
 
 

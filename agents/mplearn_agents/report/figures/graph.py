@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_PILL = np.array([1.24, 0.42])  # width and height of a node [in]
-_LABEL = np.array([0.30, 0.17])  # room of an edge's label [in]
+_PILL = np.array([1.36, 0.46])  # width and height of a node [in]
+_LABEL = np.array([0.32, 0.19])  # room of an edge's label [in]
 
 
 def draw_graph(graph: nx.DiGraph[int], labels: Mapping[int, str], least: float = 0.04) -> Figure:
@@ -90,7 +90,7 @@ def _length(order: Sequence[int], weights: FloatArray) -> float:
 
 def _places(n: int) -> tuple[FloatArray, FloatArray]:
     """Return n points (n, 2) evenly along an ellipse, and its width and height, all [in]."""
-    perimeter = max(n, 6) * 1.58
+    perimeter = max(n, 6) * 1.72
     half_width = perimeter / 5.55  # of an ellipse 1.3 times as wide as high
     size = np.array([2 * half_width, 2 * half_width / 1.3])
     angle = np.linspace(0.0, 2 * math.pi, 2000)
@@ -202,7 +202,7 @@ def _label_edge(
                 f"{100 * probability:.0f}",
                 ha="center",
                 va="center",
-                fontsize=7.5,
+                fontsize=9,
                 color=INK,
                 zorder=5,
                 bbox={"boxstyle": "round,pad=0.12", "facecolor": "white", "linewidth": 0},
@@ -228,7 +228,7 @@ def _draw_node(axes: Axes, place: FloatArray, label: str) -> None:
     words = readable(label, 34).split()
     half = max(range(len(words) + 1), key=lambda k: -_widest(words, k)) if len(words) > 1 else 1
     text = " ".join(words[:half]) + ("\n" + " ".join(words[half:]) if words[half:] else "")
-    size = 8.5 if _widest(words, half) <= 15 else 7
+    size = 10 if _widest(words, half) <= 14 else 8
     axes.text(
         place[0], place[1], text, ha="center", va="center", fontsize=size, linespacing=1.05,
         zorder=7, color=INK,

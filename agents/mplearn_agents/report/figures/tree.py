@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ROW_IN = 0.27
+_LEVEL = 0.55  # width of a level, the text beside a leaf being 1.15 wide
 
 
 def draw_tree(
@@ -27,12 +28,12 @@ def draw_tree(
     for node, parent in parents.items():
         children.setdefault(parent, []).append(node)
     rows: dict[int | None, float] = {}
-    depth: dict[int | None, int] = {None: -1}
+    depth: dict[int | None, float] = {None: -_LEVEL}
 
     def place(node: int | None) -> None:
         below = sorted(children.get(node, ()), key=lambda n: (n in children, labels.get(n, "")))
         for child in below:
-            depth[child] = depth[node] + 1
+            depth[child] = depth[node] + _LEVEL
             place(child)
         if below:
             rows[node] = (rows[below[0]] + rows[below[-1]]) / 2
@@ -42,7 +43,7 @@ def draw_tree(
     place(None)
     roots = children.get(None, [])
     leaves = [node for node in parents if node not in children]
-    levels = max((depth[leaf] for leaf in leaves), default=0)
+    levels = max((depth[leaf] for leaf in leaves), default=0.0)
     figure = new_figure(9.0, max(1.6, _ROW_IN * (len(leaves) + 1.5)))
     axes = figure.add_subplot()
     for node, parent in parents.items():
