@@ -1,0 +1,14 @@
+"""Learn motion primitives and their order on-line by watching people, and generate motion from them.
+
+The names here are the library's front door; the rooms behind it are documented in docs/structure.md.
+"""
+
+from .errors import MPLearnError as MPLearnError
+from .learner import LearnerConfig as LearnerConfig
+from .learner import MotionLearner as MotionLearner
+from .library import PrimitiveLibrary as PrimitiveLibrary
+from .mocap import open_recording as open_recording
+from .mocap import open_recordings as open_recordings
+from .recording import LabelledSegment as LabelledSegment
+from .recording import Recording as Recording
+from .recording import Segment as Segment

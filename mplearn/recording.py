@@ -121,12 +121,7 @@ class Recording:
     @property
     def is_markers(self) -> bool:
         """Whether the columns are markers, three a marker (``name.x``, ``name.y``, ``name.z``)."""
-        names = self.channels
-        return (
-            bool(names)
-            and len(names) % 3 == 0
-            and all(name.endswith(f".{'xyz'[i % 3]}") for i, name in enumerate(names))
-        )
+        return are_markers(self.channels)
 
     @property
     def marker_names(self) -> tuple[str, ...]:
@@ -159,6 +154,15 @@ class Recording:
             if s.start >= start and s.end <= end
         )
         return replace(self, frames=self.frames[start:end], labels=labels)
+
+
+def are_markers(channels: tuple[str, ...]) -> bool:
+    """Return whether columns are markers: ``NAME.x``, ``NAME.y``, ``NAME.z`` in turn."""
+    return (
+        bool(channels)
+        and len(channels) % 3 == 0
+        and all(name.endswith(f".{'xyz'[i % 3]}") for i, name in enumerate(channels))
+    )
 
 
 def marker_channels(names: tuple[str, ...]) -> tuple[str, ...]:

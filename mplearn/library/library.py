@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
+from ..body import view_of
 from ..errors import InvalidValueError, UnknownPrimitiveError
 from ..generation import StyleName, Trajectory, generate, retime
 from ..graph import History, Prediction, TransitionGraph
@@ -134,11 +135,17 @@ class PrimitiveLibrary:
         """Recognise a segment, shape (T, D).
 
         Raises:
-            InvalidValueError: The library was made without a recogniser.
+            InvalidValueError: The library was made without a recogniser, or the segment has other
+                channels.
         """
         if self.recogniser is None:
             raise InvalidValueError("this library holds no recogniser")
-        return self.recogniser.recognise(frames)
+        frames = np.asarray(frames, dtype=np.float64)
+        if frames.ndim != 2 or frames.shape[1] != len(self.channels):
+            raise InvalidValueError(
+                f"a segment must have shape (T, {len(self.channels)}), not {frames.shape}"
+            )
+        return self.recogniser.recognise(view_of(self.channels).see(frames))
 
     def predict_next(self, history: Sequence[Key | None], k: int = 3) -> tuple[Prediction, ...]:
         """Return the ``k`` primitives most likely to come next, see `TransitionGraph.predict`.

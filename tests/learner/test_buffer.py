@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mplearn.buffer import FrameBuffer
+from mplearn.learner.buffer import FrameBuffer
 from mplearn.errors import InvalidValueError
 
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from .errors import InvalidValueError
-from .recording import FloatArray
+from ..errors import InvalidValueError
+from ..recording import FloatArray
 
 
 class FrameBuffer:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from .recording import Segment
+from ..recording import Segment
 
 
 @dataclass(frozen=True)

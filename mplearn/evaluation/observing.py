@@ -1,0 +1,17 @@
+"""A recording of markers as the learner sees it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..body import MotionObserver
+from ..recording import Recording
+
+
+def observe(recording: Recording) -> Recording:
+    """Return the robot's features of a recording of markers, labels kept; others as they are."""
+    if not recording.is_markers:
+        return recording
+    observer = MotionObserver(recording.marker_names, recording.rate_hz)
+    frames = observer.observe(recording.frames)
+    return replace(recording, frames=frames, channels=observer.channels)

@@ -1,0 +1,12 @@
+"""The learner: where the stages meet, frame after frame."""
+
+from .config import LearnerConfig as LearnerConfig
+from .events import Anomaly as Anomaly
+from .events import Event as Event
+from .events import PrimitiveBorn as PrimitiveBorn
+from .events import PrimitiveMerged as PrimitiveMerged
+from .events import PrimitiveSplit as PrimitiveSplit
+from .events import Recognised as Recognised
+from .events import SegmentClosed as SegmentClosed
+from .events import TransitionSeen as TransitionSeen
+from .learner import MotionLearner as MotionLearner

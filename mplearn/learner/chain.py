@@ -1,0 +1,165 @@
+"""Which segment followed which: what the transition graph is counted from [Kulic2012, 3]."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import astuple, dataclass
+from typing import Any
+
+from ..graph import TransitionGraph
+from ..recording import Segment
+from ..tree import Placement
+from .events import Anomaly, Event, TransitionSeen
+
+REMEMBERED = 2048  # segments; older ones cannot be counted again
+
+
+@dataclass
+class Link:
+    """A segment in the chain.
+
+    Attributes:
+        number: The tree's number of the segment.
+        primitive: What it was recognised as; None for nothing.
+        follows: Whether it came right after the one before it.
+        segment: Where it lies.
+    """
+
+    number: int
+    primitive: int | None
+    follows: bool
+    segment: Segment
+
+
+class Chain:
+    """The latest segments of the stream, and what they were recognised as.
+
+    A transition is counted when two segments follow each other without a long pause and both are
+    recognised. When a primitive is born, or split, the segments that it was formed from are known
+    after all: transitions that they take part in are counted then. Nothing is counted twice.
+
+    Args:
+        graph: Where the transitions are counted.
+        rate_hz: Frames per second [1/s].
+        longest_pause_s: Longest pause that does not break the chain [s].
+    """
+
+    def __init__(self, graph: TransitionGraph, rate_hz: float, longest_pause_s: float) -> None:
+        self.graph = graph
+        self.rate_hz = rate_hz
+        self.longest_pause_s = longest_pause_s
+        self._links: list[Link] = []
+        self._paused_frames = 0
+        self._broken = True
+
+    def paused(self, segment: Segment) -> None:
+        """Take note of a segment in which nothing moved."""
+        self._paused_frames += segment.length_frames
+        if self._paused_frames > self.longest_pause_s * self.rate_hz:
+            self._broken = True
+
+    def broken(self) -> None:
+        """Take note that what comes next does not follow what came."""
+        self._broken = True
+
+    def follow(self, segment: Segment, placement: Placement, surprise: float) -> list[Event]:
+        """Take the next segment, count what is known by it, and say what is surprising.
+
+        Args:
+            segment: The segment.
+            placement: Where the tree put it, and what else changed there.
+            surprise: Transitions less likely than exp(-surprise) are anomalies [nats].
+        """
+        if placement.refused:  # no motion at all
+            self.paused(segment)
+            return []
+        known = placement.node_id if placement.node_id in placement.born else None
+        if placement.recognised and not placement.splits:
+            known = placement.node_id
+        self._links.append(Link(placement.number, known, not self._broken, segment))
+        self._paused_frames, self._broken = 0, False
+        events: list[Event] = []
+        if known is not None and not placement.born:
+            events += self._surprised(surprise)
+            events += self._count(len(self._links) - 1)
+        self._revise(placement)
+        if placement.born:
+            for id in placement.born:
+                self.graph.add_node(id)
+            for i in range(1, len(self._links)):
+                pair = {self._links[i - 1].primitive, self._links[i].primitive}
+                if pair & set(placement.born):
+                    events += self._count(i)
+        del self._links[:-REMEMBERED]
+        return events
+
+    def _revise(self, placement: Placement) -> None:
+        """Follow the tree where earlier segments turned out to be something else."""
+        for merge in placement.merges:
+            self.graph.merge_nodes(merge.kept, merge.absorbed)
+            self._rename({merge.absorbed}, merge.kept)
+        for split in placement.splits:
+            self.graph.remove_node(split.node)
+            self._rename({split.node}, None)
+        moved = dict(placement.moved)
+        if placement.number not in moved and placement.node_id in placement.born:
+            moved[placement.number] = placement.node_id
+        for link in self._links:
+            link.primitive = moved.get(link.number, link.primitive)
+
+    def _rename(self, ids: Collection[int], to: int | None) -> None:
+        for link in self._links:
+            if link.primitive in ids:
+                link.primitive = to
+
+    def _run(self, i: int) -> list[int]:
+        """Return the primitives before link i, oldest first, as far as nothing breaks them off."""
+        run: list[int] = []
+        while i > 0 and self._links[i].follows and len(run) < self.graph.order:
+            i -= 1
+            primitive = self._links[i].primitive
+            if primitive is None:
+                break
+            run.insert(0, primitive)
+        return run
+
+    def _count(self, i: int) -> list[Event]:
+        """Count the transition to link i, if there is one."""
+        link, run = self._links[i], self._run(i)
+        if link.primitive is None or not run:
+            return []
+        previous = self._links[i - 1].segment
+        duration_s = (link.segment.start - previous.start) / self.rate_hz
+        self.graph.observe(run[-1], link.primitive, duration_s, before=run[:-1])
+        count = self.graph.count(run[-1], link.primitive)
+        return [TransitionSeen(link.segment, run[-1], link.primitive, count)]
+
+    def _surprised(self, surprise: float) -> list[Event]:
+        """Return the anomaly of the newest transition, if it is one; before it is counted."""
+        link, run = self._links[-1], self._run(len(self._links) - 1)
+        if not run or link.primitive is None:
+            return []
+        p = self.graph.probabilities(run)[self.graph.ids.index(link.primitive)]
+        score = -math.log(p)
+        return [Anomaly(link.segment, "order", score)] if score > surprise else []
+
+    def state(self) -> dict[str, Any]:
+        """Return everything as plain values."""
+        return {
+            "links": [
+                (link.number, link.primitive, link.follows, astuple(link.segment))
+                for link in self._links
+            ],
+            "paused_frames": self._paused_frames,
+            "broken": self._broken,
+        }
+
+    def load_state(self, state: dict[str, Any]) -> None:
+        """Resume from what `state` returned."""
+        self._links = [
+            Link(number, primitive, follows, Segment(*segment))
+            for number, primitive, follows, segment in state["links"]
+        ]
+        self._paused_frames = int(state["paused_frames"])
+        self._broken = bool(state["broken"])

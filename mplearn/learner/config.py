@@ -1,0 +1,51 @@
+"""What a learner needs to know before the first frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from ..errors import InvalidValueError
+from ..tree import TreeConfig
+
+
+@dataclass(frozen=True)
+class LearnerConfig:
+    """The stream, and how to learn from it.
+
+    Attributes:
+        channels: Names of a frame's columns. Columns of markers (``"LSHO.x", "LSHO.y", ...``) are
+            turned into the robot's joint angles by on-line inverse kinematics; all other channels
+            [rad] or [m] are learned as they come.
+        rate_hz: Frames per second, 20 to 250 [1/s].
+        observe: What markers become: ``"robot"``, joint angles of the robot; or ``"markers"``:
+            they are learned as positions.
+        segmenter: Name of the segmenter, one of `mplearn.segmentation.SEGMENTERS`.
+        tree: How primitives are formed.
+        longest_pause_s: Two primitives with a longer pause between them do not count as
+            consecutive [s].
+        order_surprise: A transition less likely than ``exp(-order_surprise)`` is an anomaly [nats].
+        motion_radius: A motion farther from every primitive than this multiple of the nearest
+            one's radius is an anomaly.
+    """
+
+    channels: tuple[str, ...]
+    rate_hz: float = 100.0
+    observe: Literal["robot", "markers"] = "robot"
+    segmenter: str = "kohlmorgen-lemm"
+    tree: TreeConfig = field(default_factory=TreeConfig)
+    longest_pause_s: float = 2.0
+    order_surprise: float = 4.0
+    motion_radius: float = 2.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "channels", tuple(self.channels))
+        if not self.channels:
+            raise InvalidValueError("a learner needs at least one channel")
+        if not 20.0 <= self.rate_hz <= 250.0:
+            raise InvalidValueError(f"rate_hz must lie in [20, 250], not {self.rate_hz}")
+        if self.observe not in ("robot", "markers"):
+            raise InvalidValueError(f"observe must be 'robot' or 'markers', not {self.observe!r}")
+        for name in ("longest_pause_s", "order_surprise", "motion_radius"):
+            if not getattr(self, name) > 0:
+                raise InvalidValueError(f"{name} must be positive, not {getattr(self, name)}")

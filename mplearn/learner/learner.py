@@ -1,0 +1,263 @@
+"""The learner: the one place where the stages meet [Kulic2012, Figure 1].
+
+frame of markers -> gap tracking -> inverse kinematics -> segmentation -> tree -> graph -> library
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from ..body import BodyView, MotionObserver, view_of
+from ..errors import BodyError, FrameError
+from ..graph import TransitionGraph
+from ..library import PrimitiveLibrary
+from ..recording import FloatArray, Recording, Segment, are_markers
+from ..segmentation import make_segmenter
+from ..tree import FormConfig, PrimitiveTree, TreeConfig
+from .buffer import FrameBuffer
+from .chain import Chain
+from .config import LearnerConfig
+from .events import (
+    Anomaly,
+    Event,
+    PrimitiveBorn,
+    PrimitiveMerged,
+    PrimitiveSplit,
+    Recognised,
+    SegmentClosed,
+)
+from .snapshot import library_of
+
+CLOCK_TOLERANCE = 0.5  # of a sampling interval: beyond it, a time stamp does not fit the rate
+
+
+class MotionLearner:
+    """Learns motion primitives and their order from a stream, frame after frame.
+
+    Nothing looks ahead, and memory does not grow with the stream. `learn_one`, `learn_many`,
+    `learn_recording` and `end_stream` change what is known; nothing else does.
+
+    Args:
+        config: The stream, and how to learn from it.
+
+    Attributes:
+        channels: Names of the channels that primitives are made of: the robot's features where
+            markers are observed, the stream's own channels otherwise.
+        tree: The tree of primitives.
+        graph: The transitions between them.
+        n_frames: Frames seen, of all streams.
+    """
+
+    def __init__(self, config: LearnerConfig) -> None:
+        self.config = config
+        self._watches = config.observe == "robot" and are_markers(config.channels)
+        self._observer = self._new_observer()
+        self.channels = config.channels if self._observer is None else self._observer.channels
+        self._view = view_of(self.channels)
+        width = len(self._view.channels)
+        self._segmenter = make_segmenter(config.segmenter, width, config.rate_hz)
+        self._buffer = FrameBuffer(width)
+        self.tree = PrimitiveTree(config.tree, width, config.rate_hz)
+        self.graph = TransitionGraph()
+        self._chain = Chain(self.graph, config.rate_hz, config.longest_pause_s)
+        self.n_frames = 0
+        self._stream_start = 0
+        self._clock_s: float | None = None
+
+    # ---- learning
+
+    def learn_one(self, frame: FloatArray, time_s: float | None = None) -> list[Event]:
+        """Take the next frame and return what came of it.
+
+        Args:
+            frame: One sample, shape (D,); a missing marker is NaN.
+            time_s: When it was taken, on any clock [s]. Where given, it must fit the rate.
+
+        Raises:
+            FrameError: The frame has the wrong width, is not finite, or its time does not fit;
+                nothing has changed then.
+        """
+        frame = self._checked(frame)
+        if time_s is not None:
+            self._check_clock(time_s)
+        features = frame[None] if self._observer is None else self._observer.update(frame)
+        self._clock_s = time_s
+        return self._learn(features)
+
+    def learn_many(self, frames: FloatArray) -> list[Event]:
+        """Take many frames, shape (T, D): bit-identical to `learn_one` in a loop."""
+        events: list[Event] = []
+        for frame in frames:
+            events.extend(self.learn_one(frame))
+        return events
+
+    def learn_recording(self, recording: Recording) -> Iterator[list[Event]]:
+        """Learn a recording as a stream of its own; yield the events of each frame.
+
+        The stream before it is ended, and so is this one after the last frame (the events of that
+        come as one more item).
+
+        Raises:
+            FrameError: The recording has other channels, or another rate.
+        """
+        if recording.channels != self.config.channels:
+            raise FrameError(
+                f"recording {recording.name!r} has {len(recording.channels)} channels "
+                f"({', '.join(recording.channels[:3])}, ...); the learner was made for "
+                f"{len(self.config.channels)} ({', '.join(self.config.channels[:3])}, ...)"
+            )
+        if abs(recording.rate_hz - self.config.rate_hz) > 1e-3 * self.config.rate_hz:
+            raise FrameError(
+                f"recording {recording.name!r} has {recording.rate_hz:g} Hz, the learner was made "
+                f"for {self.config.rate_hz:g} Hz; open it with rate_hz={self.config.rate_hz:g}"
+            )
+        if self.n_frames > self._stream_start:
+            yield self.end_stream()
+        for frame in recording.frames:
+            yield self.learn_one(frame)
+        yield self.end_stream()
+
+    def end_stream(self) -> list[Event]:
+        """Close what is open: what comes next is another stream, perhaps of another person."""
+        events: list[Event] = []
+        if self._observer is not None:
+            with suppress(BodyError):  # too short a stream to know whose it was
+                events = self._learn(self._observer.flush())
+            self._observer = self._new_observer()
+        for segment in self._segmenter.flush():
+            events.extend(self._close(segment))
+        self._stream_start = self.n_frames
+        self._buffer = FrameBuffer(self._buffer.n_channels)
+        self._chain.broken()
+        self._clock_s = None
+        return events
+
+    # ---- what was learned
+
+    def snapshot(self) -> PrimitiveLibrary:
+        """Return what is known now, frozen."""
+        return library_of(
+            self.tree, self.graph, self._view, self.channels, self.config.rate_hz, self._body
+        )
+
+    def state(self) -> dict[str, Any]:
+        """Return everything as plain values and arrays: `from_state` resumes bit for bit."""
+        return {
+            "config": asdict(self.config),
+            "observer": None if self._observer is None else self._observer.state(),
+            "segmenter": self._segmenter.state(),
+            "buffer": self._buffer.state(),
+            "tree": self.tree.state(),
+            "graph": self.graph.state(),
+            "chain": self._chain.state(),
+            "n_frames": self.n_frames,
+            "stream_start": self._stream_start,
+            "clock_s": self._clock_s,
+        }
+
+    @classmethod
+    def from_state(cls, state: dict[str, Any]) -> MotionLearner:
+        """Return the learner that `state` described."""
+        settings = dict(state["config"])
+        tree = dict(settings.pop("tree"))
+        form = FormConfig(**tree.pop("form"))
+        learner = cls(LearnerConfig(**settings, tree=TreeConfig(**tree, form=form)))
+        if learner._observer is not None:
+            learner._observer.load_state(state["observer"])
+        learner._segmenter.load_state(state["segmenter"])
+        learner._buffer.load_state(state["buffer"])
+        learner.tree.load_state(state["tree"])
+        learner.graph.load_state(state["graph"])
+        learner._chain.load_state(state["chain"])
+        learner.n_frames = int(state["n_frames"])
+        learner._stream_start = int(state["stream_start"])
+        learner._clock_s = state["clock_s"]
+        return learner
+
+    # ---- inside
+
+    @property
+    def _body(self) -> str:
+        return self._view.body.name if isinstance(self._view, BodyView) else ""
+
+    def _new_observer(self) -> MotionObserver | None:
+        if not self._watches:
+            return None
+        names = tuple(channel[:-2] for channel in self.config.channels[::3])
+        return MotionObserver(names, self.config.rate_hz)
+
+    def _checked(self, frame: FloatArray) -> FloatArray:
+        try:
+            frame = np.asarray(frame, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise FrameError(f"a frame must hold numbers, not {frame!r:.60}") from error
+        if frame.shape != (len(self.config.channels),):
+            raise FrameError(
+                f"a frame must have shape ({len(self.config.channels)},), not {frame.shape}"
+            )
+        wrong = np.isinf(frame) if self._watches else ~np.isfinite(frame)
+        if wrong.any():
+            channel = int(np.argmax(wrong))
+            raise FrameError(
+                f"channel {self.config.channels[channel]!r} is {frame[channel]}; "
+                + ("a missing marker is NaN" if self._watches else "a frame must be finite")
+            )
+        return frame
+
+    def _check_clock(self, time_s: float) -> None:
+        step_s = 1.0 / self.config.rate_hz
+        if not np.isfinite(time_s):
+            raise FrameError(f"time_s must be finite, not {time_s}")
+        if self._clock_s is None:
+            return
+        passed_s = time_s - self._clock_s
+        if abs(passed_s - step_s) > CLOCK_TOLERANCE * step_s:
+            raise FrameError(
+                f"frames must be {step_s:.4g} s apart ({self.config.rate_hz:g} Hz), not "
+                f"{passed_s:.4g} s; after a gap, end the stream or fill it with NaN"
+            )
+
+    def _learn(self, features: FloatArray) -> list[Event]:
+        """Take features that are ready, shape (k, D)."""
+        events: list[Event] = []
+        if not len(features):
+            return events
+        for seen in self._view.see(features):
+            segments = self._segmenter.update(seen)
+            self._buffer.append(seen)
+            self.n_frames += 1
+            for segment in segments:
+                events.extend(self._close(segment))
+        return events
+
+    def _close(self, segment: Segment) -> list[Event]:
+        """Learn from a segment that the segmenter closed."""
+        frames = self._buffer.take(segment.start, segment.end)
+        self._buffer.drop_before(segment.end)
+        segment = replace(
+            segment,
+            start=segment.start + self._stream_start,
+            end=segment.end + self._stream_start,
+            decided_at=segment.decided_at + self._stream_start,
+        )
+        events: list[Event] = [SegmentClosed(segment)]
+        if segment.still:
+            self._chain.paused(segment)
+            return events
+        known = len(self.tree.leaves)
+        placement = self.tree.insert(frames)
+        if placement.recognised:
+            events.append(Recognised(segment, placement.node_id, placement.distance))
+        elif known and placement.ratio > self.config.motion_radius:
+            events.append(Anomaly(segment, "motion", placement.ratio))
+        events += [PrimitiveSplit(segment, each.node, each.into) for each in placement.splits]
+        events += [PrimitiveMerged(segment, *each) for each in placement.merges]
+        for id in placement.born:
+            events += [PrimitiveBorn(segment, id, len(self.tree.node(id).members))]
+        events.extend(self._chain.follow(segment, placement, self.config.order_surprise))
+        return events
