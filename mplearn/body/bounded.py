@@ -63,18 +63,19 @@ def bounded_solve(
         step[:] = solution
         if hit:
             continue
-        done = True
+        worst, released = 0.0, -1
         for i in range(d):
             if fixed[i] and free[i] and releases[i] < 2:
                 slope = gradient[i]
                 for j in range(d):
                     slope -= (normal[i, j] if j <= i else normal[j, i]) * step[j]
-                if (step[i] >= high[i] and slope < 0.0) or (step[i] <= low[i] and slope > 0.0):
-                    fixed[i] = False
-                    releases[i] += 1
-                    done = False
-        if done:
+                inward = -slope if step[i] >= high[i] else slope
+                if inward > worst and low[i] < high[i]:
+                    worst, released = inward, i
+        if released < 0:
             return
+        fixed[released] = False
+        releases[released] += 1
 
 
 @njit(cache=True)

@@ -80,8 +80,8 @@ def test_a_frame_is_solved_to_scipys_optimum(body, outlier_m):
     tree = follower(body).tree
     free = follower(body).free
     truth = tree.rest
-    truth[7:] = rng.uniform(*(0.4 * tree.limits.T))
-    truth[7:][~free[6:]] = 0.0
+    middle, span = tree.limits.mean(axis=1), np.ptp(tree.limits, axis=1)
+    truth[7:] = np.where(free[6:], middle + 0.3 * span * rng.uniform(-1, 1, len(span)), 0.0)
     markers = tree.points(truth, bodies, offsets) + rng.normal(0, 0.01, (39, 3))
     markers[3] = np.nan
     markers[7] += (0.3, -0.2, 0.1)
@@ -113,8 +113,8 @@ def test_a_frame_is_solved_to_scipys_optimum(body, outlier_m):
         return np.concatenate((gap.ravel(), step / np.sqrt(variance)))
 
     moved = np.concatenate((q[:3] - before[:3], turned_by(before, q), q[7:] - before[7:]))[free]
-    inside = np.clip(moved, limits[free, 0] + 1e-6, limits[free, 1] - 1e-6)
-    found = least_squares(errors, inside, bounds=limits[free].T, xtol=1e-12, ftol=1e-12)
+    start = np.clip(0.0, *(0.98 * limits[free].T + 0.02 * limits[free, ::-1].T))
+    found = least_squares(errors, start, bounds=limits[free].T, xtol=1e-12, ftol=1e-12)
     assert (errors(moved) ** 2).sum() < (errors(found.x) ** 2).sum() * (1 + 1e-4)
     step = np.zeros(dofs)
     step[free] = found.x
