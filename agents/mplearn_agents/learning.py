@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from mplearn.events import (
+from mplearn.learner import (
     Event,
+    MotionLearner,
     PrimitiveBorn,
     PrimitiveMerged,
     PrimitiveSplit,
@@ -19,8 +20,7 @@ from mplearn.recording import Recording, Segment
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-    from mplearn.learner import MotionLearner
+    from rich.progress import Progress, TaskID
 
 
 @dataclass
@@ -30,6 +30,7 @@ class LearningLog:
     Attributes:
         segments: All segments, pauses too.
         recognised: For each segment that was recognised on arrival, by its start: its primitive.
+        born: Frame at which each primitive was formed, also of those that are gone.
         known: Number of primitives known, each with the frame from which on.
         watched_s: Length of the streams so far [s].
         learning_s: How long learning took [s], reading and drawing left out.
@@ -37,6 +38,7 @@ class LearningLog:
 
     segments: list[Segment] = field(default_factory=list)
     recognised: dict[int, int] = field(default_factory=dict)
+    born: dict[int, int] = field(default_factory=dict)
     known: list[tuple[int, int]] = field(default_factory=list)
     watched_s: float = 0.0
     learning_s: float = 0.0
@@ -66,14 +68,13 @@ class LearningLog:
                 self.recognised[segment.start] = primitive
             case PrimitiveBorn(segment, primitive):
                 self._alive.add(primitive)
+                self.born[primitive] = segment.end
                 self.known.append((segment.end, len(self._alive)))
             case PrimitiveMerged(segment, _, absorbed):
                 self._alive.discard(absorbed)
                 self.known.append((segment.end, len(self._alive)))
-            case PrimitiveSplit(segment, primitive, into):
+            case PrimitiveSplit(_, primitive, _):  # the new ones are born right after
                 self._alive.discard(primitive)
-                self._alive.update(into)
-                self.known.append((segment.end, len(self._alive)))
             case _:
                 pass
 
@@ -101,13 +102,14 @@ def learn(learner: MotionLearner, recordings: Sequence[Recording], console: Cons
         for recording in recordings:
             before_s = log.watched_s
             begin = time.perf_counter()
-            for event in _events(learner, recording):
-                log.note(event)
-                if isinstance(event, SegmentClosed):
+            for n, events in enumerate(learner.learn_recording(recording), start=1):
+                for event in events:
+                    log.note(event)
+                if n % 50 == 0:
                     now = time.perf_counter()
                     log.learning_s += now - begin
                     begin = now
-                    log.watched_s += event.segment.length_frames / recording.rate_hz
+                    log.watched_s = before_s + min(n / recording.rate_hz, recording.duration_s)
                     _show(progress, bar, log)
             log.learning_s += time.perf_counter() - begin
             log.watched_s = before_s + recording.duration_s
@@ -115,13 +117,8 @@ def learn(learner: MotionLearner, recordings: Sequence[Recording], console: Cons
     return log
 
 
-def _events(learner: MotionLearner, recording: Recording) -> Iterable[Event]:
-    yield from learner.learn_recording(recording)
-    yield from learner.end_stream()
-
-
-def _show(progress: object, bar: object, log: LearningLog) -> None:
-    progress.update(  # type: ignore[attr-defined]
+def _show(progress: Progress, bar: TaskID, log: LearningLog) -> None:
+    progress.update(
         bar,
         completed=log.watched_s,
         speed=log.times_real_time,

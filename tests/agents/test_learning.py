@@ -6,7 +6,8 @@ import sys
 
 import numpy as np
 import pytest
-from mplearn.events import (
+
+from mplearn.learner import (
     PrimitiveBorn,
     PrimitiveMerged,
     PrimitiveSplit,
@@ -14,7 +15,6 @@ from mplearn.events import (
     SegmentClosed,
     TransitionSeen,
 )
-
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import Segment
 from mplearn_agents.cli import main
@@ -31,9 +31,11 @@ def test_a_log_counts_what_lives():
     log.note(Recognised(segments[2], 3, 0.5))
     log.note(TransitionSeen(segments[2], 4, 3, 1))
     log.note(PrimitiveSplit(segments[3], 3, (5, 6)))
+    log.note(PrimitiveBorn(segments[3], 5, 3))
+    log.note(PrimitiveBorn(segments[3], 6, 3))
     log.note(PrimitiveMerged(segments[4], 5, 4))
     assert log.n_primitives == 2
-    assert log.known == [(10, 1), (30, 2), (40, 3), (50, 2)]
+    assert log.known == [(10, 1), (30, 2), (40, 2), (40, 3), (50, 2)]
     assert log.recognised == {20: 3}
     assert len(log.moving) == 4
 

@@ -102,7 +102,7 @@ def tables(page: Page) -> Iterator[Table]:
 
     learned = Table(title="what was learned, against the truth", title_justify="left")
     for column in page.primitive_columns[:-1]:
-        learned.add_column(column.name, justify="right" if column.numeric else "left")
+        learned.add_column(column.name, justify="right" if column.numeric else "left", no_wrap=True)
     for row in page.primitives:
         learned.add_row(*map(escape, row.cells[:-1]), style="dim" if row.absent else None)
     yield learned

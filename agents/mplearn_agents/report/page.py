@@ -104,6 +104,7 @@ class Page:
     numbers: tuple[Number, ...]
     learned_summary: str = ""
     rates: tuple[Rate, ...] = ()
+    rates_note: str = ""
     primitive_columns: tuple[Column, ...] = ()
     primitives: tuple[Row, ...] = ()
     figures: dict[str, Shown] = field(default_factory=dict)
