@@ -46,36 +46,31 @@ def fit_sizes(
     groups = _groups(tree)
     n_groups, n_markers, n_frames = groups.max() + 1, len(bodies), len(frames)
     n_unknowns = n_groups + 3 * n_markers + 3 * n_frames
-    rows, values = [], []
+    expected = np.zeros(n_unknowns)
+    expected[:n_groups] = 1.0
+    normal, gradient = np.zeros((n_unknowns, n_unknowns)), np.zeros(n_unknowns)
+    normal[range(n_groups), range(n_groups)] = (size_sigma / MARKER_SIGMA_M) ** -2.0
+    shifted = range(n_groups, n_groups + 3 * n_markers)
+    normal[shifted, shifted] = (PLACE_SIGMA_M / MARKER_SIGMA_M) ** -2.0
+    block, unknowns = np.zeros((3, n_groups + 6)), np.arange(n_groups + 6)
+    block[:, n_groups + 3 :] = np.eye(3)
     for k, (q, frame) in enumerate(zip(postures, frames, strict=True)):
         mats = tree.forward(q)[1]
         reach = np.zeros((len(tree.parent), 3, n_groups))  # body origins, per unit of each group
         for b in range(1, len(tree.parent)):
             p = tree.parent[b]
             reach[b] = reach[p] + _per_group(mats[p], size[p] * tree.offset[b], groups[p], n_groups)
+        unknowns[n_groups + 3 :] = np.arange(3) + n_groups + 3 * n_markers + 3 * k
         for m in np.flatnonzero(np.isfinite(frame).all(axis=1)):
             b = bodies[m]
-            row = np.zeros((3, n_unknowns))
-            row[:, :n_groups] = reach[b] + _per_group(
+            block[:, :n_groups] = reach[b] + _per_group(
                 mats[b], size[b] * template[m], groups[b], n_groups
             )
-            row[:, n_groups + 3 * m : n_groups + 3 * m + 3] = mats[b]
-            at = n_groups + 3 * n_markers + 3 * k
-            row[:, at : at + 3] = np.eye(3)
-            rows.append(row)
-            values.append(frame[m])
-    design = np.concatenate(rows) / MARKER_SIGMA_M
-    target = np.concatenate(values) / MARKER_SIGMA_M
-    prior_sigma = np.concatenate(
-        (np.full(n_groups, size_sigma), np.full(3 * n_markers, PLACE_SIGMA_M))
-    )
-    precision = np.zeros(n_unknowns)
-    precision[: len(prior_sigma)] = prior_sigma**-2
-    expected = np.zeros(n_unknowns)
-    expected[:n_groups] = 1.0
-    solution = expected + np.linalg.solve(
-        design.T @ design + np.diag(precision), design.T @ (target - design @ expected)
-    )
+            block[:, n_groups : n_groups + 3] = mats[b]
+            unknowns[n_groups : n_groups + 3] = np.arange(3) + n_groups + 3 * m
+            normal[np.ix_(unknowns, unknowns)] += block.T @ block
+            gradient[unknowns] += block.T @ (frame[m] - block @ expected[unknowns])
+    solution = expected + np.linalg.solve(normal, gradient)
     factors = size * np.clip(solution[:n_groups], NARROWEST, WIDEST)[groups]
     shifts = solution[n_groups : n_groups + 3 * n_markers].reshape(n_markers, 3)
     return factors, template * factors[bodies] + shifts
