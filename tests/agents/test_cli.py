@@ -49,7 +49,16 @@ def test_perform_walks(library_file, capsys):
 def test_perform_writes_a_film(renderer, library_file, tmp_path):
     # in a process of its own: MuJoCo chooses its graphics library when it is imported
     video = tmp_path / "walk.mp4"
-    command = [sys.executable, "-m", "mplearn_agents.walk", library_file, "--steps", "1"]
+    command = [
+        sys.executable,
+        "-m",
+        "mplearn_agents.walk",
+        library_file,
+        "--steps",
+        "1",
+        "--speed",
+        "1",
+    ]
     done = subprocess.run([*command, "--video", video], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "film of" in done.stdout

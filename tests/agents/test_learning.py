@@ -1,6 +1,5 @@
 """What a log makes of events, and the commands that learn."""
 
-import os
 import subprocess
 import sys
 
@@ -98,18 +97,10 @@ def test_the_demo_writes_its_report(renderer, tmp_path):
         assert (tmp_path / name).stat().st_size > 2000
 
 
-def test_the_demo_without_a_renderer_does_the_rest(tmp_path):
-    command = [sys.executable, "-m", "mplearn_agents.cli", "demo", "--out", tmp_path]
-    environment = {**os.environ, "MUJOCO_GL": "disable"}
-    done = subprocess.run(
-        [*command, "--minutes", "2.5", "--steps", "1"],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "no off-screen renderer" in done.stdout
+def test_the_demo_without_a_renderer_does_the_rest(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("mplearn_agents.demo.run.choose_backend", lambda: False)
+    assert main(["demo", "--out", str(tmp_path), "--minutes", "2.5", "--steps", "1"]) == 0
+    assert "no off-screen renderer" in capsys.readouterr().out
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "no off-screen renderer" in html
     assert "<video" not in html
@@ -120,3 +111,31 @@ def test_the_demo_without_a_renderer_does_the_rest(tmp_path):
 def test_the_demo_refuses_a_length_that_is_none(tmp_path, capsys):
     assert main(["demo", "--out", str(tmp_path), "--minutes", "0"]) == 2
     assert "minutes must lie in (0, 60]" in capsys.readouterr().err
+
+
+def test_the_score_counts_as_the_paper_does():
+    """Twelve performances of two kinds; each rate by hand."""
+    from mplearn.recording import LabelledSegment
+    from mplearn_agents.demo.score import score_learning
+
+    labels = "AABABABABAAB"
+    truth = [LabelledSegment(20 * k, 20 * k + 20, label) for k, label in enumerate(labels)]
+    log = LearningLog()
+    for k in range(12):
+        shift = 12 if k == 10 else 1  # the eleventh is cut in the wrong place
+        log.note(SegmentClosed(Segment(20 * k + shift, 20 * k + shift + 19)))
+    at = {segment.start // 20: segment for segment in log.segments}
+    log.note(PrimitiveBorn(at[3], 1, 3))  # A, known from frame 80
+    log.note(PrimitiveBorn(at[4], 2, 3))  # B, known from frame 100
+    for k, primitive in {5: 1, 6: 1, 7: 2, 8: 2, 9: 1, 11: 2}.items():
+        log.note(Recognised(at[k], primitive, 0.1))
+    # performed: 4 B, 5 A, 6 B, 7 A, 8 B, 9 A, 10 A, 11 B
+    score = score_learning(log, truth, {1, 2})
+    assert score.performed == {"A": 7, "B": 5}
+    assert score.classes == {1: "A", 2: "B"}
+    assert score.extracted == ("A", "B")
+    assert score.recognised == {1: 3, 2: 3}
+    assert score.right == {1: 2, 2: 2}  # 6 was a B, 7 was an A
+    assert score.false_positive == pytest.approx(2 / 6)
+    assert score.false_negative == pytest.approx(1 / 7)  # 10 of 5, 6, 7, 8, 9, 10, 11
+    assert score.coverage == pytest.approx(4 / 12)

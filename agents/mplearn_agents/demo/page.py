@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from mplearn.demonstrator import Demonstration
-    from mplearn.library import PrimitiveLibrary
+    from mplearn.library import Primitive, PrimitiveLibrary
     from mplearn_agents.learning import LearningLog
     from mplearn_agents.walk import WalkResult
 
@@ -187,21 +187,21 @@ def _rows(run: Run) -> tuple[Row, ...]:
         learned = [p for p in run.library.primitives if score.classes.get(p.id) == label]
         if not learned:
             rows.append(Row((meaning(label), "-", str(count), "", "", "", "not learned"), True))
-        for primitive in learned:
-            rows.append(
-                Row(
-                    (
-                        meaning(label),
-                        str(primitive.id),
-                        str(count),
-                        str(score.recognised[primitive.id]),
-                        str(score.right[primitive.id]),
-                        f"{primitive.mean_duration_s:.2f} s",
-                        ", ".join(map(readable, most_active(primitive, run.library.channels))),
-                    )
-                )
-            )
+        rows += [_row(run, primitive, label) for primitive in learned]
     return tuple(rows)
+
+
+def _row(run: Run, primitive: Primitive, label: str) -> Row:
+    cells = (
+        meaning(label),
+        str(primitive.id),
+        str(run.score.performed[label]),
+        str(run.score.recognised[primitive.id]),
+        str(run.score.right[primitive.id]),
+        f"{primitive.mean_duration_s:.2f} s",
+        ", ".join(map(readable, most_active(primitive, run.library.channels))),
+    )
+    return Row(cells)
 
 
 def _walk(run: Run) -> Walk:
