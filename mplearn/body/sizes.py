@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from mplearn.recording import FloatArray, IntArray
 
@@ -44,7 +45,7 @@ def fit_sizes(
         Factors on the body's sizes, shape (B, 3), and the markers' places, shape (M, 3) [m].
     """
     groups = _groups(tree)
-    n_groups, n_markers, n_frames = groups.max() + 1, len(bodies), len(frames)
+    n_groups, n_markers, n_frames = int(groups.max()) + 1, len(bodies), len(frames)
     n_unknowns = n_groups + 3 * n_markers + 3 * n_frames
     expected = np.zeros(n_unknowns)
     expected[:n_groups] = 1.0
@@ -52,24 +53,10 @@ def fit_sizes(
     normal[range(n_groups), range(n_groups)] = (size_sigma / MARKER_SIGMA_M) ** -2.0
     shifted = range(n_groups, n_groups + 3 * n_markers)
     normal[shifted, shifted] = (PLACE_SIGMA_M / MARKER_SIGMA_M) ** -2.0
-    block, unknowns = np.zeros((3, n_groups + 6)), np.arange(n_groups + 6)
-    block[:, n_groups + 3 :] = np.eye(3)
-    for k, (q, frame) in enumerate(zip(postures, frames, strict=True)):
-        mats = tree.forward(q)[1]
-        reach = np.zeros((len(tree.parent), 3, n_groups))  # body origins, per unit of each group
-        for b in range(1, len(tree.parent)):
-            p = tree.parent[b]
-            reach[b] = reach[p] + _per_group(mats[p], size[p] * tree.offset[b], groups[p], n_groups)
-        unknowns[n_groups + 3 :] = np.arange(3) + n_groups + 3 * n_markers + 3 * k
-        for m in np.flatnonzero(np.isfinite(frame).all(axis=1)):
-            b = bodies[m]
-            block[:, :n_groups] = reach[b] + _per_group(
-                mats[b], size[b] * template[m], groups[b], n_groups
-            )
-            block[:, n_groups : n_groups + 3] = mats[b]
-            unknowns[n_groups : n_groups + 3] = np.arange(3) + n_groups + 3 * m
-            normal[np.ix_(unknowns, unknowns)] += block.T @ block
-            gradient[unknowns] += block.T @ (frame[m] - block @ expected[unknowns])
+    mats = np.array([tree.forward(q)[1] for q in postures])
+    _add_markers(
+        mats, tree.parent, tree.offset, size, groups, bodies, template, frames, normal, gradient
+    )
     solution = expected + np.linalg.solve(normal, gradient)
     factors = size * np.clip(solution[:n_groups], NARROWEST, WIDEST)[groups]
     shifts = solution[n_groups : n_groups + 3 * n_markers].reshape(n_markers, 3)
@@ -115,9 +102,50 @@ def _groups(tree: KinematicTree) -> IntArray:
     return groups
 
 
-def _per_group(mat: FloatArray, vector: FloatArray, groups: IntArray, n: int) -> FloatArray:
-    """Return how a vector (3,) in a body's frame moves with each group's factor, shape (3, n)."""
-    out = np.zeros((3, n))
-    for axis in range(3):
-        out[:, groups[axis]] += mat[:, axis] * vector[axis]
-    return out
+@njit(cache=True)
+def _add_markers(
+    mats: FloatArray,
+    parent: IntArray,
+    offset: FloatArray,
+    size: FloatArray,
+    groups: IntArray,
+    bodies: IntArray,
+    template: FloatArray,
+    frames: FloatArray,
+    normal: FloatArray,
+    gradient: FloatArray,
+) -> None:
+    """Add what the seen markers say, linearised at factors of one, to the normal equations."""
+    n_groups, n_markers = groups.max() + 1, len(bodies)
+    reach = np.zeros((len(parent), 3, n_groups))  # body origins, per unit of each group
+    block, unknowns = np.zeros((3, n_groups + 6)), np.arange(n_groups + 6)
+    for k in range(len(frames)):
+        for b in range(1, len(parent)):
+            p = parent[b]
+            reach[b] = reach[p]
+            for i in range(3):
+                for axis in range(3):
+                    reach[b, i, groups[p, axis]] += (
+                        mats[k, p, i, axis] * size[p, axis] * offset[b, axis]
+                    )
+        for m in range(n_markers):
+            if np.isnan(frames[k, m]).any():
+                continue
+            b = bodies[m]
+            block[:] = 0.0
+            for i in range(3):
+                block[i, n_groups + 3 + i] = 1.0
+                unknowns[n_groups + i] = n_groups + 3 * m + i
+                unknowns[n_groups + 3 + i] = n_groups + 3 * (n_markers + k) + i
+                block[i, :n_groups] = reach[b, i]
+                for axis in range(3):
+                    block[i, n_groups + axis] = mats[k, b, i, axis]
+                    block[i, groups[b, axis]] += (
+                        mats[k, b, i, axis] * size[b, axis] * template[m, axis]
+                    )
+            for i in range(3):
+                error = frames[k, m, i] - block[i, :n_groups].sum()
+                for u in range(len(unknowns)):
+                    gradient[unknowns[u]] += block[i, u] * error
+                    for v in range(len(unknowns)):
+                        normal[unknowns[u], unknowns[v]] += block[i, u] * block[i, v]
