@@ -50,9 +50,13 @@ class TreeConfig:
             ever seen (of the channel's group).
         power: Power of the likelihood distance [nat] that everything below is measured in; 1 is
             eq. 5 itself, 0.5 makes it grow linearly with the difference of postures.
-        cutoff: K_cutoff of eq. 7: a cluster is formed below mu - cutoff * sigma.
-        local: Whether mu and sigma come from the node that grew, as printed, or from all segments
-            ever seen.
+        local: Whether a cluster is formed below mu - cutoff * sigma of the node that grew, as
+            printed (eq. 7), or below a scale taken from a sample of all segments ever seen.
+        cutoff: K_cutoff of eq. 7.
+        spread: That scale over the lower quartile of the distances to the nearest neighbour, which
+            does not depend on how many primitives there are.
+        mean_share: Largest such scale, as a share of the mean distance; it holds while hardly any
+            motion has been seen twice.
         min_exemplars: Members from which on a cluster becomes a node.
         reach: K_maxGD of eq. 6: a node's radius over the largest distance between its exemplars.
         reach_cap: Largest radius over the median of that distance over all leaves.
@@ -71,8 +75,10 @@ class TreeConfig:
     n_states: int = 8
     variance_floor: float = 0.6
     power: float = 0.5
-    cutoff: float = 2.0
     local: bool = False
+    cutoff: float = 1.0
+    spread: float = 3.0
+    mean_share: float = 0.25
     min_exemplars: int = 4
     reach: float = 1.5
     reach_cap: float = 1.75
@@ -91,7 +97,6 @@ class TreeConfig:
             cls(),
             form=FormConfig(n_points=32, head=0.0, ramp=0.0, centring=0.0),
             power=1.0,
-            cutoff=1.0,
             local=True,
             reach_cap=math.inf,
             n_nearest=1_000,
@@ -100,7 +105,7 @@ class TreeConfig:
         )
 
     def __post_init__(self) -> None:
-        for name in ("variance_floor", "power", "reach", "reach_cap"):
+        for name in ("variance_floor", "power", "spread", "mean_share", "reach", "reach_cap"):
             if not getattr(self, name) > 0:
                 raise InvalidValueError(f"{name} must be positive, not {getattr(self, name)}")
         lowest = {

@@ -92,9 +92,22 @@ class DistanceSample:
         """Measure all distances again."""
         self._matrix[: len(self.numbers), : len(self.numbers)] = bank.matrix(self.numbers)
 
-    def moments(self) -> tuple[float, float]:
-        """Return mean and standard deviation of the distances; NaN below two segments."""
-        return moments(self._matrix[: len(self.numbers), : len(self.numbers)])
+    def scale(self, spread: float, mean_share: float) -> float:
+        """Return the largest distance expected between executions of one motion.
+
+        Once motions recur, most segments have another of their kind for a nearest neighbour.
+
+        Args:
+            spread: Scale over the lower quartile of the distances to the nearest neighbour.
+            mean_share: Largest scale over the mean distance.
+        """
+        n = len(self.numbers)
+        if n < 2:
+            return 0.0
+        matrix = self._matrix[:n, :n]
+        nearest = (matrix + np.diag(np.full(n, np.inf))).min(axis=1)
+        mean = matrix.sum() / (n * (n - 1))
+        return float(min(spread * np.percentile(nearest, 25), mean_share * mean))
 
     def state(self) -> dict[str, Any]:
         """Return everything as plain arrays."""

@@ -201,11 +201,8 @@ class PrimitiveTree:
         moved: list[tuple[int, int]] = []
         while True:
             loose = [i for i, number in enumerate(node.members) if number not in node.settled]
-            mu, sigma = moments(node.matrix) if self.config.local else self._sample.moments()
             groups = clusters_below(
-                node.matrix[np.ix_(loose, loose)],
-                mu - self.config.cutoff * sigma,
-                self.config.min_exemplars,
+                node.matrix[np.ix_(loose, loose)], self._cutoff(node), self.config.min_exemplars
             )
             if not groups:
                 return tuple(born), (), tuple(moved)
@@ -217,6 +214,13 @@ class PrimitiveTree:
             moved += [(number, child.id) for number in members]
             if node.id == ROOT and not self.config.local:
                 moved += self._reassign(child, mean_nearest(apart, self.config.n_nearest))
+
+    def _cutoff(self, node: Node) -> float:
+        """Return the largest distance inside a cluster that becomes a node, D_cutoff."""
+        if self.config.local:
+            mu, sigma = moments(node.matrix)
+            return mu - self.config.cutoff * sigma
+        return self._sample.scale(self.config.spread, self.config.mean_share)
 
     def _child(self, parent: Node, members: Sequence[int]) -> Node:
         """Form a node below another from some of its exemplars."""
