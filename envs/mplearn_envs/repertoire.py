@@ -20,7 +20,7 @@ from .control.reference import Reference
 from .feasibility import Feasibility, FeasibilityCheck, FeasibilityConfig
 
 HOLD = 0
-ENTRY_GAP = 0.35  # root mean square over the tracked coordinates [rad]
+ENTRY_GAP = 0.5  # largest difference of a tracked coordinate [rad]
 HEIGHT_SCALE = 5.0  # 0.2 m of height count as much as 1 rad
 
 
@@ -134,8 +134,8 @@ class Repertoire:
     def entries(self, posture: FloatArray) -> Choices:
         """Return with which primitives a walk may begin in a posture: those that start near it.
 
-        Weighted by how often each was seen. Where none that is feasible starts near, the nearest
-        feasible one is legal, so that a walk always goes on.
+        They are the feasible ones that start at most ``ENTRY_GAP`` farther than the nearest one, so
+        that there always are some; weighted by how often each was seen.
 
         Args:
             posture: Tracked coordinates, shape (U,) [m, rad].
@@ -144,26 +144,28 @@ class Repertoire:
             RobotError: The robot can perform none of the primitives.
         """
         gaps = {id: self._gap(posture, id) for id in self.ids}
-        near = {id: 1.0 for id in self.ids if gaps[id] <= ENTRY_GAP}
-        weights = {id: float(self.library[id].n_exemplars) for id in near}
-        choices = self._choices(weights)
-        if not choices.dead_end:
-            return choices
-        for id in sorted(set(self.ids) - set(near), key=lambda id: (gaps[id], id)):
-            if self.feasibility(id).feasible:
-                return self._choices({**weights, id: 1.0})
-        reasons = "; ".join(
-            f"{self.library[id].name}: {self.feasibility(id).problems[0]}" for id in self.ids[:6]
-        )
-        raise RobotError(
-            f"robot {self.planner.robot.name!r} can perform none of the library's {len(self.ids)} "
-            f"primitives ({reasons})"
+        nearest = sorted(self.ids, key=lambda id: (gaps[id], id))
+        first = next((id for id in nearest if self.feasibility(id).feasible), None)
+        if first is None:
+            reasons = "; ".join(
+                f"{self.library[id].name}: {self.feasibility(id).problems[0]}" for id in nearest[:6]
+            )
+            raise RobotError(
+                f"robot {self.planner.robot.name!r} can perform none of the library's "
+                f"{len(self.ids)} primitives ({reasons})"
+            )
+        return self._choices(
+            {
+                id: float(self.library[id].n_exemplars)
+                for id in nearest
+                if gaps[id] <= gaps[first] + ENTRY_GAP
+            }
         )
 
     def _gap(self, posture: FloatArray, id: int) -> float:
         difference = self.frames(id)[0][0, self._tracked] - posture
         difference[0] *= HEIGHT_SCALE
-        return float(np.sqrt(np.mean(difference**2)))
+        return float(np.abs(difference).max())
 
     def _choices(self, weights: dict[int, float]) -> Choices:
         mask, prior = np.zeros(self.capacity, np.int8), np.zeros(self.capacity)

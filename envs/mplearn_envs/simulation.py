@@ -98,19 +98,19 @@ class Simulation:
             frame_steps: See there.
         """
         model, data = self.model, self.data
-        step, control = mujoco.mj_step, data.ctrl
+        step, control, force = mujoco.mj_step, data.ctrl, data.qfrc_constraint[:6]
         n_knots = len(plan.q) - 1
         n_steps = len(plan.commands) // n_knots
         q, cog = np.empty((n_knots, model.nq)), np.empty((n_knots, 3))
-        ground = np.empty((n_knots, 6))
+        ground = np.zeros((n_knots, 6))  # sums over a knot's steps: single ones flutter
         next_frame, fallen, done = frame_steps, False, n_knots
         for knot in range(n_knots):
+            reaction = ground[knot]
             for command in plan.commands[knot * n_steps : (knot + 1) * n_steps]:
                 control[:] = command
                 step(model, data)
-            q[knot], cog[knot], ground[knot] = (
-                data.qpos, data.subtree_com[1], data.qfrc_constraint[:6],
-            )  # fmt: skip
+                reaction += force
+            q[knot], cog[knot] = data.qpos, data.subtree_com[1]
             if on_frame is not None and (knot + 1) * n_steps >= next_frame:
                 next_frame += frame_steps
                 self._update_positions()
@@ -120,7 +120,7 @@ class Simulation:
                 break
         fallen = fallen or self._has_fallen(plan.q[-1])
         self._update_positions()
-        return self._performance(plan, q[:done], cog[:done], ground[:done], fallen)
+        return self._performance(plan, q[:done], cog[:done], ground[:done] / n_steps, fallen)
 
     def _performance(
         self, plan: Plan, q: FloatArray, cog: FloatArray, ground: FloatArray, fallen: bool

@@ -24,7 +24,7 @@ class CogFilter:
         jerk: Standard deviation of the COG's jerk, as white noise [m/s^3 per sqrt(Hz)].
     """
 
-    def __init__(self, rate_hz: float, noise_m: float = 0.001, jerk: float = 5.0) -> None:
+    def __init__(self, rate_hz: float, noise_m: float = 0.001, jerk: float = 1.0) -> None:
         for name, value in (("rate_hz", rate_hz), ("noise_m", noise_m), ("jerk", jerk)):
             if not (np.isfinite(value) and value > 0):
                 raise InvalidValueError(f"{name} must be positive and finite, not {value}")

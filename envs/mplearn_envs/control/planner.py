@@ -26,6 +26,7 @@ from .velocity_ik import settle
 
 TOLERANCE = 1e-8  # [m, rad] to which the feet, COG and base follow
 GRID_DECIMALS = 6
+OUT_OF_REACH = 1e-3  # [m, rad]: an error that slowing down does not mend
 
 
 class Motion(NamedTuple):
@@ -52,7 +53,8 @@ class PlannerConfig:
     Attributes:
         period_s: Time between commands [s].
         knot_steps: Commands from one solution of the inverse kinematics to the next.
-        blend_s: Shortest time in which the present posture gives way to the primitive's [s].
+        blend_s: Time in which the present posture gives way to the primitive's [s]: less in short
+            motions, more where there is far to go.
         blend_velocity: Share of the velocity limits that the blending may take.
         cache_size: Number of plans that are kept.
     """
@@ -157,7 +159,7 @@ class Planner:
             path = np.hstack((tracked[:, :N_BASE], q[:, 7:]))  # (K + 1, 3 + n)
             velocity = np.diff(path, axis=0) / knot_s
             excess = float(np.max(np.abs(velocity) / self._velocity))
-            if excess <= 1.0:
+            if excess <= 1.0 or error.max() > OUT_OF_REACH:
                 break
             speed /= 1.02 * excess
         last = (targets[-1], (targets[-1] - targets[-2]) / knot_s, q[-1])
@@ -170,13 +172,13 @@ class Planner:
         limits, velocity = self._reference.limits, self._reference.velocity
         frames = np.clip(motion.frames, limits[:, 0], limits[:, 1])
         gap = start.target - frames[0]
-        blend_s = max(
-            self.config.blend_s,
-            float(np.max(1.875 * np.abs(gap) / (self.config.blend_velocity * velocity))),
-        )
-        wait_s = max(0.0, blend_s - 0.6 * motion.duration_s / speed)
+        length_s = motion.duration_s / speed
+        allowed = self.config.blend_velocity * velocity
+        needed_s = float(np.max(1.875 * np.abs(gap) / allowed))  # a quintic's peak velocity
+        blend_s = max(needed_s, min(self.config.blend_s, 0.6 * length_s))
+        wait_s = max(0.0, needed_s - 0.6 * length_s)
         ramp_s = 0.3 if wait_s > 0 else 0.0
-        n_knots = max(2, round((wait_s + 0.5 * ramp_s + motion.duration_s / speed) / knot_s))
+        n_knots = max(2, round((wait_s + 0.5 * ramp_s + length_s) / knot_s))
         time = np.arange(1.0, n_knots + 1.0) * knot_s
         progress = _progress(time, wait_s, ramp_s)
         at = progress / progress[-1] * (len(frames) - 1)  # in frames

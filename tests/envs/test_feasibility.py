@@ -1,0 +1,85 @@
+"""Verdicts and their reasons."""
+
+import numpy as np
+import pytest
+from standing_library import ARMS, BOW, KICK, RATE_HZ, SQUAT, STANDING_M, posture, sweep
+
+from mplearn_envs.control import Planner
+from mplearn_envs.feasibility import FeasibilityCheck, FeasibilityConfig
+from mplearn_envs.robot import humanoid
+
+CHECK = FeasibilityCheck(Planner(humanoid()))
+
+
+def kinds(verdict):
+    return [problem.kind for problem in verdict.problems]
+
+
+@pytest.mark.parametrize("end", [ARMS, BOW, SQUAT])
+@pytest.mark.parametrize("speed", [0.5, 1.0])
+def test_motions_with_both_feet_down_are_feasible(end, speed):
+    verdict = CHECK.judge(sweep({}, end, 1.0), RATE_HZ, speed)
+    assert verdict.feasible and verdict.speed == speed
+    assert verdict.zmp_margin_m > 0.05 and 0.05 < verdict.torque_share < 0.6
+
+
+@pytest.mark.parametrize("side", ["l", "r"])
+def test_lifting_a_foot_is_refused_with_that_reason(side):
+    lift = {name.replace("_l", f"_{side}"): value for name, value in KICK.items()}
+    for frames in (sweep({}, lift, 0.8), sweep(lift, {}, 0.8)):
+        verdict = CHECK.judge(frames, RATE_HZ, 0.5)
+        assert kinds(verdict) == ["foot_lift"]
+        assert verdict.problems[0].where == f"foot_{side}"
+        assert verdict.problems[0].value > 0.15
+        assert "allowed 0.03" in str(verdict.problems[0])
+
+
+def test_small_differences_of_the_feet_are_no_lift():
+    shuffle = {"knee_l": 0.15, "hip_pitch_l": -0.08, "ankle_pitch_l": -0.07}
+    assert CHECK.judge(sweep({}, shuffle, 1.0), RATE_HZ, 0.5).feasible
+
+
+def test_too_fast_a_motion_is_slowed_down_and_at_last_refused():
+    fast = sweep({}, ARMS, 0.12)
+    slowed = CHECK.judge(fast, RATE_HZ, 1.0)
+    assert slowed.speed < 1.0
+    frantic = CHECK.judge(
+        np.vstack([sweep({}, ARMS, 0.05), sweep(ARMS, {}, 0.05)] * 3), RATE_HZ, 2.0
+    )
+    assert not frantic.feasible and {"velocity", "torque", "balance"} & set(kinds(frantic))
+
+
+def test_what_is_beyond_the_joints_is_refused():
+    verdict = CHECK.judge(sweep({}, {"elbow_l": 1.0}, 1.0), RATE_HZ, 0.5)
+    assert kinds(verdict) == ["limit"]
+    assert verdict.problems[0].where == "elbow_l"
+
+
+def test_a_squat_too_deep_for_the_legs_is_out_of_reach():
+    deep = sweep({}, {"base_height": -0.47}, 2.0)
+    verdict = CHECK.judge(deep, RATE_HZ, 0.5)
+    assert not verdict.feasible and "reach" in kinds(verdict)
+
+
+def test_torque_and_balance_limits_are_kept():
+    motion = sweep({}, BOW, 1.0)
+    weak = FeasibilityCheck(CHECK.planner, FeasibilityConfig(torque_share=0.05))
+    assert "torque" in kinds(weak.judge(motion, RATE_HZ, 0.5))
+    timid = FeasibilityCheck(CHECK.planner, FeasibilityConfig(zmp_margin_m=0.2))
+    assert "balance" in kinds(timid.judge(motion, RATE_HZ, 0.5))
+
+
+def test_a_jerky_motion_is_slowed_for_balance():
+    """A bow whose full speed would throw the zero-moment point out of the soles."""
+    careful = FeasibilityCheck(CHECK.planner, FeasibilityConfig(zmp_margin_m=0.09))
+    verdict = careful.judge(sweep({}, {"base_pitch": 0.9}, 0.7), RATE_HZ, 1.0)
+    assert verdict.speed < 1.0
+    assert verdict.feasible and verdict.zmp_margin_m > 0.09
+
+
+def test_standing_postures_are_reached():
+    target = posture({})[CHECK._columns]
+    assert target[0] == STANDING_M
+    reference = CHECK.posture(target)
+    np.testing.assert_allclose(reference.target, target, atol=1e-6)
+    assert np.abs(reference.velocity).max() < 1e-6

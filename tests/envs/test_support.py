@@ -1,0 +1,119 @@
+"""Hull, margins and zero-moment points against scipy and mechanics."""
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import ConvexHull, Delaunay
+
+from mplearn.errors import FrameError, InvalidValueError
+from mplearn_envs.control.cog_filter import CogFilter
+from mplearn_envs.control.inverse_dynamics import InverseDynamics
+from mplearn_envs.control.reference import reference_robot
+from mplearn_envs.control.support import (
+    convex_hull,
+    pendulum_zmp,
+    support_margin,
+    zero_moment_point,
+)
+from mplearn_envs.robot import humanoid
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10_000), st.integers(4, 20))
+def test_the_hull_and_the_inside_are_scipys(seed, n):
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(n, 2))
+    hull = convex_hull(points)
+    expected = points[ConvexHull(points).vertices]
+    assert sorted(map(tuple, hull)) == sorted(map(tuple, expected))
+    area = 0.5 * np.sum(hull[:, 0] * np.roll(hull[:, 1], -1) - hull[:, 1] * np.roll(hull[:, 0], -1))
+    assert area == pytest.approx(ConvexHull(points).volume)  # positive: counter-clockwise
+    probes = rng.normal(size=(50, 2))
+    inside = Delaunay(hull).find_simplex(probes) >= 0
+    np.testing.assert_array_equal(support_margin(hull, probes) >= 0, inside)
+
+
+def test_margins_of_a_rectangle():
+    hull = convex_hull(np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [0.0, 2.0], [2.0, 0.0]]))
+    assert len(hull) == 4
+    points = np.array([[2.0, 1.0], [0.5, 1.0], [5.0, 1.0], [np.nan, 1.0]])
+    np.testing.assert_allclose(support_margin(hull, points), [1.0, 0.5, -1.0, np.nan])
+
+
+def test_points_without_a_polygon_are_refused():
+    with pytest.raises(InvalidValueError, match="no polygon"):
+        convex_hull(np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]))
+
+
+def test_the_zmp_of_two_vertical_forces_is_their_centre():
+    places, forces = np.array([[0.1, 0.2, 0.0], [0.3, -0.1, 0.0]]), np.array([100.0, 300.0])
+    origin = np.array([0.05, 0.02, 0.9])
+    force = np.array([20.0, -10.0, forces.sum()])
+    moment = np.zeros(3)
+    for place, lift in zip(places, forces, strict=True):
+        share = np.append(force[:2] * lift / forces.sum(), lift)
+        moment += np.cross(place - origin, share)
+    expected = (places[:, :2] * forces[:, None]).sum(axis=0) / forces.sum()
+    np.testing.assert_allclose(zero_moment_point(force, moment, origin), expected)
+    assert np.isnan(zero_moment_point(np.zeros(3), moment, origin)).all()
+
+
+def test_a_point_masss_zmp_is_the_pendulums():
+    cog, acceleration = np.array([0.1, 0.2, 0.8]), np.array([1.0, -0.5, 0.3])
+    force = 50.0 * (acceleration + np.array([0.0, 0.0, 9.81]))
+    np.testing.assert_allclose(
+        pendulum_zmp(cog, acceleration), zero_moment_point(force, np.zeros(3), cog)
+    )
+
+
+def test_static_torques_and_zmp_are_those_of_the_simulation():
+    robot = humanoid()
+    rest = reference_robot(robot).rest
+    dynamics = InverseDynamics(robot)
+    zmp, share = dynamics.along(np.repeat(rest[None], 6, axis=0), 0.02)
+    np.testing.assert_allclose(zmp[0], reference_robot(robot).stance.cog, atol=1e-6)
+    model = robot.model()
+    data = mujoco.MjData(model)
+    data.qpos[:] = rest
+    data.ctrl[:] = rest[7:]
+    for _ in range(500):
+        mujoco.mj_step(model, data)
+    measured = np.abs(data.actuator_force) / robot.per_joint("torque")
+    np.testing.assert_allclose(share[0], measured, atol=0.02)
+
+
+def test_the_cog_filter_follows_a_swaying_cog():
+    rng = np.random.default_rng(0)
+    t = np.arange(0, 6, 0.01)
+    sway = 0.02 * np.sin(2 * np.pi * 0.5 * t)
+    acceleration = -((2 * np.pi * 0.5) ** 2) * sway
+    cog = np.stack((sway, np.zeros_like(t), np.full_like(t, 0.85)), axis=1)
+    cog_filter = CogFilter(100.0, noise_m=0.0005)
+    estimates, zmp = [], []
+    for i, measured in enumerate(cog + rng.normal(scale=0.0005, size=cog.shape)):
+        estimates.append(cog_filter.update(None if i % 20 == 7 else measured))
+        zmp.append(cog_filter.zmp())
+
+    def rmse(ours, truth):
+        return np.sqrt(np.mean((np.asarray(ours) - truth)[200:] ** 2))
+
+    estimates = np.array(estimates)
+    assert rmse(estimates[:, 0, 0], sway) < 0.0004  # below the noise
+    assert rmse(estimates[:, 2, 0], acceleration) < 0.13
+    differences = np.gradient(np.gradient(cog[:, 0] + rng.normal(scale=0.0005, size=600))) * 1e4
+    assert rmse(estimates[:, 2, 0], acceleration) < 0.1 * rmse(differences, acceleration)
+    assert rmse(np.array(zmp)[:, 0], sway - 0.85 * acceleration / 9.81) < 0.012
+
+
+def test_the_cog_filter_refuses_bad_input():
+    with pytest.raises(InvalidValueError, match="rate_hz"):
+        CogFilter(0.0)
+    cog_filter = CogFilter(100.0)
+    with pytest.raises(FrameError, match="first"):
+        cog_filter.update(None)
+    with pytest.raises(FrameError, match="finite"):
+        cog_filter.update(np.array([0.0, np.nan, 0.0]))
+    with pytest.raises(FrameError, match="not been given"):
+        cog_filter.zmp()
