@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from ..recording import Segment
+from ..tree import Placement
 
 
 @dataclass(frozen=True)
@@ -18,9 +19,11 @@ class SegmentClosed:
 
     Attributes:
         segment: Where it lies, and how sure its end is.
+        placement: All that the tree said of it; None for a pause, which the tree does not see.
     """
 
     segment: Segment
+    placement: Placement | None = None
 
 
 @dataclass(frozen=True)

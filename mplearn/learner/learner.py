@@ -245,12 +245,12 @@ class MotionLearner:
             end=segment.end + self._stream_start,
             decided_at=segment.decided_at + self._stream_start,
         )
-        events: list[Event] = [SegmentClosed(segment)]
         if segment.still:
             self._chain.paused(segment)
-            return events
+            return [SegmentClosed(segment)]
         known = len(self.tree.leaves)
         placement = self.tree.insert(frames)
+        events: list[Event] = [SegmentClosed(segment, placement)]
         if placement.recognised:
             events.append(Recognised(segment, placement.node_id, placement.distance))
         elif known and placement.ratio > self.config.motion_radius:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
-
 from ...recording import LabelledSegment, Recording
 from ...segmentation import SEGMENTERS, make_segmenter
 from ..boundaries import BoundaryScore, score_boundaries
 from ..executions import split_repetitions
 from ..observing import observe
 from ..table import Table, percent
+from .sessions import by_person
 
 TOLERANCE_S = 0.25
 
@@ -25,11 +25,8 @@ def boundary_table(takes: Iterable[Recording]) -> Table:
     Returns:
         One row a segmenter and person, and one over all people.
     """
-    people: dict[str, list[Recording]] = defaultdict(list)
-    for take in takes:
-        people[take.person].append(take)
     scores: dict[tuple[str, str], list[tuple[BoundaryScore, BoundaryScore]]] = defaultdict(list)
-    for person, own in people.items():
+    for person, own in by_person(takes).items():
         for take in split_repetitions(own):
             features = observe(take)
             for name in SEGMENTERS:
@@ -60,7 +57,7 @@ def boundary_table(takes: Iterable[Recording]) -> Table:
         note=(
             f"Matched one to one within {TOLERANCE_S} s. All boundaries: joins of repetitions, and "
             "the reversal inside each, which is found from the farthest posture; a cut there is "
-            "right. The first repetition of a take is left out: it starts in the middle of a motion."
+            "right. A take's first repetition is left out: it starts in the middle of a motion."
         ),
     )
 

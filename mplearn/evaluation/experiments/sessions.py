@@ -1,0 +1,41 @@
+"""The sessions that learning is measured on: the synthetic demonstrator's, and people's."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from ...demonstrator import paper_session
+from ...recording import Recording
+from ..sessions import make_session
+from .learning import Outcome, learn_session
+
+ORDERS = 5
+
+
+def learn_paper_sessions(seeds: Sequence[int]) -> Iterator[tuple[str, Outcome]]:
+    """Learn sessions like the paper's: 16 minutes, 22 types, about 751 segments."""
+    for seed in seeds:
+        demonstration = paper_session(seed)
+        yield (
+            f"paper_session({seed})",
+            learn_session(demonstration.recording, demonstration.truth),
+        )
+
+
+def learn_people(takes: Iterable[Recording], orders: int = ORDERS) -> Iterator[tuple[str, Outcome]]:
+    """Learn each person's takes, joined into sessions in several orders, by a new learner each."""
+    for person, own in by_person(takes).items():
+        for order in range(orders):
+            session = make_session(own, np.random.default_rng(order))
+            yield f"{person or 'unnamed'}, order {order}", learn_session(session)
+
+
+def by_person(takes: Iterable[Recording]) -> dict[str, list[Recording]]:
+    """Group takes by who performs them, in the order of their first take."""
+    people: dict[str, list[Recording]] = defaultdict(list)
+    for take in takes:
+        people[take.person].append(take)
+    return people
