@@ -69,9 +69,9 @@ class PrimitiveHumanoidEnv(gymnasium.Env[Observation, np.int64]):
     that the robot can perform (`Feasibility`). The prior is their observed frequency; hold has
     probability 0 as long as there is another choice. Holding changes nothing in that: the same
     successors stay legal. At a dead end only hold is legal, with probability 1; it makes an
-    *entry*: as at the start of an episode, those primitives are legal that start near the present
-    posture, or else the nearest one, with their observed frequency as prior. So a walk by the prior
-    goes on for ever::
+    *entry*: as at the start of an episode, those primitives are legal that start nearest to the
+    present posture (up to 0.5 rad farther than the nearest one), with their observed frequency as
+    prior. So a walk by the prior goes on for ever::
 
         action = env.action_space.sample(probability=info["transition_prior"])
 

@@ -1,0 +1,1 @@
+"""The built-in library, and the command that makes it."""
