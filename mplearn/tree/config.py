@@ -23,7 +23,7 @@ class FormConfig:
     """
 
     n_points: int = 16
-    head: float = 0.2
+    head: float = 0.25
     ramp: float = 0.2
     centring: float = 0.5
 
@@ -63,6 +63,8 @@ class TreeConfig:
         n_nearest: A segment's distance to a node is the mean of that to so many exemplars.
         split_ratio: A leaf is split when the distance between its two branches exceeds that inside
             them by this; inf for never.
+        merge_ratio: Two leaves that a segment lies in are merged when the distance between them is
+            below that inside them times this; 0 for never.
         n_candidates: Leaves, by mean trajectory, that are looked at closely; 0 to search down from
             the root, as printed.
         max_exemplars: Exemplars kept by a node.
@@ -77,13 +79,14 @@ class TreeConfig:
     power: float = 0.5
     local: bool = False
     cutoff: float = 1.0
-    spread: float = 3.0
-    mean_share: float = 0.25
+    spread: float = 6.0
+    mean_share: float = 0.28
     min_exemplars: int = 4
     reach: float = 1.5
     reach_cap: float = 1.75
     n_nearest: int = 3
     split_ratio: float = 2.0
+    merge_ratio: float = 1.4
     n_candidates: int = 6
     max_exemplars: int = 12
     max_unplaced: int = 200
@@ -101,6 +104,7 @@ class TreeConfig:
             reach_cap=math.inf,
             n_nearest=1_000,
             split_ratio=math.inf,
+            merge_ratio=0.0,
             n_candidates=0,
         )
 
@@ -118,6 +122,7 @@ class TreeConfig:
             "n_sampled": 3,
             "seed": 0,
             "split_ratio": 1,
+            "merge_ratio": 0,
         }
         for name, low in lowest.items():
             if not getattr(self, name) >= low:

@@ -17,7 +17,7 @@ from .bank import ExemplarBank
 from .clustering import clusters_below, separation, two_branches
 from .config import TreeConfig
 from .node import Node
-from .placement import ROOT, Placement, Split
+from .placement import ROOT, Match, Merge, Placement, Split
 from .recogniser import Recogniser, refusal
 from .search import NodeIndex, mean_nearest
 from .spread import ChannelSpread, DistanceSample, moments
@@ -148,10 +148,12 @@ class PrimitiveTree:
         recognised = node.id != ROOT and node.is_leaf
         self._add(node, number)
         born, splits, moved = self._grow(node)
+        merges = () if splits or not recognised else self._merge(matches)
         self._release(number)
         home = next((to for which, to in moved if which == number), node.id)
+        home = next((merge.kept for merge in merges if merge.absorbed == home), home)
         others = tuple(move for move in moved if move[0] != number)
-        return Placement(number, home, recognised, distance, ratio, born, splits, (), others)
+        return Placement(number, home, recognised, distance, ratio, born, splits, merges, others)
 
     def _remember(self, number: int, frames: FloatArray) -> None:
         """Model a segment; it is held until released."""
@@ -272,6 +274,38 @@ class PrimitiveTree:
             into.append(child.id)
             moved += [(number, child.id) for number in group]
         return tuple(into), (Split(leaf.id, tuple(into)),), tuple(moved)
+
+    def _merge(self, matches: Sequence[Match]) -> tuple[Merge, ...]:
+        """Merge the two leaves that a segment lies in, if they are no farther apart than inside."""
+        inside = [match.node for match in matches if match.ratio <= 1]
+        if len(inside) < 2 or self.config.local:
+            return ()
+        older, younger = sorted((self._nodes[id] for id in inside[:2]), key=lambda node: node.id)
+        rows = [self._bank.distances(self._bank[n], younger.members) for n in older.members]
+        across = np.stack(rows)
+        joint = np.block([[older.matrix, across], [across.T, younger.matrix]])
+        first, second = np.split(np.arange(len(joint)), [len(older.members)])
+        if separation(joint, first, second) >= self.config.merge_ratio:
+            return ()
+        older.matrix = joint
+        older.members += younger.members
+        older.n_placed += younger.n_placed
+        older.n_frames += younger.n_frames
+        older.history.append(("merged", self.n_seen))
+        self._remove(younger)
+        self._release(*older.thin(self.config.max_exemplars))
+        self._reindex()
+        return (Merge(older.id, younger.id),)
+
+    def _remove(self, node: Node) -> None:
+        """Take a leaf out of the tree, and what is above it and holds nothing else."""
+        del self._nodes[node.id]
+        self._models.pop(node.id, None)
+        parent = self._nodes[node.parent if node.parent is not None else ROOT]
+        parent.children.remove(node.id)
+        if parent.id != ROOT and not parent.children:
+            self._release(*parent.members)
+            self._remove(parent)
 
     # ---- keeping
 
