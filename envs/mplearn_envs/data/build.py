@@ -1,8 +1,8 @@
 """Make the built-in library: ``python -m mplearn_envs.data.build`` writes ``default.mplearn``.
 
 The demonstrator performs the paper's 22 primitives, a `MotionLearner` watches its markers and
-learns them, like any user's. Only what acting needs is kept (no recogniser), and the primitives get the
-names that the demonstrator gives them, as a person would name them on seeing them.
+learns them, like any user's. Only what acting needs is kept (no recogniser), and the primitives get
+the names that the demonstrator gives them, as a person would name them on seeing them.
 """
 
 from __future__ import annotations
