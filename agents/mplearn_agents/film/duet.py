@@ -63,14 +63,14 @@ def _stretched(frames: FloatArray, n: int) -> FloatArray:
 
 
 def _centred(body: Body, frames: FloatArray) -> FloatArray:
-    """Move a motion so that its first posture stands about the origin and looks along x."""
-    left, right = (body.tree.body(f"foot_{side}") for side in "lr")
-    places, _ = body.tree.forward(frames[0])
-    across = places[left, :2] - places[right, :2]
-    half = 0.5 * np.arctan2(across[0], across[1])  # of the turn that brings the left foot to +y
+    """Move a motion so that its first posture stands about the origin, the toes along x."""
+    feet = [body.tree.body(f"foot_{side}") for side in "lr"]
+    places, turns = body.tree.forward(frames[0])
+    ahead = turns[feet, :2, 0].sum(axis=0)
+    half = -0.5 * np.arctan2(ahead[1], ahead[0])
     c, s = np.cos(2 * half), np.sin(2 * half)
     moved = frames.copy()
-    moved[:, :2] = (frames[:, :2] - places[[left, right], :2].mean(axis=0)) @ [[c, s], [-s, c]]
+    moved[:, :2] = (frames[:, :2] - places[feet, :2].mean(axis=0)) @ [[c, s], [-s, c]]
     w, x, y, z = frames[:, 3:7].T
     c, s = np.cos(half), np.sin(half)
     moved[:, 3:7] = np.stack([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w], axis=1)

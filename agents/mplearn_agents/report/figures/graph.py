@@ -106,8 +106,7 @@ def _curve(
     """Return the control points of an edge's quadratic Bezier curve, shape (3, 2)."""
     start, end = places[before], places[after]
     if before == after:
-        outward = start / np.linalg.norm(start)
-        return np.array([start, start + 0.85 * outward, start])
+        return np.repeat([_above(start, 0.42)], 3, axis=0)  # the label of a loop has one place
     return np.array([start, _control(places, order, before, after), end])
 
 
@@ -132,7 +131,7 @@ def _bend(places: Mapping[int, FloatArray], order: Sequence[int], before: int, a
     dx, dy = end - start
     inward = -math.copysign(1.0, float(np.dot((start + end) / 2, [dy, -dx])))
     first = order.index(before) < order.index(after)
-    return inward * (0.14 if first else 0.42)
+    return inward * (0.14 if first else 0.5)
 
 
 def _draw_edge(
@@ -157,12 +156,11 @@ def _draw_edge(
         "zorder": 1 + probability,
     }
     if before == after:
-        start, outward = places[before], places[before] / np.linalg.norm(places[before])
-        side = 0.22 * np.array([-outward[1], outward[0]])
-        foot = start + 0.5 * _PILL * np.array([outward[0], outward[1]])
+        foot = _above(places[before], 0.0)
+        side = np.array([math.copysign(0.16, -foot[1]), 0.0])
         axes.add_patch(
             FancyArrowPatch(
-                _xy(foot - side), _xy(foot + side), connectionstyle="arc3,rad=1.6", **style
+                _xy(foot - side), _xy(foot + side), connectionstyle="arc3,rad=1.8", **style
             )
         )
         return
@@ -237,6 +235,11 @@ def _draw_node(axes: Axes, place: FloatArray, label: str) -> None:
 
 def _widest(words: Sequence[str], at: int) -> int:
     return max(len(" ".join(words[:at])), len(" ".join(words[at:])))
+
+
+def _above(place: FloatArray, gap: float) -> FloatArray:
+    """Return a point outside the ellipse, above or below a node, so far from its rim [in]."""
+    return place + [0.0, math.copysign(0.5 * float(_PILL[1]) + gap, place[1])]
 
 
 def _xy(point: FloatArray) -> tuple[float, float]:
