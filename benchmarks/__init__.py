@@ -1,0 +1,1 @@
+"""Timings, as ratios against named peers or floors, interleaved in one run: ``make bench``."""

@@ -1,0 +1,28 @@
+"""Prints all timings. Run with one core to oneself: ``make bench``."""
+
+import os
+
+os.environ.setdefault("NUMBA_NUM_THREADS", "1")  # before numba is imported: one core for all peers
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+from rich.console import Console
+from rich.table import Table
+
+from . import chain, environment, hmm
+
+
+def main() -> None:
+    console = Console(width=130)
+    for title, module in (
+        ("The learning chain (processor time, one core)", chain),
+        ("Hidden Markov models (interleaved, one core)", hmm),
+        ("The environment", environment),
+    ):
+        table = Table("what", "took", "against", "ratio", title=title, title_justify="left")
+        for row in module.rows():
+            table.add_row(*row)
+        console.print(table)
+
+
+if __name__ == "__main__":
+    main()

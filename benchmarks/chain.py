@@ -1,0 +1,80 @@
+"""The chain, stage by stage and as a whole: how many times faster than real time on one core."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from mplearn import LearnerConfig, MotionLearner
+from mplearn.body import InverseKinematics, robot_body, view_of
+from mplearn.demonstrator import paper_session
+from mplearn.evaluation import observe
+from mplearn.learner import SegmentClosed
+from mplearn.mocap import GapTracker
+from mplearn.segmentation import make_segmenter
+from mplearn.tree import PrimitiveTree, TreeConfig
+
+MINUTES = 4.0
+
+
+def timed(function: Callable[[], object]) -> float:
+    begin = time.process_time()
+    function()
+    return time.process_time() - begin
+
+
+def rows() -> list[tuple[str, str, str, str]]:
+    recording = paper_session(7).recording
+    warm, recording = (
+        recording.sliced(0, 2000),
+        recording.sliced(0, round(MINUTES * 60 * recording.rate_hz)),
+    )
+    config = LearnerConfig(recording.channels, recording.rate_hz)
+    MotionLearner(config).learn_many(warm.frames)
+    learner = MotionLearner(config)
+    events = []
+    whole = timed(lambda: events.extend(learner.learn_many(recording.frames)))
+
+    features = observe(recording)
+    view = view_of(features.channels)
+    seen = view.see(features.frames)
+    markers = recording.markers
+    gaps = GapTracker(markers.shape[1], recording.rate_hz)
+    ik = InverseKinematics(robot_body(), recording.marker_names, rate_hz=recording.rate_hz)
+    ik.calibrate(markers[:60])
+    tree = PrimitiveTree(TreeConfig(), seen.shape[1], recording.rate_hz)
+    segments = [
+        event.segment
+        for event in events
+        if isinstance(event, SegmentClosed) and not event.segment.still
+    ]
+    stages = {
+        "gap tracking": lambda: [gaps.update(each) for each in markers],
+        "inverse kinematics, without gaps": lambda: [ik.update(each) for each in markers],
+        "view": lambda: [view.see(each[None]) for each in features.frames],
+        "tree": lambda: [tree.insert(seen[s.start : s.end]) for s in segments],
+    }
+    for name in ("kohlmorgen-lemm", "zero-velocity"):
+        segmenter = make_segmenter(name, seen.shape[1], recording.rate_hz)
+        stages[f"segmentation, {name}"] = lambda s=segmenter: [s.update(each) for each in seen]
+    took = {name: timed(function) for name, function in stages.items()}
+    took["from features on: view, segmentation, tree, graph"] = timed(
+        lambda: MotionLearner(LearnerConfig(features.channels, features.rate_hz)).learn_many(
+            features.frames
+        )
+    )
+    took["the whole chain, from markers"] = whole
+    slowest = _slowest(config, recording.frames)
+    n = len(recording)
+    table = [
+        (name, f"{1e6 * each / n:.0f} us a frame", "real time", f"{n / 100 / each:.0f} x")
+        for name, each in took.items()
+    ]
+    return [*table, ("slowest frame", f"{1e3 * slowest:.1f} ms", "sampling interval", "10 ms")]
+
+
+def _slowest(config: LearnerConfig, frames: np.ndarray) -> float:
+    """Return the time of the slowest frame of the first minute after calibration [s]."""
+    learner = MotionLearner(config)
+    learner.learn_many(frames[:100])
+    return max(timed(lambda f=frame: learner.learn_one(f)) for frame in frames[100:6000])
