@@ -17,6 +17,7 @@ from mplearn.learner import (
     SegmentClosed,
 )
 from mplearn.recording import Recording, Segment
+from mplearn.tree import Placement
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -29,16 +30,16 @@ class LearningLog:
 
     Attributes:
         segments: All segments, pauses too.
+        placements: What the tree said to each; None for a pause.
         recognised: For each segment that was recognised on arrival, by its start: its primitive.
-        born: Frame at which each primitive was formed, also of those that are gone.
         known: Number of primitives known, each with the frame from which on.
         watched_s: Length of the streams so far [s].
         learning_s: How long learning took [s], reading and drawing left out.
     """
 
     segments: list[Segment] = field(default_factory=list)
+    placements: list[Placement | None] = field(default_factory=list)
     recognised: dict[int, int] = field(default_factory=dict)
-    born: dict[int, int] = field(default_factory=dict)
     known: list[tuple[int, int]] = field(default_factory=list)
     watched_s: float = 0.0
     learning_s: float = 0.0
@@ -62,13 +63,13 @@ class LearningLog:
     def note(self, event: Event) -> None:
         """Keep what an event says."""
         match event:
-            case SegmentClosed(segment):
+            case SegmentClosed(segment, placement):
                 self.segments.append(segment)
+                self.placements.append(placement)
             case Recognised(segment, primitive):
                 self.recognised[segment.start] = primitive
             case PrimitiveBorn(segment, primitive):
                 self._alive.add(primitive)
-                self.born[primitive] = segment.end
                 self.known.append((segment.end, len(self._alive)))
             case PrimitiveMerged(segment, _, absorbed):
                 self._alive.discard(absorbed)

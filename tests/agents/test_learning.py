@@ -15,8 +15,10 @@ from mplearn.learner import (
     TransitionSeen,
 )
 from mplearn.library import PrimitiveLibrary
-from mplearn.recording import Segment
+from mplearn.recording import LabelledSegment, Segment
+from mplearn.tree import Placement
 from mplearn_agents.cli import main
+from mplearn_agents.demo.score import score_learning
 from mplearn_agents.learning import LearningLog
 
 
@@ -24,7 +26,7 @@ def test_a_log_counts_what_lives():
     log = LearningLog()
     segments = [Segment(10 * k, 10 * k + 10, still=k == 1) for k in range(5)]
     for segment in segments:
-        log.note(SegmentClosed(segment))
+        log.note(SegmentClosed(segment, None))
     log.note(PrimitiveBorn(segments[0], 3, 4))
     log.note(PrimitiveBorn(segments[2], 4, 4))
     log.note(Recognised(segments[2], 3, 0.5))
@@ -113,29 +115,30 @@ def test_the_demo_refuses_a_length_that_is_none(tmp_path, capsys):
     assert "minutes must lie in (0, 60]" in capsys.readouterr().err
 
 
-def test_the_score_counts_as_the_paper_does():
-    """Twelve performances of two kinds; each rate by hand."""
-    from mplearn.recording import LabelledSegment
-    from mplearn_agents.demo.score import score_learning
+def placed(number, node, *, recognised=False, born=(), moved=()):
+    return Placement(number, node, recognised, 0.1, 0.5, born=born, moved=moved)
 
-    labels = "AABABABABAAB"
-    truth = [LabelledSegment(20 * k, 20 * k + 20, label) for k, label in enumerate(labels)]
+
+def test_the_score_tells_what_was_recognised_rightly():
+    truth = [LabelledSegment(20 * k, 20 * k + 20, label) for k, label in enumerate("AABABB")]
     log = LearningLog()
-    for k in range(12):
-        shift = 12 if k == 10 else 1  # the eleventh is cut in the wrong place
-        log.note(SegmentClosed(Segment(20 * k + shift, 20 * k + shift + 19)))
-    at = {segment.start // 20: segment for segment in log.segments}
-    log.note(PrimitiveBorn(at[3], 1, 3))  # A, known from frame 80
-    log.note(PrimitiveBorn(at[4], 2, 3))  # B, known from frame 100
-    for k, primitive in {5: 1, 6: 1, 7: 2, 8: 2, 9: 1, 11: 2}.items():
-        log.note(Recognised(at[k], primitive, 0.1))
-    # performed: 4 B, 5 A, 6 B, 7 A, 8 B, 9 A, 10 A, 11 B
-    score = score_learning(log, truth, {1, 2})
-    assert score.performed == {"A": 7, "B": 5}
+    placements = [
+        placed(0, 0),
+        placed(1, 1, born=(1,), moved=((0, 1),)),
+        placed(2, 2, born=(2,)),
+        placed(3, 1, recognised=True),
+        placed(4, 2, recognised=True),
+        placed(5, 1, recognised=True),  # a B, taken for an A
+    ]
+    for t, placement in zip(truth, placements, strict=True):
+        segment = Segment(t.start + 1, t.end)
+        log.note(SegmentClosed(segment, placement))
+        if placement.recognised:
+            log.note(Recognised(segment, placement.node_id, 0.1))
+    score = score_learning(log, truth, rate_hz=50.0)
     assert score.classes == {1: "A", 2: "B"}
-    assert score.extracted == ("A", "B")
-    assert score.recognised == {1: 3, 2: 3}
-    assert score.right == {1: 2, 2: 2}  # 6 was a B, 7 was an A
-    assert score.false_positive == pytest.approx(2 / 6)
-    assert score.false_negative == pytest.approx(1 / 7)  # 10 of 5, 6, 7, 8, 9, 10, 11
-    assert score.coverage == pytest.approx(4 / 12)
+    assert score.performed == {"A": 3, "B": 3}
+    assert score.recognised == {1: 2, 2: 1}
+    assert score.right == {1: 1, 2: 1}
+    assert [score.shows[s.start] for s in log.segments] == list("AABABB")
+    assert score.rates.n_wrong == 1

@@ -66,7 +66,7 @@ def run_demo(out: Path, minutes: float, steps: int, seed: int, console: Console)
     learner = MotionLearner(LearnerConfig(recording.channels, recording.rate_hz))
     log = learn(learner, [recording], console)
     library = learner.snapshot()
-    score = score_learning(log, demonstration.truth, library.ids)
+    score = score_learning(log, demonstration.truth, recording.rate_hz)
     library = _named(library, score.classes)
     library.save(out / "library.mplearn")
 

@@ -239,7 +239,7 @@ def _widest(words: Sequence[str], at: int) -> int:
 
 def _above(place: FloatArray, gap: float) -> FloatArray:
     """Return a point outside the ellipse, above or below a node, so far from its rim [in]."""
-    return place + [0.0, math.copysign(0.5 * float(_PILL[1]) + gap, place[1])]
+    return place + np.array([0.0, math.copysign(0.5 * float(_PILL[1]) + gap, place[1])])
 
 
 def _xy(point: FloatArray) -> tuple[float, float]:
