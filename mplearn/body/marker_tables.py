@@ -8,8 +8,6 @@ skin and the marker.
 
 from __future__ import annotations
 
-from .human_model import FOREARM, HEIGHT_M
-
 Offset = tuple[float, float, float]
 Table = dict[str, tuple[str, Offset]]
 
@@ -102,49 +100,57 @@ _CMU41 = (
 
 # joint centres, as skeletal files give them
 _ORIGIN: Offset = (0.0, 0.0, 0.0)
-# a bone of an ASF skeleton ends where its child starts; its marker is that end
+# a joint of a skeleton is where its segment starts; "_end" is where the last one ends
 _ASF_SIDE: Table = {
-    "hipjoint": ("thigh_l", _ORIGIN),
-    "femur": ("shank_l", _ORIGIN),
-    "tibia": ("foot_l", _ORIGIN),
-    "foot": ("toes_l", _ORIGIN),
-    "toes": ("toes_l", (0.07, 0.0, -0.01)),
-    "clavicle": ("upper_arm_l", _ORIGIN),
-    "humerus": ("forearm_l", _ORIGIN),
-    "radius": ("forearm_l", (0.0, 0.0, -FOREARM * HEIGHT_M)),
-    "wrist": ("hand_l", (0.0, 0.0, -0.045)),
-    "hand": ("hand_l", (0.0, 0.0, -0.085)),
-    "fingers": ("hand_l", (0.0, 0.0, -0.160)),
-    "thumb": ("hand_l", (0.045, 0.0, -0.080)),
+    "hipjoint": ("pelvis", (0.0, 0.0, 0.050)),
+    "femur": ("thigh_l", _ORIGIN),
+    "tibia": ("shank_l", _ORIGIN),
+    "foot": ("foot_l", _ORIGIN),
+    "toes": ("toes_l", _ORIGIN),
+    "toes_end": ("toes_l", (0.070, 0.0, -0.010)),
+    "clavicle": ("chest", (-0.010, 0.0, 0.250)),
+    "humerus": ("upper_arm_l", _ORIGIN),
+    "radius": ("forearm_l", _ORIGIN),
+    "wrist": ("forearm_l", (0.0, 0.0, -0.170)),
+    "hand": ("hand_l", _ORIGIN),
+    "fingers": ("hand_l", (0.0, 0.0, -0.080)),
+    "fingers_end": ("hand_l", (0.0, 0.0, -0.130)),
+    "thumb": ("hand_l", _ORIGIN),
+    "thumb_end": ("hand_l", (0.050, 0.0, -0.060)),
 }
 _ASF = {
     "root": ("pelvis", (0.0, 0.0, 0.050)),
     **_sides(_ASF_SIDE, "l{}", "r{}"),
-    "lowerback": ("abdomen", (-0.02, 0.0, 0.080)),
-    "upperback": ("chest", (-0.02, 0.0, 0.040)),
-    "thorax": ("chest", (-0.02, 0.0, 0.200)),
-    "lowerneck": ("chest", (-0.01, 0.0, 0.310)),
-    "upperneck": ("head", (0.0, 0.0, 0.060)),
-    "head": ("head", (0.01, 0.0, 0.170)),
+    "lowerback": ("pelvis", (0.0, 0.0, 0.050)),
+    "upperback": ("abdomen", (-0.010, 0.0, 0.090)),
+    "thorax": ("chest", (-0.010, 0.0, 0.060)),
+    "lowerneck": ("chest", (-0.010, 0.0, 0.250)),
+    "upperneck": ("head", (0.0, 0.0, 0.0)),
+    "head": ("head", (0.005, 0.0, 0.090)),
+    "head_end": ("head", (0.010, 0.0, 0.180)),
 }
-# a joint of a BVH skeleton is where its segment starts
 _BVH_SIDE: Table = {
     "Shoulder": ("clavicle_l", _ORIGIN),
     "Arm": ("upper_arm_l", _ORIGIN),
     "ForeArm": ("forearm_l", _ORIGIN),
     "Hand": ("hand_l", _ORIGIN),
+    "Hand_end": ("hand_l", (0.0, 0.0, -0.130)),
     "UpLeg": ("thigh_l", _ORIGIN),
     "Leg": ("shank_l", _ORIGIN),
     "Foot": ("foot_l", _ORIGIN),
     "ToeBase": ("toes_l", _ORIGIN),
+    "ToeBase_end": ("toes_l", (0.070, 0.0, -0.010)),
 }
 _BVH = {
     "Hips": ("pelvis", (0.0, 0.0, 0.050)),
-    "Spine": ("abdomen", (-0.01, 0.0, 0.040)),
-    "Spine1": ("chest", (-0.01, 0.0, 0.080)),
-    "Spine2": ("chest", (-0.01, 0.0, 0.180)),
-    "Neck": ("head", (-0.01, 0.0, 0.0)),
+    "LowerBack": ("pelvis", (0.0, 0.0, 0.050)),
+    "Spine": ("abdomen", (-0.010, 0.0, 0.040)),
+    "Spine1": ("chest", (-0.010, 0.0, 0.060)),
+    "Spine2": ("chest", (-0.010, 0.0, 0.180)),
+    "Neck": ("chest", (-0.010, 0.0, 0.300)),
+    "Neck1": ("head", _ORIGIN),
     "Head": ("head", (0.005, 0.0, 0.090)),
+    "Head_end": ("head", (0.010, 0.0, 0.180)),
     **_sides(_BVH_SIDE, "Left{}", "Right{}"),
 }
 
