@@ -20,7 +20,7 @@ def clusters_below(matrix: FloatArray, cutoff: float, least: int) -> list[IntArr
     Returns:
         Positions of the members, in order.
     """
-    if len(matrix) < least or not cutoff > 0:
+    if len(matrix) < least or not cutoff >= 0:
         return []
     labels = fcluster(linkage(pairs(matrix), "complete"), cutoff, "distance")
     groups = [np.flatnonzero(labels == label) for label in np.unique(labels)]

@@ -63,6 +63,7 @@ class TreeConfig:
         n_nearest: A segment's distance to a node is the mean of that to so many exemplars.
         split_ratio: A leaf is split when the distance between its two branches exceeds that inside
             them by this; inf for never.
+        split_scale: And when it exceeds the median diameter of all leaves by this.
         merge_ratio: Two leaves that a segment lies in are merged when the distance between them is
             below that inside them times this; 0 for never.
         n_candidates: Leaves, by mean trajectory, that are looked at closely; 0 to search down from
@@ -85,7 +86,8 @@ class TreeConfig:
     reach: float = 1.5
     reach_cap: float = 1.75
     n_nearest: int = 3
-    split_ratio: float = 2.0
+    split_ratio: float = 1.7
+    split_scale: float = 1.1
     merge_ratio: float = 1.4
     n_candidates: int = 6
     max_exemplars: int = 12
@@ -122,6 +124,7 @@ class TreeConfig:
             "n_sampled": 3,
             "seed": 0,
             "split_ratio": 1,
+            "split_scale": 0,
             "merge_ratio": 0,
         }
         for name, low in lowest.items():

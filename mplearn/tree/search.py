@@ -45,12 +45,15 @@ class NodeIndex:
         self.diameters[k] = node.diameter
         self.means[k] = bank.mean_profile(node.members)
 
+    def scale(self) -> float:
+        """Return the median diameter of the leaves, the size that executions of a motion share."""
+        return float(np.median(self.diameters[self.leaves])) if self.leaves.any() else 0.0
+
     def radii(self) -> FloatArray:
         """Return the radius of each node: eq. 6, capped by the scale that the leaves share."""
         radii = self.config.reach * self.diameters
-        if np.isfinite(self.config.reach_cap) and self.leaves.any():
-            scale = float(np.median(self.diameters[self.leaves]))
-            radii = np.minimum(radii, self.config.reach_cap * scale)
+        if np.isfinite(self.config.reach_cap):
+            radii = np.minimum(radii, self.config.reach_cap * self.scale())
         return np.asarray(radii)
 
     def search(self, exemplar: Exemplar, bank: ExemplarBank) -> list[Match]:

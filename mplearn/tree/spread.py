@@ -102,11 +102,13 @@ class DistanceSample:
             mean_share: Largest scale over the mean distance.
         """
         n = len(self.numbers)
-        if n < 2:
-            return 0.0
         matrix = self._matrix[:n, :n]
-        nearest = (matrix + np.diag(np.full(n, np.inf))).min(axis=1)
-        mean = matrix.sum() / (n * (n - 1))
+        mean = matrix.sum() / max(n * (n - 1), 1)
+        apart = np.where(matrix > 1e-6 * mean, matrix, np.inf)  # a copy says nothing of variation
+        nearest = apart.min(axis=1, initial=np.inf)
+        nearest = nearest[np.isfinite(nearest)]
+        if not len(nearest):
+            return 0.0
         return float(min(spread * np.percentile(nearest, 25), mean_share * mean))
 
     def state(self) -> dict[str, Any]:

@@ -139,9 +139,13 @@ class PrimitiveTree:
         reason = refusal(frames, self._shortest_frames)
         if reason:
             return Placement(-1, ROOT, False, np.inf, np.inf, refused=reason)
+        points = form.points_of(frames, self.config.form)
+        self._spread.update(points)
+        if self.n_seen == 0:
+            self._rescale()
         number = self.n_seen
         self.n_seen += 1
-        self._remember(number, frames)
+        self._remember(number, points, frames)
         matches = self._index.search(self._bank[number], self._bank)
         distance, ratio = (matches[0].distance, matches[0].ratio) if matches else (np.inf, np.inf)
         node = self._nodes[matches[0].node if ratio <= 1 else ROOT]
@@ -150,19 +154,14 @@ class PrimitiveTree:
         born, splits, moved = self._grow(node)
         merges = () if splits or not recognised else self._merge(matches)
         self._release(number)
+        self._rescale()
         home = next((to for which, to in moved if which == number), node.id)
         home = next((merge.kept for merge in merges if merge.absorbed == home), home)
         others = tuple(move for move in moved if move[0] != number)
         return Placement(number, home, recognised, distance, ratio, born, splits, merges, others)
 
-    def _remember(self, number: int, frames: FloatArray) -> None:
+    def _remember(self, number: int, points: FloatArray, frames: FloatArray) -> None:
         """Model a segment; it is held until released."""
-        points = form.points_of(frames, self.config.form)
-        self._spread.update(points)
-        floor = self.config.variance_floor**2 * self._spread.variances()
-        change = floor / self._bank.floor
-        if change.max() > _RESCALE or change.min() < 1 / _RESCALE:
-            self._rescale(floor)
         self._bank.add(number, self._bank.model(form.centred(points, self.config.form)))
         self._frames[number] = frames
         self._hold(number)
@@ -173,7 +172,12 @@ class PrimitiveTree:
             if gone is not None:
                 self._release(gone)
 
-    def _rescale(self, floor: FloatArray) -> None:
+    def _rescale(self) -> None:
+        """Model all exemplars again where the variance of all motion has changed much."""
+        floor = self.config.variance_floor**2 * self._spread.variances()
+        change = floor / self._bank.floor
+        if change.max() <= _RESCALE and change.min() >= 1 / _RESCALE:
+            return
         self._bank.refit(floor)
         self._sample.measure(self._bank)
         for node in self._nodes.values():
@@ -260,7 +264,12 @@ class PrimitiveTree:
         if len(leaf.members) < 6:
             return (), (), ()
         branches = two_branches(leaf.matrix)
-        if len(branches[1]) < 3 or separation(leaf.matrix, *branches) <= self.config.split_ratio:
+        between = float(leaf.matrix[np.ix_(*branches)].mean())
+        if (
+            len(branches[1]) < 3
+            or separation(leaf.matrix, *branches) <= self.config.split_ratio
+            or between <= self.config.split_scale * self._index.scale()
+        ):
             return (), (), ()
         leaf.history.append(("split", self.n_seen))
         groups = [[leaf.members[i] for i in branch] for branch in branches]
