@@ -38,8 +38,8 @@ def walk_table(library: PrimitiveLibrary, seeds: Sequence[int], steps: int = STE
     env = gymnasium.make(
         "mplearn/PrimitiveHumanoid-v0", library=library, disable_env_checker=True, max_steps=steps
     )
-    _, info = env.reset()
-    refused = sum(not f for f in env.unwrapped.repertoire.feasible.values())
+    repertoire = env.unwrapped.repertoire  # type: ignore[attr-defined]
+    refused = sum(not repertoire.feasibility(id).feasible for id in library.ids)
     rows = [_row(seed, walk(env, POLICIES["random"](), steps, seed)) for seed in seeds]
     env.close()
     return Table(

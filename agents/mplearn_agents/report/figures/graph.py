@@ -239,7 +239,8 @@ def _widest(words: Sequence[str], at: int) -> int:
 
 def _above(place: FloatArray, gap: float) -> FloatArray:
     """Return a point outside the ellipse, above or below a node, so far from its rim [in]."""
-    return place + np.array([0.0, math.copysign(0.5 * float(_PILL[1]) + gap, place[1])])
+    up = math.copysign(0.5 * float(_PILL[1]) + gap, place[1])
+    return np.array([place[0], place[1] + up])
 
 
 def _xy(point: FloatArray) -> tuple[float, float]:
