@@ -171,7 +171,7 @@ def test_joint_angles_of_the_human_under_noise():
     } | {"thorax_pitch", "lumbar_pitch", "thorax_roll", "lumbar_roll"}
     for name, value in zip(body.joint_names, error, strict=True):
         if name not in undetermined:
-            assert value < (9.0 if name in loose else 4.0), (name, value)
+            assert value < (4.0 if name in loose else 2.5), (name, value)
 
 
 def test_a_hidden_limb_is_held_and_said_to_be_uncertain():
