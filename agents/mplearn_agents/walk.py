@@ -32,6 +32,9 @@ class WalkStep:
         reward: What it earned.
         illegal: Whether the action was not allowed.
         fallen: Whether the robot fell.
+        tracking_rmse_rad: Root mean square of the joints' tracking error [rad].
+        cog_deviation_m: Largest distance of the centre of gravity from the middle of the soles [m].
+        zmp_margin_m: Least distance of the zero-moment point from the edge of the soles [m].
     """
 
     action: int
@@ -41,6 +44,9 @@ class WalkStep:
     reward: float
     illegal: bool
     fallen: bool
+    tracking_rmse_rad: float
+    cog_deviation_m: float
+    zmp_margin_m: float
 
 
 @dataclass(frozen=True)
@@ -128,6 +134,9 @@ def walk(
                 reward=float(reward),
                 illegal=info["illegal"],
                 fallen=bool(fallen),
+                tracking_rmse_rad=info["tracking_rmse_rad"],
+                cog_deviation_m=info["cog_deviation_m"],
+                zmp_margin_m=info["zmp_margin_m"],
             )
         )
         performed += not held

@@ -58,8 +58,10 @@ def test_captions_change_the_head_of_a_picture_only():
 
 
 def test_the_middle_picture_of_a_step_belongs_to_it():
-    step = WalkStep(1, 7, "squat", 2.0, 0.0, illegal=False, fallen=False)
-    hold = WalkStep(0, None, "hold", 0.5, 0.0, illegal=False, fallen=False)
+    well = {"illegal": False, "fallen": False}
+    measured = {"tracking_rmse_rad": 0.01, "cog_deviation_m": 0.0, "zmp_margin_m": 0.1}
+    step = WalkStep(1, 7, "squat", 2.0, 0.0, **well, **measured)
+    hold = WalkStep(0, None, "hold", 0.5, 0.0, **well, **measured)
     step_of = np.repeat([0, 1, 2], [10, 3, 11])
     walk = WalkResult((step, hold, step), np.zeros((24, 37)), step_of, 10.0)
     middles = middle_pictures(walk)

@@ -23,7 +23,10 @@ class Ring(gymnasium.Env):
         return 4, self._info()
 
     def step(self, action):
-        info = {"illegal": False, "duration_s": 0.5}
+        info = {
+            "illegal": False, "duration_s": 0.5, "tracking_rmse_rad": 0.01,
+            "cog_deviation_m": 0.002, "zmp_margin_m": 0.05,
+        }  # fmt: skip
         if action == 0 or not self._info()["action_mask"][action]:
             return self.at, 0.0, False, False, self._info() | info | {"illegal": action != 0}
         self.at = action

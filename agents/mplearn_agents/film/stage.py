@@ -42,9 +42,10 @@ class Stage:
         self._starts = np.flatnonzero(self._model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
         self._starts = self._model.jnt_qposadr[self._starts]
         self._camera = mujoco.MjvCamera()
-        self._camera.lookat[:] = (0.0, 0.0, 1.0)
-        self._camera.distance = 3.0
-        self._camera.azimuth, self._camera.elevation = 170.0, -9.0
+        self._camera.lookat[:] = (0.0, 0.0, 1.04)
+        self._camera.distance = 3.15
+        self._camera.azimuth = 180.0 if len(self.bodies) > 1 else 165.0
+        self._camera.elevation = -9.0
         try:
             self._renderer = mujoco.Renderer(self._model, height=size[1], width=size[0])
         except Exception as error:  # what fails depends on the machine's graphics libraries
