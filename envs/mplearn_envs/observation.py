@@ -19,7 +19,7 @@ def observation_limits(n_joints: int) -> dict[str, FloatArray]:
     """Return the largest magnitude of each measurement, as in `PrimitiveHumanoidEnv`'s table."""
     angles = np.full(n_joints, 2 * np.pi)
     return {
-        "posture": np.concatenate(([10.0, np.pi, np.pi / 2], angles)),
+        "posture": np.concatenate(([10.0, np.pi / 2, np.pi], angles)),
         "velocity": np.full(6 + n_joints, 100.0),
         "cog": np.full(3, 10.0),
         "support_margin": np.full(1, 10.0),

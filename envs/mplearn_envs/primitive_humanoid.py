@@ -47,8 +47,8 @@ class PrimitiveHumanoidEnv(gymnasium.Env[Observation, np.int64]):
     key                num  meaning                              min     max     unit
     ================== ==== ==================================== ======= ======= =====
     posture            0    height of the base                   -10     10      m
-    posture            1    roll of the base                     -pi     pi      rad
-    posture            2    pitch of the base                    -pi/2   pi/2    rad
+    posture            1    roll of the base                     -pi/2   pi/2    rad
+    posture            2    pitch of the base                    -pi     pi      rad
     posture            3..  joint angles                         -2 pi   2 pi    rad
     velocity           0-2  linear, x along the heading          -100    100     m/s
     velocity           3-5  angular, base's frame                -100    100     rad/s

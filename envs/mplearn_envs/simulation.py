@@ -150,8 +150,8 @@ class Simulation:
     def posture(self) -> FloatArray:
         """Return base height [m], roll, pitch and the joint angles [rad], shape (3 + n,)."""
         w, x, y, z = self.data.qpos[3:7]
-        roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-        pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
+        roll = np.arcsin(np.clip(2 * (y * z + w * x), -1.0, 1.0))
+        pitch = np.arctan2(2 * (w * y - x * z), 1 - 2 * (x * x + y * y))
         return np.concatenate(([self.data.qpos[2], roll, pitch], self.data.qpos[7:]))
 
     def velocity(self) -> FloatArray:
@@ -184,7 +184,7 @@ class Simulation:
     def _heading(self) -> FloatArray:
         """Return the (2, 2) matrix that turns vectors of the floor into the base's heading."""
         w, x, y, z = self.data.qpos[3:7]
-        yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        yaw = np.arctan2(2 * (w * z - x * y), 1 - 2 * (x * x + z * z))
         c, s = np.cos(yaw), np.sin(yaw)
         return np.array([[c, s], [-s, c]])
 

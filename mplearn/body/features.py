@@ -28,7 +28,8 @@ def feature_channels(body: Body | None = None) -> tuple[str, ...]:
 def features_of(q: FloatArray, body: Body | None = None) -> FloatArray:
     """Return the features of postures.
 
-    The base's orientation is yaw, then pitch, then roll (z-y'-x''), of which the yaw is dropped.
+    The base's orientation is yaw, then roll, then pitch (z-x'-y''), of which the yaw is dropped. So
+    deep bows and forward rolls go through no singular posture; only lying on one side is one.
 
     Args:
         q: Postures, shape (..., 7 + n).
@@ -41,8 +42,8 @@ def features_of(q: FloatArray, body: Body | None = None) -> FloatArray:
     if q.shape[-1] != body.nq:
         raise BodyError(f"a posture of {body.name!r} has {body.nq} values, not {q.shape[-1]}")
     w, x, y, z = np.moveaxis(q[..., 3:7], -1, 0)
-    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
+    roll = np.arcsin(np.clip(2 * (y * z + w * x), -1.0, 1.0))
+    pitch = np.arctan2(2 * (w * y - x * z), 1 - 2 * (x * x + y * y))
     base = np.stack((q[..., 2], roll, pitch), axis=-1)
     return np.concatenate((base, q[..., 7 + body.driven]), axis=-1)
 
@@ -74,10 +75,10 @@ def posture_of(
     q[..., 0], q[..., 1], q[..., 2] = x, y, features[..., 0]
     half = np.stack(np.broadcast_arrays(features[..., 1], features[..., 2], yaw)) / 2
     (cr, cp, cy), (sr, sp, sy) = np.cos(half), np.sin(half)
-    q[..., 3] = cr * cp * cy + sr * sp * sy
-    q[..., 4] = sr * cp * cy - cr * sp * sy
-    q[..., 5] = cr * sp * cy + sr * cp * sy
-    q[..., 6] = cr * cp * sy - sr * sp * cy
+    q[..., 3] = cy * cr * cp - sy * sr * sp
+    q[..., 4] = cy * sr * cp - sy * cr * sp
+    q[..., 5] = cy * cr * sp + sy * sr * cp
+    q[..., 6] = cy * sr * sp + sy * cr * cp
     q[..., 7 + body.driven] = features[..., 3:]
     return q
 

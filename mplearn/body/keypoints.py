@@ -92,7 +92,7 @@ def _points(
     for t in range(len(features)):
         cr, sr = np.cos(features[t, 1] / 2), np.sin(features[t, 1] / 2)
         cp, sp = np.cos(features[t, 2] / 2), np.sin(features[t, 2] / 2)
-        posture[3], posture[4], posture[5], posture[6] = cr * cp, sr * cp, cr * sp, -sr * sp
+        posture[3], posture[4], posture[5], posture[6] = cr * cp, sr * cp, cr * sp, sr * sp
         for j in range(len(driven)):
             posture[7 + driven[j]] = features[t, 3 + j]
         forward_kinematics(

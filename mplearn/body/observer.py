@@ -70,7 +70,7 @@ class MotionObserver:
 
             self._gaps = GapTracker(len(self.marker_names), self.rate_hz)
         self._gathered: list[FloatArray] = []
-        self._last_roll = 0.0
+        self._last_pitch = 0.0
 
     def update(self, frame: FloatArray) -> FloatArray:
         """Take one frame and return the features of those that are ready.
@@ -130,9 +130,9 @@ class MotionObserver:
         if self._gaps is not None:
             frames = np.array([self._gaps.update(markers) for markers in frames])
         features = features_of(np.array([self.ik.update(markers) for markers in frames]), self.body)
-        for row in features:  # the roll is an angle of the whole circle: keep it continuous
-            row[1] += 2 * np.pi * np.round((self._last_roll - row[1]) / (2 * np.pi))
-            self._last_roll = float(row[1])
+        for row in features:  # the pitch is an angle of the whole circle: keep it continuous
+            row[2] += 2 * np.pi * np.round((self._last_pitch - row[2]) / (2 * np.pi))
+            self._last_pitch = float(row[2])
         return features
 
     def state(self) -> dict[str, Any]:
@@ -141,7 +141,7 @@ class MotionObserver:
             "ik": self.ik.state(),
             "gaps": None if self._gaps is None else self._gaps.state(),
             "gathered": np.array(self._gathered).reshape(-1, len(self.marker_names), 3),
-            "last_roll": self._last_roll,
+            "last_pitch": self._last_pitch,
         }
 
     def load_state(self, state: dict[str, Any]) -> None:
@@ -150,4 +150,4 @@ class MotionObserver:
         if self._gaps is not None:
             self._gaps.load_state(state["gaps"])
         self._gathered = list(np.array(state["gathered"], dtype=np.float64))
-        self._last_roll = float(state["last_roll"])
+        self._last_pitch = float(state["last_pitch"])

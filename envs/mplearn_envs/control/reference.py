@@ -60,9 +60,9 @@ class Reference(NamedTuple):
 
 @njit(cache=True)
 def base_rotation(roll: float, pitch: float) -> FloatArray:
-    """Return the base's orientation without heading, R_y(pitch) R_x(roll), shape (3, 3)."""
+    """Return the base's orientation without heading, R_x(roll) R_y(pitch), shape (3, 3)."""
     cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
-    return np.array([[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]])
+    return np.array([[cp, 0.0, sp], [sr * sp, cr, -sr * cp], [-cr * sp, sr, cr * cp]])
 
 
 @lru_cache(maxsize=8)
@@ -185,7 +185,7 @@ def _lowest(tree: MassTree, feet: IntArray, corners: FloatArray, frames: FloatAr
         q[2] = frames[t, 0]
         cr, sr = np.cos(0.5 * frames[t, 1]), np.sin(0.5 * frames[t, 1])
         cp, sp = np.cos(0.5 * frames[t, 2]), np.sin(0.5 * frames[t, 2])
-        q[3], q[4], q[5], q[6] = cp * cr, cp * sr, sp * cr, -sp * sr
+        q[3], q[4], q[5], q[6] = cp * cr, cp * sr, sp * cr, sp * sr
         q[7:] = frames[t, 3:]
         pose = forward(tree, q)
         for side in range(2):
