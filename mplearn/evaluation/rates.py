@@ -71,8 +71,13 @@ class LearningRates:
         return self.n_missed / max(1, self.n_found)
 
     @property
+    def recognised(self) -> float:
+        """Share of the motions that were recognised rightly as they came."""
+        return self.n_recognised / max(1, self.n_motions)
+
+    @property
     def coverage(self) -> float:
-        """Share of the motions that a right primitive stands for at the end."""
+        """Share of the motions that lie in a right primitive at the end."""
         return self.n_inside / max(1, self.n_motions)
 
 

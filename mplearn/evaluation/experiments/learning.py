@@ -14,7 +14,10 @@ from ..boundaries import BoundaryScore, score_boundaries
 from ..rates import LearningRates, rate_learning
 from ..table import Table, percent
 
-PAPER = ("paper, one person", "17 of 22", "0", "-", "3.5 %", "6.7 %", "77 %", "6-8", "-", "> 1 x")
+PAPER = (
+    "paper, one person",
+    *("17 of 22", "0", "-", "3.5 %", "6.7 %", "77 %", "-", "6-8", "-", "> 1 x"),
+)
 COLUMNS = (
     "session",
     "extracted",
@@ -22,7 +25,8 @@ COLUMNS = (
     "duplicates",
     "false positives",
     "false negatives",
-    "coverage",
+    "recognised",
+    "inside at the end",
     "demonstrations",
     "boundary F1",
     "real time",
@@ -32,8 +36,12 @@ NOTE = (
     "intersection over union exceeds 0.5, one to one, boundaries within 0.25 s counting as equal. "
     "A primitive's class is the majority among the segments it was formed from. False positives: "
     "found segments recognised as another class, or though they show none. False negatives: not "
-    "recognised in spite of a model of their class. Coverage: motions that lie in a primitive of "
-    "their class at the end. Demonstrations: mean number of a class up to its first primitive."
+    "recognised in spite of a model of their class; both as shares of all found segments. "
+    "Recognised: share of all motions that were recognised rightly as they came, the first ones of "
+    "each class included. Inside: share that lies in a primitive of its class at the end; the "
+    "paper's 77 % must be this, for 17 of 22 types are 77.3 % of the motions, of which some "
+    "precede the models. "
+    "Demonstrations: mean number of a class up to its first primitive."
 )
 
 
@@ -100,6 +108,7 @@ def outcome_row(name: str, outcome: Outcome) -> tuple[str, ...]:
         str(rates.n_duplicates),
         percent(rates.false_positive),
         percent(rates.false_negative),
+        percent(rates.recognised),
         percent(rates.coverage),
         f"{_demonstrations(rates):.1f}",
         f"{outcome.boundaries.f1:.3f}",
@@ -116,6 +125,7 @@ def mean_row(name: str, outcomes: Sequence[Outcome]) -> tuple[str, ...]:
 
     positives = [r.false_positive for r in rates]
     negatives = [r.false_negative for r in rates]
+    recognised = [r.recognised for r in rates]
     coverages = [r.coverage for r in rates]
     return (
         name,
@@ -125,6 +135,7 @@ def mean_row(name: str, outcomes: Sequence[Outcome]) -> tuple[str, ...]:
         f"{np.mean([r.n_duplicates for r in rates]):.1f}",
         mean(positives, max(positives)),
         mean(negatives, max(negatives)),
+        mean(recognised, min(recognised)),
         mean(coverages, min(coverages)),
         f"{np.mean([_demonstrations(r) for r in rates]):.1f}",
         f"{np.mean([o.boundaries.f1 for o in outcomes]):.3f}",
