@@ -1,5 +1,6 @@
 # The commands of mplearn. `make demo` and `make test` set up what they need.
-.PHONY: demo test setup check format bench evaluate build clean
+.PHONY: demo test setup check format bench evaluate build clean clean-cache
+.DEFAULT_GOAL := demo
 
 PYTHON ?= python3
 VENV   := .venv
@@ -7,6 +8,7 @@ BIN    := $(VENV)/bin
 DATA   ?= ../shared/data
 OUT    ?= out
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
+export MUJOCO_GL ?= egl
 export MPLEARN_DATA ?= $(abspath $(DATA))
 
 demo: $(VENV)/.demo                 ## learn from the demonstrator, perform a walk, write out/demo/report.html
@@ -32,10 +34,10 @@ bench: setup                        ## timings, as ratios against named peers, i
 
 evaluate: setup                     ## the paper's experiments: tables on synthetic and real motion
 	$(BIN)/mplearn evaluate paper-session --out $(OUT)/evaluate
-	@if [ -d "$(MPLEARN_DATA)" ]; then \
-	    $(BIN)/mplearn evaluate "$(MPLEARN_DATA)" --out $(OUT)/evaluate; \
+	@if [ -d "$(MPLEARN_DATA)/ui_prmd" ]; then \
+	    $(BIN)/mplearn evaluate "$(MPLEARN_DATA)/ui_prmd" --out $(OUT)/evaluate; \
 	else \
-	    echo "no recordings at $(MPLEARN_DATA): the tables on real motion are left out (set MPLEARN_DATA)"; \
+	    echo "no ui_prmd in $(MPLEARN_DATA): the tables on real motion are left out (set MPLEARN_DATA)"; \
 	fi
 
 build: setup                        ## wheel and sdist, each installed in isolation and smoke-tested
@@ -43,7 +45,10 @@ build: setup                        ## wheel and sdist, each installed in isolat
 	$(BIN)/python -m build --outdir dist .
 	$(BIN)/python benchmarks/smoke_build.py dist
 
-clean:                              ## remove what the other commands made
+clean-cache:                        ## remove numba's caches, which do not notice changes across files
+	find mplearn envs agents -name '*.nb[ic]' -delete
+
+clean: clean-cache                  ## remove what the other commands made
 	rm -rf $(VENV) $(OUT) dist
 
 # One environment, two depths: the demo needs no torch.
