@@ -1,8 +1,8 @@
 """The human as MJCF: 40 hinges on a free pelvis, 1.75 m.
 
 The paper's 40-DoF human model ([Kulic2012], 4.1) is not published; this one has anthropometric
-proportions. Segment lengths and joint heights as fractions of stature follow Drillis and Contini
-(1966) as reprinted by Winter, *Biomechanics and Motor Control of Human Movement* (4th ed., table
+proportions. Segment lengths and joint heights as fractions of stature follow [DrillisContini1966]
+as reprinted by Winter, *Biomechanics and Motor Control of Human Movement* (4th ed., table
 4.1 and figure 4.1); mass fractions follow Winter's table 4.1 (after Dempster). Hip centres lie
 0.36 of the distance between the iliac spines from the middle (Bell et al. 1990). Stated otherwise
 nowhere: the split of the spine into lumbar (three hinges) and thoracic (two), and the two
