@@ -28,11 +28,46 @@ def clusters_below(matrix: FloatArray, cutoff: float, least: int) -> list[IntArr
     return sorted(large, key=lambda group: float(matrix[np.ix_(group, group)].max()))
 
 
-def two_branches(matrix: FloatArray) -> tuple[IntArray, IntArray]:
-    """Return the positions of the two last branches of the complete-link tree, larger one first."""
-    labels = fcluster(linkage(pairs(matrix), "complete"), 2, "maxclust")
-    first, second = np.flatnonzero(labels == 1), np.flatnonzero(labels == 2)
-    return (first, second) if len(first) >= len(second) else (second, first)
+def two_branches(matrix: FloatArray, least: int) -> tuple[IntArray, IntArray] | None:
+    """Return the positions of the two main branches of the complete-link tree, larger one first.
+
+    Branches of fewer than ``least`` members that join last are outliers; each goes to the branch
+    that is nearer on average. None where there are no two branches of that size.
+    """
+    n = len(matrix)
+    if n < 2 * least:
+        return None
+    merges = linkage(pairs(matrix), "complete")
+    sizes = np.concatenate([np.ones(n), merges[:, 3]])
+    at = 2 * n - 2
+    while True:
+        if at < n:
+            return None
+        left, right = (int(child) for child in merges[at - n, :2])
+        if min(sizes[left], sizes[right]) >= least:
+            break
+        at = left if sizes[left] >= sizes[right] else right
+    groups = [_members(merges, left), _members(merges, right)]
+    inside = np.concatenate(groups)
+    for outlier in np.setdiff1d(np.arange(n), inside):
+        nearer = int(np.argmin([matrix[outlier, group].mean() for group in groups]))
+        groups[nearer] = np.sort(np.append(groups[nearer], outlier))
+    first, second = sorted(groups, key=lambda group: (-len(group), group[0]))
+    return first, second
+
+
+def _members(merges: FloatArray, cluster: int) -> IntArray:
+    """Return the positions of a cluster's members, in order."""
+    n = len(merges) + 1
+    found = []
+    pending = [cluster]
+    while pending:
+        at = pending.pop()
+        if at < n:
+            found.append(at)
+        else:
+            pending += [int(child) for child in merges[at - n, :2]]
+    return np.array(sorted(found), dtype=np.int64)
 
 
 def separation(matrix: FloatArray, first: IntArray, second: IntArray) -> float:

@@ -23,7 +23,7 @@ class FormConfig:
     """
 
     n_points: int = 16
-    head: float = 0.25
+    head: float = 0.22
     ramp: float = 0.2
     centring: float = 0.5
 
@@ -60,10 +60,12 @@ class TreeConfig:
         min_exemplars: Members from which on a cluster becomes a node.
         reach: K_maxGD of eq. 6: a node's radius over the largest distance between its exemplars.
         reach_cap: Largest radius over the median of that distance over all leaves.
+        reach_limit: Largest radius over the scale below which clusters are formed.
         n_nearest: A segment's distance to a node is the mean of that to so many exemplars.
         split_ratio: A leaf is split when the distance between its two branches exceeds that inside
             them by this; inf for never.
-        split_scale: And when it exceeds the median diameter of all leaves by this.
+        min_branch: Members of each branch from which on it is one.
+        split_scale: And when it exceeds the median diameter of the other leaves by this.
         merge_ratio: Two leaves that a segment lies in are merged when the distance between them is
             below that inside them times this; 0 for never.
         n_candidates: Leaves, by mean trajectory, that are looked at closely; 0 to search down from
@@ -85,9 +87,11 @@ class TreeConfig:
     min_exemplars: int = 4
     reach: float = 1.5
     reach_cap: float = 1.75
-    n_nearest: int = 3
-    split_ratio: float = 1.7
-    split_scale: float = 1.1
+    reach_limit: float = 1.0
+    n_nearest: int = 2
+    split_ratio: float = 1.5
+    min_branch: int = 3
+    split_scale: float = 1.25
     merge_ratio: float = 1.4
     n_candidates: int = 6
     max_exemplars: int = 12
@@ -111,7 +115,15 @@ class TreeConfig:
         )
 
     def __post_init__(self) -> None:
-        for name in ("variance_floor", "power", "spread", "mean_share", "reach", "reach_cap"):
+        for name in (
+            "variance_floor",
+            "power",
+            "spread",
+            "mean_share",
+            "reach",
+            "reach_cap",
+            "reach_limit",
+        ):
             if not getattr(self, name) > 0:
                 raise InvalidValueError(f"{name} must be positive, not {getattr(self, name)}")
         lowest = {
@@ -124,6 +136,7 @@ class TreeConfig:
             "n_sampled": 3,
             "seed": 0,
             "split_ratio": 1,
+            "min_branch": 2,
             "split_scale": 0,
             "merge_ratio": 0,
         }

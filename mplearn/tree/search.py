@@ -21,13 +21,17 @@ class NodeIndex:
         config: Rules of the tree.
         bank: Holds the exemplars of the nodes.
         nodes: The nodes; the root among them is left out.
+        limit: Largest radius.
     """
 
-    def __init__(self, config: TreeConfig, bank: ExemplarBank, nodes: Iterable[Node]) -> None:
+    def __init__(
+        self, config: TreeConfig, bank: ExemplarBank, nodes: Iterable[Node], limit: float
+    ) -> None:
         below = sorted((node for node in nodes if node.parent is not None), key=lambda n: n.id)
         if config.n_candidates:
             below = [node for node in below if node.is_leaf]
         self.config = config
+        self.limit = limit
         self.ids = np.array([node.id for node in below], dtype=np.int64)
         self.parents = np.array([node.parent for node in below], dtype=np.int64)
         self.leaves = np.array([node.is_leaf for node in below], dtype=np.bool_)
@@ -45,15 +49,19 @@ class NodeIndex:
         self.diameters[k] = node.diameter
         self.means[k] = bank.mean_profile(node.members)
 
-    def scale(self) -> float:
-        """Return the median diameter of the leaves, the size that executions of a motion share."""
-        return float(np.median(self.diameters[self.leaves])) if self.leaves.any() else 0.0
+    def scale(self, but: int | None = None) -> float:
+        """Return the median diameter of the leaves, but for one: how much executions vary.
+
+        It is 0 where there is no leaf.
+        """
+        chosen = self.leaves & (self.ids != but) if but is not None else self.leaves
+        return float(np.median(self.diameters[chosen])) if chosen.any() else 0.0
 
     def radii(self) -> FloatArray:
         """Return the radius of each node: eq. 6, capped by the scale that the leaves share."""
         radii = self.config.reach * self.diameters
         if np.isfinite(self.config.reach_cap):
-            radii = np.minimum(radii, self.config.reach_cap * self.scale())
+            radii = np.minimum(radii, min(self.config.reach_cap * self.scale(), self.limit))
         return np.asarray(radii)
 
     def search(self, exemplar: Exemplar, bank: ExemplarBank) -> list[Match]:
@@ -106,6 +114,7 @@ class NodeIndex:
     def state(self) -> dict[str, Any]:
         """Return everything as plain values and arrays."""
         return {
+            "limit": self.limit,
             "ids": self.ids.copy(),
             "parents": self.parents.copy(),
             "leaves": self.leaves.copy(),
@@ -116,7 +125,7 @@ class NodeIndex:
     @classmethod
     def from_state(cls, config: TreeConfig, bank: ExemplarBank, state: dict[str, Any]) -> NodeIndex:
         """Return the index that `state` described."""
-        index = cls(config, bank, ())
+        index = cls(config, bank, (), float(state["limit"]))
         index.ids = np.array(state["ids"], dtype=np.int64)
         index.parents = np.array(state["parents"], dtype=np.int64)
         index.leaves = np.array(state["leaves"], dtype=np.bool_)

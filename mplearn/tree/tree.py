@@ -69,7 +69,7 @@ class PrimitiveTree:
         self._frames: dict[int, FloatArray] = {}
         self._holds: Counter[int] = Counter()
         self._nodes = {ROOT: Node(ROOT, None, 0)}
-        self._index = NodeIndex(config, self._bank, ())
+        self._index = NodeIndex(config, self._bank, (), 0.0)
         self._models: dict[int, tuple[tuple[int, ...], LeftRightHMM]] = {}
 
     # ---- looking
@@ -155,6 +155,7 @@ class PrimitiveTree:
         merges = () if splits or not recognised else self._merge(matches)
         self._release(number)
         self._rescale()
+        self._index.limit = self.config.reach_limit * self._common_scale()
         home = next((to for which, to in moved if which == number), node.id)
         home = next((merge.kept for merge in merges if merge.absorbed == home), home)
         others = tuple(move for move in moved if move[0] != number)
@@ -226,6 +227,9 @@ class PrimitiveTree:
         if self.config.local:
             mu, sigma = moments(node.matrix)
             return mu - self.config.cutoff * sigma
+        return self._common_scale()
+
+    def _common_scale(self) -> float:
         return self._sample.scale(self.config.spread, self.config.mean_share)
 
     def _child(self, parent: Node, members: Sequence[int]) -> Node:
@@ -261,14 +265,14 @@ class PrimitiveTree:
         self, leaf: Node
     ) -> tuple[tuple[int, ...], tuple[Split, ...], tuple[tuple[int, int], ...]]:
         """Split a leaf whose two branches lie too far apart."""
-        if len(leaf.members) < 6:
+        branches = two_branches(leaf.matrix, self.config.min_branch)
+        if branches is None:
             return (), (), ()
-        branches = two_branches(leaf.matrix)
         between = float(leaf.matrix[np.ix_(*branches)].mean())
-        if (
-            len(branches[1]) < 3
-            or separation(leaf.matrix, *branches) <= self.config.split_ratio
-            or between <= self.config.split_scale * self._index.scale()
+        if separation(
+            leaf.matrix, *branches
+        ) <= self.config.split_ratio or between <= self.config.split_scale * self._index.scale(
+            but=leaf.id
         ):
             return (), (), ()
         leaf.history.append(("split", self.n_seen))
@@ -360,7 +364,8 @@ class PrimitiveTree:
                 self._bank.drop(number)
 
     def _reindex(self) -> None:
-        self._index = NodeIndex(self.config, self._bank, self._nodes.values())
+        limit = self.config.reach_limit * self._common_scale()
+        self._index = NodeIndex(self.config, self._bank, self._nodes.values(), limit)
 
     @property
     def _shortest_frames(self) -> int:

@@ -1,0 +1,347 @@
+"""The tree on streams whose truth is known: what it finds, keeps, forgets and refuses."""
+
+import hashlib
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+sys.path.insert(0, str(Path(__file__).parent))
+from motions import RATE_HZ, Motions
+
+from mplearn.errors import FrameError, InvalidValueError, UnknownPrimitiveError
+from mplearn.tree import ROOT, FormConfig, PrimitiveTree, TreeConfig
+
+D = 6
+
+
+def new_tree(**rules):
+    return PrimitiveTree(TreeConfig(**rules), D, RATE_HZ)
+
+
+def learned(n_motions=5, n_rounds=7, seed=0, **rules):
+    motions = Motions(n_motions, D, seed)
+    session = motions.session(n_rounds)
+    tree = new_tree(**rules)
+    placements = [tree.insert(frames) for _, frames in session]
+    return tree, placements, [motion for motion, _ in session], motions
+
+
+def home_of(placements):
+    home = {}
+    for p in placements:
+        home[p.number] = p.node_id
+        home.update(p.moved)
+    return home
+
+
+def digest(value):
+    """A hash over a state that depends on every bit."""
+    sha = hashlib.sha256()
+
+    def feed(part):
+        if isinstance(part, dict):
+            for key in sorted(part):
+                sha.update(key.encode())
+                feed(part[key])
+        elif isinstance(part, list | tuple):
+            for item in part:
+                feed(item)
+        elif isinstance(part, np.ndarray):
+            sha.update(np.ascontiguousarray(part).tobytes())
+        else:
+            sha.update(repr(part).encode())
+
+    feed(value)
+    return sha.hexdigest()
+
+
+@pytest.mark.parametrize("n_motions", [2, 5, 25])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_every_motion_becomes_one_primitive_however_many_there_are(n_motions, seed):
+    tree, placements, labels, _ = learned(n_motions, 8, seed)
+    home = home_of(placements)
+    assert len(tree.leaves) == n_motions
+    for leaf in tree.leaves:
+        assert len({labels[n] for n, node in home.items() if node == leaf}) == 1
+    late = placements[-n_motions:]
+    assert sum(p.recognised for p in late) >= 0.9 * n_motions
+
+
+def test_a_primitive_is_born_of_its_fourth_demonstration_and_recognises_the_fifth():
+    motions = Motions(3, D, 3)
+    tree = new_tree()
+    for motion in (0, 1, 2) * 3:
+        placement = tree.insert(motions.perform(motion))
+        assert placement.node_id == ROOT and not placement.born
+    fourth = tree.insert(motions.perform(0))
+    assert not fourth.recognised
+    assert fourth.born == (fourth.node_id,)
+    assert sorted(number for number, _ in fourth.moved) == [0, 3, 6]
+    fifth = tree.insert(motions.perform(0))
+    assert fifth.recognised and fifth.node_id == fourth.node_id and fifth.ratio <= 1
+    assert fifth.distance > 0
+    other = tree.insert(motions.perform(1))
+    assert not other.recognised
+    node = tree.node(fourth.node_id)
+    assert node.n_placed == 5
+    assert node.history == [("born", 10)]
+
+
+def test_unknown_motions_stay_outside():
+    tree, _, _, motions = learned(5, 6)
+    strangers = Motions(10, D, 99)
+    assert not any(tree.insert(strangers.perform(m)).recognised for m in range(10))
+    assert tree.insert(motions.perform(0)).recognised
+
+
+def test_a_leaf_of_two_motions_is_split_and_both_live_on():
+    motions = Motions(4, D, 5)
+    offset = np.zeros(D)
+    offset[0] = 0.55
+    motions.keys[1] = motions.keys[0] + [[0, 0, 0, 0, 0, 0], offset, offset * 0.5, [0] * 6]
+    order = [0, 1, 2, 3] * 2 + [0, 1] * 8
+    tree = new_tree(spread=30.0, mean_share=0.5, reach=2.0)  # so coarse that 0 and 1 start as one
+    placements = [tree.insert(motions.perform(m)) for m in order]
+    splits = [split for p in placements for split in p.splits]
+    assert splits, "the two motions were never mixed, or never told apart"
+    assert all(split.node not in tree.leaves for split in splits)
+    assert set(splits[0].into) <= set(tree.leaves)
+    assert all(tree.node(child).parent == splits[0].node for child in splits[0].into)
+    home = home_of(placements)
+    for child in splits[0].into:
+        assert len({order[n] for n, node in home.items() if node == child}) == 1
+
+
+def test_two_leaves_of_one_motion_are_merged():
+    tree, _, _, motions = learned(3, 8, split_ratio=np.inf)
+    leaf = tree.leaves[0]
+    state = tree.state()
+    twin = next(dict(node) for node in state["nodes"] if node["id"] == leaf)
+    k = len(twin["members"]) // 2
+    first = next(node for node in state["nodes"] if node["id"] == leaf)
+    root = next(node for node in state["nodes"] if node["id"] == ROOT)
+    twin |= {"id": 77, "members": twin["members"][k:], "matrix": twin["matrix"][k:, k:]}
+    first |= {"members": first["members"][:k], "matrix": first["matrix"][:k, :k]}
+    root["children"].append(77)
+    state["nodes"].append(twin)
+    again = new_tree(split_ratio=np.inf)
+    again.load_state(state)
+    assert len(again.leaves) == 4
+    merges = []
+    for _ in range(6):
+        for motion in range(3):
+            merges += again.insert(motions.perform(motion)).merges
+    assert merges == [(leaf, 77)]
+    assert len(again.leaves) == 3
+    with pytest.raises(UnknownPrimitiveError, match="77"):
+        again.node(77)
+
+
+@given(st.integers(0, 1000))
+@settings(max_examples=8, deadline=None)
+def test_the_recogniser_decides_as_the_tree_places(seed):
+    tree, _, _, motions = learned(4, 5, seed)
+    strangers = Motions(3, D, seed + 1)
+    for source, m in [(motions, 0), (motions, 3), (strangers, 1), (motions, 2)]:
+        frames = source.perform(m)
+        said = tree.recogniser().recognise(frames)
+        before = tree.state()
+        placed = tree.insert(frames)
+        node = next((s.node for s in placed.splits), placed.node_id)
+        assert said.primitive == (node if placed.recognised else None)
+        assert (said.distance, said.ratio) == (placed.distance, placed.ratio)
+        tree.load_state(before)
+
+
+def test_recognition_changes_nothing_and_survives_storage():
+    tree, _, _, motions = learned(4, 6)
+    recogniser = tree.recogniser()
+    before = digest(tree.state()), digest(recogniser.state())
+    frames = [motions.perform(m % 4) for m in range(8)]
+    said = [recogniser.recognise(f) for f in frames]
+    assert (digest(tree.state()), digest(recogniser.state())) == before
+    again = type(recogniser).from_state(recogniser.state())
+    assert [again.recognise(f) for f in frames] == said
+    assert again.primitives == tree.leaves
+    for frames_, answer in zip(frames, said, strict=True):
+        assert answer.alternatives[0].distance == answer.distance
+        tree.insert(frames_)  # the recogniser is frozen: what the tree learns does not reach it
+    assert [recogniser.recognise(f) for f in frames] == said
+
+
+def test_state_resumes_bit_for_bit():
+    motions = Motions(5, D, 2)
+    session = [frames for _, frames in motions.session(6)]
+    straight, first = new_tree(n_sampled=8), new_tree(n_sampled=8)
+    for frames in session:
+        straight.insert(frames)
+    for frames in session[:13]:
+        first.insert(frames)
+    second = new_tree(n_sampled=8)
+    second.load_state(first.state())
+    for frames in session[13:]:
+        second.insert(frames)
+    assert digest(second.state()) == digest(straight.state())
+
+
+def test_a_new_process_gives_the_same_bits():
+    program = "import test_primitive_tree as t; print(t.digest(t.learned(4, 6, 1)[0].state()))"
+    here = digest(learned(4, 6, 1)[0].state())
+    there = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=Path(__file__).parent,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.strip()
+    assert there == here
+
+
+def test_memory_is_bounded_however_long_the_stream():
+    tree, _, _, motions = learned(3, 10, max_exemplars=6, max_unplaced=10, n_sampled=12)
+    junk = Motions(40, D, 7)
+    for m in range(40):
+        tree.insert(junk.perform(m))
+        tree.insert(motions.perform(m % 3))
+    assert len(tree.node(ROOT).members) <= 10
+    assert all(len(tree.exemplars(leaf)) <= 6 for leaf in tree.leaves)
+    held = tree.state()["bank"]["numbers"]
+    assert len(held) <= 10 + 12 + 6 * len(tree.leaves)
+    assert len(tree.state()["frames"]) == len(held)
+    assert sum(tree.node(leaf).n_placed for leaf in tree.leaves) >= 60
+
+
+def test_poison_leaves_no_trace():
+    motions = Motions(3, D, 4)
+    session = [frames for _, frames in motions.session(5)]
+    clean, poisoned = new_tree(), new_tree()
+    lost = session[0].copy()
+    lost[:, 2] = np.nan
+    for i, frames in enumerate(session):
+        clean.insert(frames)
+        poisoned.insert(frames)
+        if i % 4 == 0:
+            assert "channel 2" in poisoned.insert(lost).refused
+            assert "1 frames" in poisoned.insert(frames[:1]).refused
+            with pytest.raises(FrameError, match="infinite"):
+                poisoned.insert(np.full((30, D), np.inf))
+            with pytest.raises(FrameError, match="6"):
+                poisoned.insert(np.zeros((30, 5)))
+    assert digest(poisoned.state()) == digest(clean.state())
+
+
+def test_gaps_and_short_segments_are_recognised_all_the_same():
+    tree, _, _, motions = learned(4, 6)
+    frames = motions.perform(1)
+    whole = tree.recogniser().recognise(frames)
+    gaps = frames.copy()
+    gaps[10:22, 3] = np.nan
+    gaps[::3, 1] = np.nan
+    assert tree.recogniser().recognise(gaps).primitive == whole.primitive is not None
+    assert tree.insert(gaps).recognised
+    few = motions.perform(1, seconds=0.14)  # 7 frames, fewer than the states
+    assert tree.recogniser().recognise(few).primitive == whole.primitive
+    assert tree.insert(few).recognised
+    assert tree.model(whole.primitive).n_states <= 8
+
+
+def test_identical_segments_make_one_primitive():
+    still = np.zeros((40, D))
+    tree = new_tree()
+    for _ in range(12):
+        placement = tree.insert(still)
+    assert len(tree.leaves) == 1
+    assert placement.recognised and placement.distance == 0
+    motions = Motions(3, D, 0)
+    for m in (0, 1, 2) * 6:
+        tree.insert(motions.perform(m))
+    assert len(tree.leaves) >= 3
+
+
+def test_the_model_of_a_node_is_in_the_units_and_the_rate_of_the_stream():
+    tree, *_ = learned(3, 6)
+    for leaf in tree.leaves:
+        model = tree.model(leaf)
+        exemplars = tree.exemplars(leaf)
+        assert model.n_channels == D
+        assert model is tree.model(leaf)
+        expected = np.mean([len(e) for e in exemplars]) * (model.n_states - 1) / model.n_states
+        assert model.durations_frames.sum() == pytest.approx(expected, rel=0.3)
+        assert np.abs(model.means[0] - np.mean([e[:4].mean(0) for e in exemplars], 0)).max() < 0.3
+
+
+@pytest.mark.parametrize("rate_factor", [1, 3])
+def test_frame_rate_does_not_matter(rate_factor):
+    motions = Motions(5, D, 6)
+    tree = PrimitiveTree(TreeConfig(), D, RATE_HZ * rate_factor)
+    for _, frames in motions.session(6):
+        at = np.linspace(0, len(frames) - 1, len(frames) * rate_factor)
+        dense = np.stack([np.interp(at, np.arange(len(frames)), c) for c in frames.T], axis=1)
+        tree.insert(dense)
+    assert len(tree.leaves) == 5
+
+
+def test_units_do_not_matter():
+    plain, scaled = new_tree(), new_tree()
+    mixed = PrimitiveTree(TreeConfig(), D, RATE_HZ, groups=(0, 0, 0, 1, 1, 1))
+    unit = np.array([1, 1, 1, 1000, 1000, 1000])
+    for _, frames in Motions(5, D, 8).session(6):
+        told = plain.insert(frames), scaled.insert(frames * 1000.0), mixed.insert(frames * unit)
+        assert told[0].node_id == told[1].node_id
+    assert len(plain.leaves) == len(mixed.leaves) == 5
+
+
+def test_the_rules_as_printed_find_well_separated_motions():
+    motions = Motions(3, D, 11)
+    tree = PrimitiveTree(TreeConfig.printed(), D, RATE_HZ)
+    placements = []
+    labels = []
+    for motion, frames in motions.session(10):
+        placements.append(tree.insert(frames))
+        labels.append(motion)
+    nodes = {p.node_id for p in placements} - {ROOT}
+    assert nodes
+    assert all(
+        node.parent is None or node.parent in [n.id for n in tree.nodes] for node in tree.nodes
+    )
+
+
+def test_bad_rules_are_named():
+    for rules, message in [
+        ({"power": 0.0}, "power"),
+        ({"min_exemplars": 1}, "min_exemplars"),
+        ({"max_exemplars": 3}, "max_exemplars"),
+        ({"n_states": 40}, "n_points"),
+        ({"split_ratio": 0.5}, "split_ratio"),
+    ]:
+        with pytest.raises(InvalidValueError, match=message):
+            TreeConfig(**rules)
+    with pytest.raises(InvalidValueError, match="head"):
+        FormConfig(head=0.9, ramp=0.2)
+    with pytest.raises(InvalidValueError, match="n_channels"):
+        PrimitiveTree(TreeConfig(), 0, 100.0)
+    with pytest.raises(InvalidValueError, match="groups"):
+        PrimitiveTree(TreeConfig(), 3, 100.0, groups=(0, 1))
+    with pytest.raises(UnknownPrimitiveError, match="9"):
+        new_tree().node(9)
+
+
+def test_state_is_plain():
+    tree, *_ = learned(2, 5)
+
+    def plain(value):
+        if isinstance(value, dict):
+            return all(isinstance(key, str) and plain(item) for key, item in value.items())
+        if isinstance(value, list):
+            return all(plain(item) for item in value)
+        return value is None or isinstance(value, np.ndarray | int | float | str | bool)
+
+    assert plain(tree.state())
+    assert plain(tree.recogniser().state())
+    json.dumps(tree.recogniser().state()["config"])
