@@ -1,6 +1,6 @@
-"""Learn motion primitives and their order on-line by watching people, and generate motion from them.
+"""Learn motion primitives and their order on-line by watching people, and generate motion.
 
-The names here are the library's front door; the rooms behind it are documented in docs/structure.md.
+These names are the library's front door; docs/structure.md describes the rooms behind it.
 """
 
 from .errors import MPLearnError as MPLearnError

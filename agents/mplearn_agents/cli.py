@@ -8,6 +8,7 @@ import os
 import pkgutil
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
 from types import ModuleType
 
 from mplearn.errors import MPLearnError
@@ -45,6 +46,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="mplearn",
         description="Learn motion primitives and their order by watching people, and perform them.",
     )
+    parser.add_argument("--version", action="version", version=f"mplearn {version('mplearn')}")
     found = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name, module in _commands().items():
         command = found.add_parser(name, help=module.HELP, description=module.HELP)

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from mplearn.errors import InvalidValueError
 from mplearn.generation import StyleName
 from mplearn.library import PrimitiveLibrary
-from mplearn.recording import FloatArray
 
 from .control.planner import Plan, Planner, PlannerConfig
 from .control.reference import rest_reference
@@ -120,7 +119,6 @@ class PrimitiveHumanoidEnv(gymnasium.Env[Observation, np.int64]):
     Attributes:
         frame_callback: Called while a macro step goes on, so that a video of it is smooth: call
             ``env.render()`` there. Not pickled.
-        person: Posture of the human body that `render` draws beside the robot; None draws nobody.
 
     ## Versions
 
@@ -175,7 +173,6 @@ class PrimitiveHumanoidEnv(gymnasium.Env[Observation, np.int64]):
         self.height = height
         self.frame_rate_hz = frame_rate_hz
         self.frame_callback: Callable[[], object] | None = None
-        self.person: FloatArray | None = None
 
         self.simulation = Simulation(self.robot)
         period_s = float(self.simulation.model.opt.timestep)
@@ -264,7 +261,7 @@ class PrimitiveHumanoidEnv(gymnasium.Env[Observation, np.int64]):
             from .rendering import Renderer
 
             self._picture = Renderer(self.simulation.model, self.width, self.height)
-        picture: NDArray[np.uint8] = self._picture.render(self.simulation.data, self.person)
+        picture: NDArray[np.uint8] = self._picture.render(self.simulation.data)
         return picture
 
     def close(self) -> None:

@@ -1,8 +1,7 @@
-"""Pictures of the robot, and of the person beside it."""
+"""Pictures of the robot."""
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import mujoco
@@ -14,8 +13,6 @@ from mplearn.recording import FloatArray
 
 if TYPE_CHECKING:
     import mujoco.viewer
-
-BESIDE_M = 1.1  # how far to the robot's left the person stands
 
 
 class Renderer:
@@ -60,35 +57,18 @@ class Renderer:
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = int(shadows)
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
 
-    def render(self, data: mujoco.MjData, person: FloatArray | None = None) -> NDArray[np.uint8]:
-        """Return a picture, shape (height, width, 3).
-
-        Args:
-            data: State of the simulation.
-            person: Posture of `mplearn.body.human_body`, shape (47,), drawn at the robot's left.
-        """
+    def render(self, data: mujoco.MjData) -> NDArray[np.uint8]:
+        """Return a picture of the simulation's state, shape (height, width, 3)."""
         here = data.xpos[1] * (1.0, 1.0, 0.0)
-        there = here + np.array([0.0, BESIDE_M, 0.0])
-        self.camera.lookat[:] = here if person is None else 0.5 * (here + there)
+        self.camera.lookat[:] = here
         self.camera.lookat[2] = 0.9
         self._renderer.update_scene(data, self.camera)
         add_ground_shadow(self._renderer.scene, here)
-        if person is not None:
-            add_ground_shadow(self._renderer.scene, there)
-            add_person(self._renderer.scene, person, there)
         return np.array(self._renderer.render())
 
     def close(self) -> None:
         """Free the renderer; a second time does nothing."""
         self._renderer.close()
-
-
-@lru_cache(maxsize=1)
-def _person_model() -> tuple[mujoco.MjModel, mujoco.MjData]:
-    from mplearn.body import human_body
-
-    model = human_body().model()
-    return model, mujoco.MjData(model)
 
 
 def add_ground_shadow(scene: mujoco.MjvScene, place: FloatArray) -> None:
@@ -110,33 +90,6 @@ def add_ground_shadow(scene: mujoco.MjvScene, place: FloatArray) -> None:
             np.array([0.0, 0.0, 0.0, 0.04], dtype=np.float32),
         )
         scene.ngeom += 1
-
-
-def add_person(scene: mujoco.MjvScene, posture: FloatArray, place: FloatArray) -> None:
-    """Add a person to a scene.
-
-    Args:
-        scene: What is about to be drawn.
-        posture: Posture of `mplearn.body.human_body`, shape (47,).
-        place: Where the person's base is moved to, shape (3,) [m]; its height stays.
-
-    Raises:
-        InvalidValueError: The posture does not fit the human body.
-    """
-    model, data = _person_model()
-    posture = np.asarray(posture, dtype=np.float64)
-    if posture.shape != (model.nq,) or not np.isfinite(posture).all():
-        raise InvalidValueError(
-            f"a person's posture is {model.nq} finite values, not {posture.shape}"
-        )
-    data.qpos[:] = posture
-    data.qpos[:2] = place[:2]
-    mujoco.mj_kinematics(model, data)
-    first = scene.ngeom
-    options, nothing = mujoco.MjvOption(), mujoco.MjvPerturb()
-    mujoco.mjv_addGeoms(model, data, options, nothing, mujoco.mjtCatBit.mjCAT_DYNAMIC, scene)
-    for geom in scene.geoms[first : scene.ngeom]:
-        geom.matid = -1  # materials are looked up in the robot's model
 
 
 class Viewer:

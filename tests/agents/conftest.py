@@ -53,12 +53,3 @@ def library(demonstration):
 @pytest.fixture
 def library_file(library, tmp_path):
     return library.save(tmp_path / "small.mplearn")
-
-
-@pytest.fixture(scope="session")
-def renderer():
-    """Skip where no picture can be drawn off screen."""
-    from mplearn_agents.film import choose_backend
-
-    if not choose_backend():
-        pytest.skip("no off-screen renderer on this machine")

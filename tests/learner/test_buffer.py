@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mplearn.learner.buffer import FrameBuffer
 from mplearn.errors import InvalidValueError
+from mplearn.learner.buffer import FrameBuffer
 
 
 @given(st.lists(st.tuples(st.integers(1, 700), st.integers(0, 900)), min_size=1, max_size=6))

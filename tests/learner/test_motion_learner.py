@@ -2,6 +2,7 @@ import hashlib
 import subprocess
 import sys
 from collections import Counter
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -72,8 +73,7 @@ def test_the_past_of_a_new_primitive_counts(
     links = learner._chain._links
     known = [link.primitive is not None for link in links]
     assert len(seen) == sum(
-        a and b and link.follows
-        for a, b, link in zip(known, known[1:], links[1:], strict=False)
+        a and b and link.follows for a, b, link in zip(known, known[1:], links[1:], strict=False)
     )
 
 
@@ -83,7 +83,7 @@ def test_segments_tile_the_stream(
     closed = [event.segment for event in learned[1] if isinstance(event, SegmentClosed)]
     assert closed[0].start == 0
     assert closed[-1].end == len(four.recording)
-    assert all(a.end == b.start for a, b in zip(closed, closed[1:], strict=False))
+    assert all(a.end == b.start for a, b in pairwise(closed))
 
 
 def test_nothing_looks_ahead(features: Recording, four: Demonstration) -> None:
@@ -164,7 +164,8 @@ learner = MotionLearner(LearnerConfig({features.channels!r}, {features.rate_hz})
 learner.learn_many(frames)
 print(learner.snapshot().version)
 """
-    done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
     learner = learner_for(features)
     learner.learn_many(features.frames)
     assert done.stdout.strip() == learner.snapshot().version

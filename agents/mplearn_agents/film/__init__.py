@@ -1,6 +1,5 @@
 """Pictures of bodies in motion: a stage, the person beside the robot, captions."""
 
-from .backend import choose_backend as choose_backend
 from .captions import captioned as captioned
 from .duet import accompany as accompany
 from .film import film as film

@@ -16,7 +16,7 @@ from ..table import Table, percent
 
 PAPER = (
     "paper, one person",
-    *("17 of 22", "0", "-", "3.5 %", "6.7 %", "77 %", "-", "6-8", "-", "> 1 x"),
+    *("17 of 22", "0", "-", "3.5 %", "6.7 %", "-", "77 %", "6-8", "-", "> 1 x"),
 )
 COLUMNS = (
     "session",
@@ -62,21 +62,15 @@ class Outcome:
     times_real_time: float
 
 
-def learn_session(
-    recording: Recording,
-    truth: Sequence[LabelledSegment] | None = None,
-    learner: MotionLearner | None = None,
-) -> Outcome:
-    """Learn a session frame by frame and rate what the learner said.
+def learn_session(recording: Recording, truth: Sequence[LabelledSegment] | None = None) -> Outcome:
+    """Learn a session frame by frame, from nothing, and rate what the learner said.
 
     Args:
         recording: The session.
         truth: What was performed; the recording's labels where not given.
-        learner: A learner that may know something already; a new one where not given.
     """
     truth = recording.labels if truth is None else truth
-    learner = learner or MotionLearner(LearnerConfig(recording.channels, recording.rate_hz))
-    first_frame = learner.n_frames
+    learner = MotionLearner(LearnerConfig(recording.channels, recording.rate_hz))
     begin = time.perf_counter()
     closed = [
         event
@@ -85,15 +79,11 @@ def learn_session(
         if isinstance(event, SegmentClosed)
     ]
     took_s = time.perf_counter() - begin
-    moved = [
-        LabelledSegment(s.start + first_frame, s.end + first_frame, s.label, s.person)
-        for s in truth
-    ]
     segments = [event.segment for event in closed]
     return Outcome(
         learner,
-        rate_learning(moved, segments, [e.placement for e in closed], recording.rate_hz),
-        score_boundaries(segments, moved, recording.rate_hz),
+        rate_learning(truth, segments, [e.placement for e in closed], recording.rate_hz),
+        score_boundaries(segments, truth, recording.rate_hz),
         recording.duration_s / took_s,
     )
 

@@ -1,0 +1,12 @@
+import pytest
+
+from mplearn_envs.graphics import choose_backend
+
+CAN_DRAW = choose_backend()  # before anything imports mujoco, which reads MUJOCO_GL then
+
+
+@pytest.fixture(scope="session")
+def renderer() -> None:
+    """Skip where no picture can be drawn off screen."""
+    if not CAN_DRAW:
+        pytest.skip("no off-screen renderer on this machine; see scripts/system_packages.sh")
