@@ -89,8 +89,8 @@ class TreeConfig:
     reach_cap: float = 1.75
     reach_limit: float = 1.0
     n_nearest: int = 2
-    split_ratio: float = 1.5
-    min_branch: int = 3
+    split_ratio: float = 2.0
+    min_branch: int = 4
     split_scale: float = 1.25
     merge_ratio: float = 1.4
     n_candidates: int = 6

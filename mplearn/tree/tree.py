@@ -268,12 +268,10 @@ class PrimitiveTree:
         branches = two_branches(leaf.matrix, self.config.min_branch)
         if branches is None:
             return (), (), ()
+        ratio = separation(leaf.matrix, *branches)
         between = float(leaf.matrix[np.ix_(*branches)].mean())
-        if separation(
-            leaf.matrix, *branches
-        ) <= self.config.split_ratio or between <= self.config.split_scale * self._index.scale(
-            but=leaf.id
-        ):
+        usual = self._index.scale(but=leaf.id)
+        if ratio <= self.config.split_ratio or between <= self.config.split_scale * usual:
             return (), (), ()
         leaf.history.append(("split", self.n_seen))
         groups = [[leaf.members[i] for i in branch] for branch in branches]
