@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from mplearn_agents.report import Page
 
 _MEAN_SEGMENT_S = 1.28
+_WARM_UP_FRAMES = 2500  # enough for a first primitive: what is compiled is not counted as learning
 
 
 def run_demo(out: Path, minutes: float, steps: int, seed: int, console: Console) -> Path:
@@ -63,7 +64,10 @@ def run_demo(out: Path, minutes: float, steps: int, seed: int, console: Console)
         f"[bold]watching[/] a person with {len(recording.marker_names)} markers perform "
         f"{len(PAPER_PRIMITIVES)} kinds of motion for {recording.duration_s / 60:.1f} minutes"
     )
-    learner = MotionLearner(LearnerConfig(recording.channels, recording.rate_hz))
+    config = LearnerConfig(recording.channels, recording.rate_hz)
+    with console.status("compiling, the first time only"):
+        MotionLearner(config).learn_many(recording.frames[:_WARM_UP_FRAMES])
+    learner = MotionLearner(config)
     log = learn(learner, [recording], console)
     library = learner.snapshot()
     score = score_learning(log, demonstration.truth, recording.rate_hz)
