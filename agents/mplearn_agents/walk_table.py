@@ -16,9 +16,11 @@ from .walk import WalkResult, walk
 
 STEPS = 20
 COLUMNS = (
-    "walk",
-    "primitives",
-    "of these different",
+    "learned from",
+    "seed",
+    "feasible",
+    "performed",
+    "different",
     "falls",
     "robot's time",
     "tracking RMSE, worst",
@@ -27,34 +29,42 @@ COLUMNS = (
 )
 
 
-def walk_table(library: PrimitiveLibrary, seeds: Sequence[int], steps: int = STEPS) -> Table:
-    """Let the robot walk at half speed, once a seed, and return what it was like.
+def walk_table(
+    libraries: Sequence[tuple[str, PrimitiveLibrary]], seeds: Sequence[int], steps: int = STEPS
+) -> Table:
+    """Let the robot walk at half speed, once a library and seed, and return what it was like.
 
     Args:
-        library: What was learned, as features of the robot.
+        libraries: What was learned, as features of the robot, by name.
         seeds: Seeds of the walks.
         steps: Primitives a walk.
     """
-    env = gymnasium.make(
-        "mplearn/PrimitiveHumanoid-v0", library=library, disable_env_checker=True, max_steps=steps
-    )
-    repertoire = env.unwrapped.repertoire  # type: ignore[attr-defined]
-    refused = sum(not repertoire.feasibility(id).feasible for id in library.ids)
-    rows = [_row(seed, walk(env, POLICIES["random"](), steps, seed)) for seed in seeds]
-    env.close()
+    rows: list[tuple[str, ...]] = []
+    for name, library in libraries:
+        env = gymnasium.make(
+            "mplearn/PrimitiveHumanoid-v0", library=library, disable_env_checker=True
+        )
+        repertoire = env.unwrapped.repertoire  # type: ignore[attr-defined]
+        feasible = sum(repertoire.feasibility(id).feasible for id in library.ids)
+        known = f"{feasible} of {len(library)}"
+        rows += [
+            _row((name, str(seed), known), walk(env, POLICIES["random"](), steps, seed))
+            for seed in seeds
+        ]
+        env.close()
     return Table(
-        f"Random walks of the robot on {len(library)} primitives",
+        f"Random walks of {steps} primitives, performed by the robot",
         COLUMNS,
         tuple(rows),
-        f"By the transition prior, at half the human's speed, in simulation. {refused} of the "
-        "primitives are masked, because they lift a foot or exceed the robot's limits.",
+        "By the transition prior, at half the human's speed, in simulation. Primitives that lift a "
+        "foot, or exceed what the robot can do, are masked.",
     )
 
 
-def _row(seed: int, result: WalkResult) -> tuple[str, ...]:
+def _row(head: tuple[str, ...], result: WalkResult) -> tuple[str, ...]:
     moved = [step for step in result.steps if step.primitive is not None]
     return (
-        f"seed {seed}",
+        *head,
         str(len(result.primitives)),
         str(len(set(result.primitives))),
         str(result.falls),

@@ -72,9 +72,13 @@ class ExemplarBank:
     def model(self, points: FloatArray) -> Exemplar:
         """Model the points of a segment, shape (P, D); the bank does not remember it.
 
+        They are rounded to single precision first, so that a stored recogniser is small and yet
+        decides as the tree does.
+
         Raises:
             ModelError: A channel is missing throughout.
         """
+        points = points.astype(np.float32).astype(np.float64)
         model = fit(
             [points],
             self.config.n_states,
@@ -141,10 +145,26 @@ class ExemplarBank:
 
     def subset(self, numbers: Iterable[int]) -> ExemplarBank:
         """Return a bank of some of the exemplars, sharing no memory."""
-        state = self.state()
-        keep = np.isin(state["numbers"], list(numbers))
-        part = {name: state[name][keep] for name in ("numbers", *Exemplar._fields)}
-        return ExemplarBank.from_state(self.config, {"floor": state["floor"], **part})
+        return ExemplarBank.from_points(self.config, self.points(numbers))
+
+    def points(self, numbers: Iterable[int] | None = None) -> dict[str, Any]:
+        """Return what `from_points` needs of all exemplars, or of some; models follow from it."""
+        numbers = sorted(self._slots if numbers is None else numbers)
+        columns = self._rows.columns[self._slots_of(numbers)]
+        return {
+            "floor": self.floor.copy(),
+            "numbers": np.array(numbers, np.int64),
+            "columns": columns,
+        }
+
+    @classmethod
+    def from_points(cls, config: TreeConfig, points: dict[str, Any]) -> ExemplarBank:
+        """Return the bank that `points` described."""
+        floor = np.array(points["floor"], dtype=np.float64)
+        bank = cls(config, len(floor), floor)
+        for number, columns in zip(points["numbers"], points["columns"], strict=True):
+            bank.add(int(number), bank.model(np.asarray(columns, dtype=np.float64).T))
+        return bank
 
     def state(self) -> dict[str, Any]:
         """Return all exemplars as plain arrays."""

@@ -91,7 +91,7 @@ class TreeConfig:
     n_nearest: int = 2
     split_ratio: float = 2.0
     min_branch: int = 4
-    split_scale: float = 1.25
+    split_scale: float = 0.9
     merge_ratio: float = 1.4
     n_candidates: int = 6
     max_exemplars: int = 12

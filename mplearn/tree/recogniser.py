@@ -79,7 +79,7 @@ class Recogniser:
         return {
             "config": asdict(self.config),
             "shortest_frames": self.shortest_frames,
-            "bank": self._bank.state(),
+            "bank": self._bank.points(),
             "index": self._index.state(),
         }
 
@@ -88,7 +88,7 @@ class Recogniser:
         """Return the recogniser that `state` described: equal in every decision."""
         settings = dict(state["config"])
         config = TreeConfig(**(settings | {"form": FormConfig(**settings["form"])}))
-        bank = ExemplarBank.from_state(config, state["bank"])
+        bank = ExemplarBank.from_points(config, state["bank"])
         index = NodeIndex.from_state(config, bank, state["index"])
         return cls(config, bank, index, int(state["shortest_frames"]))
 

@@ -66,18 +66,19 @@ def _tables(args: argparse.Namespace) -> Iterator[Table]:
     if args.data == _SYNTHETIC:
         outcomes = list(learn_paper_sessions(args.seeds))
         yield learning_table("Sessions like the paper's, of the synthetic demonstrator", outcomes)
-        yield walk_table(outcomes[0][1].learner.snapshot(), args.seeds)
+        yield walk_table([(name, each.learner.snapshot()) for name, each in outcomes], args.seeds)
         return
     from mplearn.learner import LearnerConfig, MotionLearner
     from mplearn.mocap import open_recordings
 
     takes = open_recordings(args.data)
     yield boundary_table(takes)
-    yield learning_table(
-        "Sessions made of each person's takes", list(learn_people(takes, args.orders))
-    )
+    outcomes = list(learn_people(takes, args.orders))
+    yield learning_table("Sessions made of each person's takes", outcomes)
     learner = MotionLearner(LearnerConfig(takes[0].channels, takes[0].rate_hz))
     for take in takes:
         for _ in learner.learn_recording(take):
             pass
-    yield walk_table(learner.snapshot(), args.seeds)
+    walked = [("all takes", learner.snapshot())]
+    walked += [(name, each.learner.snapshot()) for name, each in outcomes[:: args.orders]]
+    yield walk_table(walked, args.seeds)
