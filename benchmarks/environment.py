@@ -33,7 +33,8 @@ def rows() -> list[tuple[str, str, str, str]]:
         _, _, terminated, truncated, info = env.step(action)
         step_s.append(time.process_time() - begin)
         simulated_s += info["duration_s"]
-        model, data = env.unwrapped.model, env.unwrapped.data
+        simulation = env.unwrapped.simulation
+        model, data = simulation.model, simulation.data
         copy = mujoco.MjData(model)
         copy.qpos[:], copy.ctrl[:] = data.qpos, data.ctrl
         substeps = round(info["duration_s"] / model.opt.timestep)
