@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.cluster.hierarchy import fcluster, linkage
 
 from ..recording import FloatArray, IntArray
 from .spread import pairs
@@ -20,6 +19,8 @@ def clusters_below(matrix: FloatArray, cutoff: float, least: int) -> list[IntArr
     Returns:
         Positions of the members, in order.
     """
+    from scipy.cluster.hierarchy import fcluster, linkage
+
     if len(matrix) < least or not cutoff >= 0:
         return []
     labels = fcluster(linkage(pairs(matrix), "complete"), cutoff, "distance")
@@ -34,6 +35,8 @@ def two_branches(matrix: FloatArray, least: int) -> tuple[IntArray, IntArray] | 
     Branches of fewer than ``least`` members that join last are outliers; each goes to the branch
     that is nearer on average. None where there are no two branches of that size.
     """
+    from scipy.cluster.hierarchy import linkage
+
     n = len(matrix)
     if n < 2 * least:
         return None
