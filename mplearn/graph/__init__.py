@@ -1,5 +1,8 @@
 """The motion primitive graph: learned transitions, paths, walks, prediction [Kulic2012, 3]."""
 
+from .chains import MergedGraph as MergedGraph
+from .levels import LevelledGraph as LevelledGraph
+from .levels import tree_levels as tree_levels
 from .prediction import History as History
 from .prediction import Prediction as Prediction
 from .transition_graph import TransitionGraph as TransitionGraph

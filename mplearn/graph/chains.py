@@ -2,9 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ..errors import UnknownPrimitiveError
 from ..recording import IntArray
+from .edges import EdgeTable
+
+if TYPE_CHECKING:
+    from .transition_graph import TransitionGraph
+
+
+@dataclass(frozen=True)
+class MergedGraph:
+    """A graph in which each chain is one node; nothing is lost by it.
+
+    Attributes:
+        whole: The graph as it was: the undo.
+        graph: The graph of chains, of order 1; a chain goes by its first primitive. Durations are
+            from the start of a chain to the start of the next.
+        chains: The primitives of each chain, by the first.
+    """
+
+    whole: TransitionGraph
+    graph: TransitionGraph
+    chains: Mapping[int, tuple[int, ...]]
+
+    def expand(self, path: Sequence[int]) -> tuple[int, ...]:
+        """Return the primitives of a path of chains.
+
+        Raises:
+            UnknownPrimitiveError: The path names something that is not a chain's first primitive.
+        """
+        for head in path:
+            if head not in self.chains:
+                raise UnknownPrimitiveError(
+                    f"no chain starts with primitive {head}; chains start with {list(self.chains)}"
+                )
+        return tuple(id for head in path for id in self.chains[head])
 
 
 def find_chains(
@@ -38,3 +77,19 @@ def find_chains(
         taken.update(chain)
         chains[head] = tuple(chain)
     return tuple(chains[i] for i in order if i in chains)
+
+
+def merged_edges(edges: EdgeTable, chains: Mapping[int, tuple[int, ...]]) -> IntArray:
+    """Return the rows of the edges between chains, shape (E, 5); those inside are gone.
+
+    A chain takes the mean time of its inner edges more than its last primitive alone.
+    """
+    head_of = {chain[-1]: head for head, chain in chains.items()}
+    rows = []
+    for source, target, count, total_ms, squares in edges.rows.tolist():
+        if source in head_of and target in chains:
+            chain = chains[head_of[source]]
+            more = sum(round(1e3 * edges.time_s(i, j)[0]) for i, j in pairwise(chain))
+            squares += 2 * more * total_ms + more**2 * count
+            rows.append([head_of[source], target, count, total_ms + more * count, squares])
+    return np.array(rows, dtype=np.int64).reshape(len(rows), 5)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -12,6 +12,7 @@ from ..errors import InvalidValueError, UnknownPrimitiveError
 from ..recording import FloatArray, IntArray
 from .edges import EdgeTable
 from .history import HistoryTable
+from .validation import checked_arrays
 
 
 class TransitionCounts:
@@ -21,13 +22,13 @@ class TransitionCounts:
 
     Attributes:
         order: Longest history that prediction looks at; 1 is a first-order Markov chain.
-        concentration: Weight of what a shorter history predicts, in observations: the mass of a
-            Dirichlet prior whose mean is the prediction of the next lower order.
+        concentration: Weight of what a shorter history predicts, in observations for each different
+            primitive that has followed the longer one; 1 is Witten and Bell's [Witten1991].
         history_capacity: Largest number of entries kept about histories longer than one.
     """
 
     def __init__(
-        self, *, order: int = 2, concentration: float = 2.0, history_capacity: int = 20_000
+        self, *, order: int = 2, concentration: float = 1.0, history_capacity: int = 20_000
     ) -> None:
         if not 1 <= order <= 8:
             raise InvalidValueError(f"order must lie in [1, 8], not {order}")
@@ -137,12 +138,26 @@ class TransitionCounts:
     def duration_s(self, previous: int, next: int) -> float:
         """Mean duration of a transition [s]; NaN where it has never been seen."""
         self._require(previous, next)
-        return self._edges.duration_s(previous, next)
+        return self._edges.time_s(previous, next)[0]
 
     def successors(self, id: int) -> tuple[int, ...]:
         """The primitives that have been seen to follow one, in the order of first sight."""
         self._require(id)
         return tuple(self._edges.targets[self._edges.sources == id].tolist())
+
+    def seen(self, context: tuple[int, ...], next: int) -> bool:
+        """Whether a primitive has been counted after a context, oldest first."""
+        if len(context) < 2:
+            return bool(context) and self._edges.count(context[0], next) > 0
+        return next in self._histories.followers(context[-self.order :])
+
+    def edge_rows(self) -> IntArray:
+        """Return the edges, shape (E, 5): source, target, count, total [ms], squares [ms^2]."""
+        return self._edges.rows
+
+    def histories(self) -> Iterator[tuple[tuple[int, ...], int, int]]:
+        """Yield (context, next, count) of the contexts longer than one primitive."""
+        return self._histories.entries()
 
     # ---- keeping
 
@@ -169,7 +184,7 @@ class TransitionCounts:
             concentration=float(state["concentration"]),
             history_capacity=int(state["history_capacity"]),
         )
-        ids, edges, histories = _checked_arrays(state, fresh.order)
+        ids, edges, histories = checked_arrays(state, fresh.order)
         fresh._index = {id: k for k, id in enumerate(ids.tolist())}
         fresh._edges.add(edges)
         fresh._histories = HistoryTable.from_array(fresh.order, fresh.history_capacity, histories)
@@ -233,25 +248,3 @@ class TransitionCounts:
 def _shortened(ids: tuple[int, ...]) -> str:
     shown = ", ".join(map(str, ids[:20]))
     return f"{len(ids)} primitives: {shown}" + (", ..." if len(ids) > 20 else "")
-
-
-def _checked_arrays(state: Mapping[str, Any], order: int) -> tuple[IntArray, IntArray, IntArray]:
-    ids, edges, histories = (np.asarray(state[key]) for key in ("ids", "edges", "histories"))
-    shapes_fit = ids.ndim == 1 and edges.ndim == histories.ndim == 2
-    if not (shapes_fit and edges.shape[1] == 5 and histories.shape[1] == order + 3):
-        raise InvalidValueError(
-            "a graph's state needs ids (n,), edges (E, 5) and histories (H, order + 3), not "
-            f"{ids.shape}, {edges.shape} and {histories.shape}"
-        )
-    if any(array.dtype.kind not in "iu" for array in (ids, edges, histories)):
-        raise InvalidValueError("a graph's state holds whole numbers only")
-    lengths = histories[:, 0]
-    if not ((lengths >= 2) & (lengths <= order)).all():
-        raise InvalidValueError(f"histories must have lengths in [2, {order}]")
-    used = np.arange(order) < lengths[:, None]
-    named = (edges[:, :2].ravel(), histories[:, 1:-2][used], histories[:, -2])
-    if len(set(ids.tolist())) != len(ids) or not np.isin(np.concatenate(named), ids).all():
-        raise InvalidValueError("a graph's ids must differ, and its transitions name only them")
-    if (edges[:, 2] < 1).any() or (edges[:, 3:] < 0).any() or (histories[:, -1] < 1).any():
-        raise InvalidValueError("a graph's counts must be at least 1, its durations at least 0")
-    return ids, edges, histories

@@ -66,12 +66,23 @@ class EdgeTable:
         row = self._row_of.get((source, target))
         return 0 if row is None else int(self._rows[row, _COUNT])
 
-    def duration_s(self, source: int, target: int) -> float:
-        """Mean duration of an edge [s]; NaN where it was never taken."""
-        row = self._row_of.get((source, target))
-        if row is None:
-            return float("nan")
-        return float(self._rows[row, _TOTAL_MS] / self._rows[row, _COUNT] / 1e3)
+    def time_s(self, source: int, target: int | None = None) -> tuple[float, float]:
+        """Mean and standard deviation of an edge's duration [s]; NaN where it was never taken.
+
+        Args:
+            source: Where the edge starts.
+            target: Where it ends; None for all edges from ``source`` together.
+        """
+        if target is None:
+            rows = np.flatnonzero(self.sources == source)
+        else:
+            row = self._row_of.get((source, target))
+            rows = np.array([] if row is None else [row], dtype=np.int64)
+        count, total_ms, squares = self._rows[rows, _COUNT:].sum(axis=0).tolist()
+        if count == 0:
+            return float("nan"), float("nan")
+        mean_s = total_ms / count / 1e3
+        return mean_s, max(squares / count / 1e6 - mean_s**2, 0.0) ** 0.5
 
     def observe(self, source: int, target: int, duration_s: float) -> None:
         """Count an edge once.

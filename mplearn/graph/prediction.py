@@ -17,18 +17,21 @@ History: TypeAlias = Sequence[int | None]
 
 @dataclass(frozen=True)
 class Prediction:
-    """A primitive that may come next.
+    """A primitive that may come next, how likely, and when.
 
     Attributes:
         id: The primitive.
         probability: How likely it is, in [0, 1].
         duration_s: Mean time from the start of the last primitive of the history until this one
-            starts [s]; NaN where that transition has never been seen.
+            starts [s]. Where this transition has never been seen, that until whatever followed;
+            NaN where nothing ever did.
+        duration_std_s: Standard deviation of that time [s].
     """
 
     id: int
     probability: float
     duration_s: float
+    duration_std_s: float
 
 
 def usable_context(history: History, order: int) -> tuple[int, ...]:
@@ -39,27 +42,33 @@ def usable_context(history: History, order: int) -> tuple[int, ...]:
 
 
 def backed_off(counts: TransitionCounts, context: tuple[int, ...], mass: float) -> FloatArray:
-    """Return p(next | context), shape (n,), by a hierarchy of Dirichlet priors [MacKay1995].
+    """Return p(next | context), shape (n,), interpolated over the orders [Witten1991].
 
-    ``p_k(x) = (c(h_k, x) + m p_{k-1}(x)) / (c(h_k) + m)`` from equal shares upwards, where h_0 is
-    the empty history. With m = 0 the longest history that has been seen decides alone.
+    ``p_k(x) = (c(h_k, x) + m d(h_k) p_{k-1}(x)) / (c(h_k) + m d(h_k))`` from equal shares upwards,
+    where h_0 is the empty history and d(h) the number of different primitives that followed h:
+    what has always had one follower is soon sure of it, what has had many keeps an open mind. With
+    m = 0 the longest history that has been seen decides alone.
     """
     n = len(counts)
     p = np.full(n, 1.0 / n) if n else np.zeros(0)
     for length in range(len(context) + 1):
         seen = counts.followers(context[len(context) - length :])
         if seen.any():
-            p = (seen + mass * p) / (seen.sum() + mass)
+            weight = mass * np.count_nonzero(seen)
+            p = (seen + weight * p) / (seen.sum() + weight)
     return p
 
 
 def surprise(counts: TransitionCounts, sequence: History) -> FloatArray:
-    """Return log p(x_t | x_1..x_{t-1}), shape (len(sequence) - 1,); NaN where x_t is None."""
+    """Return -log p(x_t | x_1..x_{t-1}) [nat], shape (len(sequence) - 1,); NaN where x_t is None.
+
+    NaN too where nothing is known of what came before x_t: that is no order.
+    """
     scores = np.full(max(len(sequence) - 1, 0), np.nan)
     known = {context: i for i, context in enumerate(counts.ids)}
     for t, next_id in enumerate(sequence[1:], start=1):
-        if next_id is not None:
-            context = usable_context(sequence[:t], counts.order)
+        context = usable_context(sequence[:t], counts.order)
+        if next_id is not None and context:
             p = backed_off(counts, context, counts.concentration)
-            scores[t - 1] = math.log(p[known[next_id]])
+            scores[t - 1] = -math.log(p[known[next_id]])
     return scores

@@ -117,6 +117,75 @@ def test_a_way_by_all_of_two_others(edges, start, goal):
     assert set(visits) <= set(path)
 
 
+@settings(max_examples=60)
+@given(
+    edge_lists,
+    st.integers(0, N - 1),
+    st.integers(0, N - 1),
+    st.tuples(st.floats(0, 3), st.floats(0, 3)).map(sorted),
+)
+def test_ways_of_a_duration_are_those_of_enumeration(edges, start, goal, bounds):
+    graph = graph_of(edges)
+    exported = graph.to_networkx()
+    low, high = bounds
+
+    def ms(walk):
+        return sum(round(1e3 * exported.edges[i, j]["duration_s"]) for i, j in pairwise(walk))
+
+    # a step takes 0.4 s at least, so eight primitives are more than 3 s allow
+    fitting = {w for w in all_walks(graph, start, goal, 9) if 1e3 * low <= ms(w) <= 1e3 * high}
+    if not fitting:
+        with pytest.raises(NoPathError, match=f"in {low:g} to {high:g} s"):
+            graph.path(start, goal, duration_s=(low, high))
+        return
+    costs = sorted(weight(graph, walk, "probability") for walk in fitting)
+    found = graph.k_paths(start, goal, 3, duration_s=(low, high))
+    assert set(found) <= fitting
+    assert len(set(found)) == len(found) == min(3, len(fitting))
+    np.testing.assert_allclose(
+        [weight(graph, walk, "probability") for walk in found], costs[: len(found)], atol=1e-12
+    )
+
+
+@settings(max_examples=60)
+@given(
+    st.lists(st.integers(0, N - 1), min_size=4, max_size=25),
+    st.integers(0, N - 1),
+    st.integers(0, N - 1),
+    st.integers(3, 6),
+    st.integers(2, 3),
+)
+def test_novel_paths_have_never_been_observed(sequence, start, goal, length, order):
+    graph = TransitionGraph(order=order)
+    for id in range(N):
+        graph.add_node(id)
+    for t in range(1, len(sequence)):
+        before = sequence[max(t - order, 0) : t - 1]
+        graph.observe(sequence[t - 1], sequence[t], 1.0, before=before)
+    grams = {
+        tuple(sequence[i : i + n])
+        for n in range(3, order + 2)
+        for i in range(len(sequence) - n + 1)
+    }
+
+    def is_new(walk):
+        ends = range(3, len(walk) + 1)
+        return any(walk[max(e - order - 1, 0) : e] not in grams for e in ends)
+
+    fitting = {w for w in all_walks(graph, start, goal, length) if len(w) == length and is_new(w)}
+    if not fitting:
+        with pytest.raises(NoPathError, match="never observed"):
+            graph.path(start, goal, length=length, novel=True)
+        return
+    found = graph.k_paths(start, goal, 3, length=length, novel=True)
+    assert set(found) <= fitting
+    assert len(set(found)) == len(found) == min(3, len(fitting))
+    observed = {tuple(sequence[i : i + length]) for i in range(len(sequence))}
+    assert not observed & set(found)
+    best = min(weight(graph, walk, "probability") for walk in fitting)
+    assert weight(graph, found[0], "probability") == pytest.approx(best)
+
+
 def test_what_cannot_be_asked():
     graph = graph_of([(0, 1, 1), (1, 0, 1)])
     with pytest.raises(UnknownPrimitiveError, match="42"):
@@ -127,6 +196,11 @@ def test_what_cannot_be_asked():
         graph.path(0, 1, length=0)
     with pytest.raises(InvalidValueError, match="too large"):
         graph.path(0, 1, length=10_000_000)
+    for wrong in ((2.0, 1.0), (-1.0, 1.0), (0.0, np.inf)):
+        with pytest.raises(InvalidValueError, match="duration_s"):
+            graph.path(0, 1, duration_s=wrong)
+    with pytest.raises(NoPathError, match=r"in 0\.1 to 0\.2 s by a succession never observed"):
+        graph.path(0, 1, duration_s=(0.1, 0.2), novel=True)
     with pytest.raises(NoPathError, match=r"avoiding \[1\]"):
         graph.path(0, 1, avoid=[1])
     assert graph.path(0, 0) == (0,)

@@ -72,7 +72,7 @@ def test_smoothing_by_hand():
     graph.observe(0, 1, 1.0)
     graph.observe(0, 1, 1.0)
     graph.observe(1, 2, 1.0, before=[0])
-    p0 = (np.array([0, 2, 1]) + 2 / 3) / 5
+    p0 = (np.array([0, 2, 1]) + 4 / 3) / 7  # two different ones followed: a weight of 4
     np.testing.assert_allclose(graph.probabilities(), p0)
     np.testing.assert_allclose(graph.probabilities([0]), (np.array([0, 2, 0]) + 2 * p0) / 4)
     p1 = (np.array([0, 0, 1]) + 2 * p0) / 3
@@ -97,17 +97,16 @@ def test_longer_histories_tell_apart_what_one_step_cannot():
     assert math.isnan(two.predict([None], 1)[0].duration_s)
 
 
-def test_a_planted_wrong_order_scores_lowest():
+def test_a_planted_wrong_order_surprises_most():
     sequence = [0, 1, 2, 3] * 30
     graph = learned(sequence)
     planted = [*sequence[:20], 3, *sequence[20:40]]
-    scores = graph.log_likelihoods(planted)
-    assert np.argmin(scores) in (19, 20)
+    scores = graph.surprises(planted)
+    assert np.argmax(scores) in (19, 20)
     assert len(scores) == len(planted) - 1
-    broken = graph.log_likelihoods([0, 1, None, 3, 0])
-    assert np.isnan(broken).tolist() == [False, True, False, False]
-    np.testing.assert_allclose(broken[0], np.log(graph.probabilities([0])[1]))
-    np.testing.assert_allclose(broken[2], np.log(graph.probabilities([])[3]))
+    broken = graph.surprises([0, 1, None, 3, 0])
+    assert np.isnan(broken).tolist() == [False, True, True, False]
+    np.testing.assert_allclose(broken[0], -np.log(graph.probabilities([0])[1]))
 
 
 @given(sequences, sequences, st.randoms())
@@ -205,11 +204,34 @@ def test_histories_are_bounded_and_keep_what_is_frequent():
 
 def test_chains_of_the_paper():
     graph = paper_graph()
+    before = graph.state()
     assert graph.chains() == ((0, 1), (2, 3), (4, 5))
-    merged = graph.merged_view()
-    assert set(merged.nodes) == {(0, 1), (2, 3), (4, 5)}
-    assert merged.edges[(0, 1), (2, 3)]["probability"] == pytest.approx(2 / 3)
-    assert set(graph.to_networkx().nodes) == set(range(6))
+    merged = graph.merged()
+    assert merged.graph.ids == (0, 2, 4)
+    np.testing.assert_allclose(merged.graph.prior(0), [0, 2 / 3, 1 / 3])
+    assert merged.expand(merged.graph.path(2, 4)) == (2, 3, 4, 5)
+    for key, value in merged.whole.state().items():  # the undo
+        np.testing.assert_array_equal(value, before[key])
+    with pytest.raises(UnknownPrimitiveError, match="no chain starts with primitive 3"):
+        merged.expand([2, 3])
+
+
+@given(sequences)
+def test_merging_chains_loses_no_count_and_no_time(sequence):
+    graph = learned([*range(7), *sequence])
+    merged = graph.merged()
+    inside = {pair for chain in merged.chains.values() for pair in pairwise(chain)}
+    edges = [(i, j) for i, j, *_ in graph.edge_rows().tolist() if (i, j) not in inside]
+    head_of = {id: head for head, chain in merged.chains.items() for id in chain}
+    outside = sum(graph.count(i, j) for i, j in edges)
+    assert merged.graph.n_transitions == outside
+    for i, j in edges:
+        chain = merged.chains[head_of[i]]
+        if i == chain[-1] and j in merged.chains:
+            time_s = sum(graph.duration_s(*pair) for pair in [*pairwise(chain), (i, j)])
+            assert merged.graph.duration_s(chain[0], j) == pytest.approx(
+                time_s, abs=1e-3 * len(chain)
+            )
 
 
 @given(sequences)
