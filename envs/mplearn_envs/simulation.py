@@ -4,44 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
 
-from mplearn.body.tree import quaternion_matrix
 from mplearn.recording import BoolArray, FloatArray
 
 from .control.planner import Plan
 from .control.reference import rest_reference, sole_corners
-from .control.support import convex_hull, support_margin, zero_moment_point
+from .control.support import convex_hull, support_margin
+from .performance import Performance as Performance
+from .performance import assess, fallen_at
 from .robot import Robot
 
 SETTLE_S = 1.0
-FALL_TILT_RAD = 0.6
-FALL_DROP_M = 0.2
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
-
-
-class Performance(NamedTuple):
-    """What happened while a plan was performed, at its S reference postures (fewer after a fall).
-
-    Attributes:
-        time_s: Time since the start, shape (S,) [s].
-        tracking_error_rad: Root mean square over the joints of actual minus wanted angle, (S,)
-            [rad].
-        cog_deviation_m: Distance of the COG's projection from the middle of the soles, (S,) [m].
-        zmp_margin_m: Distance of the zero-moment point from the edge of the soles, (S,) [m].
-        fallen: Whether the robot fell; the last sample is when.
-        duration_s: How long it took [s].
-    """
-
-    time_s: FloatArray
-    tracking_error_rad: FloatArray
-    cog_deviation_m: FloatArray
-    zmp_margin_m: FloatArray
-    fallen: bool
-    duration_s: float
+_PHYSICS = mujoco.mjtState.mjSTATE_FULLPHYSICS
+_INPUTS = int(
+    mujoco.mjtState.mjSTATE_CTRL
+    | mujoco.mjtState.mjSTATE_QFRC_APPLIED
+    | mujoco.mjtState.mjSTATE_XFRC_APPLIED
+)
 
 
 class Simulation:
@@ -90,55 +74,60 @@ class Simulation:
     def perform(
         self, plan: Plan, on_frame: Callable[[], None] | None = None, frame_steps: int = 10
     ) -> Performance:
-        """Send a plan's commands to the servos and simulate.
+        """Send a plan's commands to the servos and simulate, until the end or a fall.
+
+        Other threads go on meanwhile.
 
         Args:
             plan: What to perform.
-            on_frame: Called every ``frame_steps`` steps, to take pictures.
+            on_frame: Called at the first reference posture after every ``frame_steps`` steps, to
+                take pictures; without it all is simulated in one go, with the same result.
             frame_steps: See there.
         """
-        model, data = self.model, self.data
-        step, control, force = mujoco.mj_step, data.ctrl, data.qfrc_constraint[:6]
+        nq, nv = self.model.nq, self.model.nv
         n_knots = len(plan.q) - 1
         n_steps = len(plan.commands) // n_knots
-        q, cog = np.empty((n_knots, model.nq)), np.empty((n_knots, 3))
-        ground = np.zeros((n_knots, 6))  # sums over a knot's steps: single ones flutter
-        next_frame, fallen, done = frame_steps, False, n_knots
-        for knot in range(n_knots):
-            reaction = ground[knot]
-            for command in plan.commands[knot * n_steps : (knot + 1) * n_steps]:
-                control[:] = command
-                step(model, data)
-                reaction += force
-            q[knot], cog[knot] = data.qpos, data.subtree_com[1]
-            if on_frame is not None and (knot + 1) * n_steps >= next_frame:
-                next_frame += frame_steps
-                self._update_positions()
+        at_once = n_knots if on_frame is None else -(-frame_steps // n_steps)
+        state = np.empty((n_knots + 1, mujoco.mj_stateSize(self.model, _PHYSICS)))
+        mujoco.mj_getState(self.model, self.data, state[0], _PHYSICS)
+        done, fallen = 0, False
+        while done < n_knots and not fallen:
+            last = min(done + at_once, n_knots)
+            before = self.state()
+            commands = plan.commands[done * n_steps : last * n_steps]
+            state[done + 1 : last + 1] = self._send(commands)[n_steps - 1 :: n_steps]
+            q = state[done + 1 : last + 1, 1 : 1 + nq]
+            down = np.flatnonzero(fallen_at(q, plan.q[done + 1 : last + 1]))
+            if fallen := len(down) > 0:
+                last = done + 1 + int(down[0])
+                mujoco.mj_setState(self.model, self.data, before, _STATE)
+                self._send(commands[: (last - done) * n_steps])
+            done = last
+            self._update_positions()
+            if on_frame is not None:
                 on_frame()
-            if knot % 5 == 4 and self._has_fallen(plan.q[knot + 1]):
-                fallen, done = True, knot + 1
-                break
-        fallen = fallen or self._has_fallen(plan.q[-1])
-        self._update_positions()
-        return self._performance(plan, q[:done], cog[:done], ground[:done] / n_steps, fallen)
+        q, v = state[: done + 1, 1 : 1 + nq], state[: done + 1, 1 + nq : 1 + nq + nv]
+        return assess(self.robot, plan, q, v, self.soles(), fallen)
 
-    def _performance(
-        self, plan: Plan, q: FloatArray, cog: FloatArray, ground: FloatArray, fallen: bool
-    ) -> Performance:
-        turn = np.array([quaternion_matrix(x) for x in q[:, 3:7]])
-        moment = np.einsum("kij,kj->ki", turn, ground[:, 3:])  # free joints turn in their own frame
-        zmp = zero_moment_point(ground[:, :3], moment, q[:, :3])
-        soles = self.soles()[..., :2].reshape(-1, 2)
-        time = np.arange(1.0, len(q) + 1.0) * plan.knot_s
-        error = q[:, 7:] - plan.q[1 : len(q) + 1, 7:]
-        return Performance(
-            time,
-            np.sqrt(np.mean(error**2, axis=1)),
-            np.linalg.norm(cog[:, :2] - soles.mean(axis=0), axis=1),
-            np.nan_to_num(support_margin(convex_hull(soles), zmp), nan=-1.0),
-            fallen,
-            float(time[-1]),
+    def _send(self, commands: FloatArray) -> FloatArray:
+        """Simulate some steps; return the states after each, shape (N, n_state)."""
+        from mujoco.rollout import rollout
+
+        model, data = self.model, self.data
+        start = np.empty(mujoco.mj_stateSize(model, _PHYSICS))
+        mujoco.mj_getState(model, data, start, _PHYSICS)
+        applied = np.concatenate((data.qfrc_applied, data.xfrc_applied.ravel()))
+        control = np.empty((1, len(commands), model.nu + len(applied)))
+        control[..., : model.nu], control[..., model.nu :] = commands, applied
+        states, _ = rollout(
+            model,
+            data,
+            start,
+            control,
+            control_spec=_INPUTS,
+            initial_warmstart=data.qacc_warmstart.copy(),
         )
+        return np.asarray(states[0])
 
     def soles(self) -> FloatArray:
         """Return the lower corners of both soles, shape (2, 4, 3) [m]."""
@@ -188,11 +177,6 @@ class Simulation:
         c, s = np.cos(yaw), np.sin(yaw)
         return np.array([[c, s], [-s, c]])
 
-    def _has_fallen(self, wanted: FloatArray) -> bool:
-        """Whether the base is far from upright or from its height, or not finite."""
-        upright = _up(self.data.qpos) @ _up(wanted) > np.cos(FALL_TILT_RAD)
-        return not (upright and self.data.qpos[2] > wanted[2] - FALL_DROP_M)
-
     def _update_positions(self) -> None:
         """Bring poses up to the state, which a step leaves one step behind."""
         mujoco.mj_kinematics(self.model, self.data)
@@ -210,9 +194,3 @@ class Simulation:
     def __setstate__(self, state: dict[str, Any]) -> None:
         Simulation.__init__(self, state["robot"])
         self.load_state(state["state"])
-
-
-def _up(q: FloatArray) -> FloatArray:
-    """Return the vertical in the base's frame, shape (3,)."""
-    w, x, y, z = q[3:7]
-    return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from mplearn.body.tree import quaternion_matrix
 from mplearn.errors import RobotError
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.robot import Robot
@@ -25,6 +26,8 @@ class ReferenceRobot(NamedTuple):
 
     Attributes:
         tree: Kinematics and masses.
+        inertia: Rotational inertia of each body about its centre of mass, in its own frame, shape
+            (B, 3, 3) [kg m^2].
         stance: Both feet on the floor, symmetric about the origin.
         upper: Hinges that are tracked, shape (U - 3,).
         limits: Smallest and largest value of the tracked coordinates, shape (U, 2) [m, rad].
@@ -35,6 +38,7 @@ class ReferenceRobot(NamedTuple):
     """
 
     tree: MassTree
+    inertia: FloatArray
     stance: Stance
     upper: IntArray
     limits: FloatArray
@@ -120,8 +124,10 @@ def reference_robot(robot: Robot) -> ReferenceRobot:
     upper = robot.upper_joints
     lowest = 0.45 * straight[2]
     base_limits = np.array([[lowest, straight[2]], [-0.6, 0.6], [-0.6, 1.6]])
+    turn = np.array([quaternion_matrix(quat) for quat in model.body_iquat[1:]])
     return ReferenceRobot(
         tree,
+        np.einsum("bij,bj,bkj->bik", turn, model.body_inertia[1:], turn),
         stance,
         upper,
         np.vstack((base_limits, limits[upper])),

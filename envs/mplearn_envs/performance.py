@@ -1,0 +1,85 @@
+"""What happened while a plan was performed, from the states that were recorded."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mplearn.recording import BoolArray, FloatArray
+
+from .control.momentum import ground_reaction, momenta
+from .control.planner import Plan
+from .control.reference import reference_robot
+from .control.support import convex_hull, support_margin
+from .robot import Robot
+
+FALL_TILT_RAD = 0.6
+FALL_DROP_M = 0.2
+
+
+class Performance(NamedTuple):
+    """What happened while a plan was performed, at its S reference postures (fewer after a fall).
+
+    Attributes:
+        time_s: Time since the start, shape (S,) [s].
+        tracking_error_rad: Root mean square over the joints of actual minus wanted angle, (S,)
+            [rad].
+        cog_deviation_m: Distance of the COG's projection from the middle of the soles, (S,) [m].
+        zmp_margin_m: Distance of the zero-moment point from the edge of the soles, (S,) [m].
+        fallen: Whether the robot fell; the last sample is when.
+        duration_s: How long it took [s].
+    """
+
+    time_s: FloatArray
+    tracking_error_rad: FloatArray
+    cog_deviation_m: FloatArray
+    zmp_margin_m: FloatArray
+    fallen: bool
+    duration_s: float
+
+
+def assess(
+    robot: Robot, plan: Plan, q: FloatArray, v: FloatArray, soles: FloatArray, fallen: bool
+) -> Performance:
+    """Compare what was recorded with what was planned.
+
+    Args:
+        robot: The robot.
+        plan: What it performed.
+        q: Postures at the plan's reference postures, the start included, shape (S + 1, 7 + n).
+        v: Velocities there, shape (S + 1, 6 + n).
+        soles: Corners of the soles at the end, shape (2, 4, 3) [m].
+        fallen: Whether it fell.
+    """
+    ref = reference_robot(robot)
+    cog, linear, angular = momenta(ref.tree, ref.inertia, q, v)
+    zmp = ground_reaction(float(ref.tree.mass.sum()), cog, linear, angular, plan.knot_s)
+    corners = soles[..., :2].reshape(-1, 2)
+    time = np.arange(1.0, len(q)) * plan.knot_s
+    error = q[1:, 7:] - plan.q[1 : len(q), 7:]
+    return Performance(
+        time,
+        np.sqrt(np.mean(error**2, axis=1)),
+        np.linalg.norm(cog[1:, :2] - corners.mean(axis=0), axis=1),
+        np.nan_to_num(support_margin(convex_hull(corners), zmp), nan=-1.0),
+        fallen,
+        float(time[-1]),
+    )
+
+
+def fallen_at(q: FloatArray, wanted: FloatArray) -> BoolArray:
+    """Return whether the base is far from upright, from its height, or not finite, shape (S,).
+
+    Args:
+        q: Actual postures, shape (S, 7 + n).
+        wanted: Wanted postures, shape (S, 7 + n).
+    """
+    upright = np.sum(_up(q) * _up(wanted), axis=1) > np.cos(FALL_TILT_RAD)
+    return np.asarray(~(upright & (q[:, 2] > wanted[:, 2] - FALL_DROP_M)))
+
+
+def _up(q: FloatArray) -> FloatArray:
+    """Return the vertical in the base's frame, shape (S, 3)."""
+    w, x, y, z = q[:, 3:7].T
+    return np.stack((2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)), axis=1)

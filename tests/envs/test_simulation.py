@@ -1,0 +1,76 @@
+"""The simulation: what it does is MuJoCo's, bit for bit, however it is cut up."""
+
+import pickle
+
+import mujoco
+import numpy as np
+import pytest
+from standing_library import BOW, RATE_HZ, sweep
+
+from mplearn_envs.control import Motion, Planner, rest_reference
+from mplearn_envs.control.controller import tracked_columns
+from mplearn_envs.robot import humanoid
+from mplearn_envs.simulation import Simulation
+
+HUMANOID = humanoid()
+MOTION = Motion(sweep({}, BOW, 1.0)[:, tracked_columns(HUMANOID)], RATE_HZ)
+PLAN = Planner(HUMANOID).plan(rest_reference(HUMANOID), MOTION, 1.0)
+STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+
+
+@pytest.fixture
+def simulation():
+    simulation = Simulation(HUMANOID)
+    simulation.reset()
+    return simulation
+
+
+def step_by_step(simulation, commands):
+    """Return the state after MuJoCo's own steps."""
+    model, data = simulation.model, mujoco.MjData(simulation.model)
+    mujoco.mj_setState(model, data, simulation.state(), STATE)
+    for command in commands:
+        data.ctrl[:] = command
+        mujoco.mj_step(model, data)
+    out = np.empty(mujoco.mj_stateSize(model, STATE))
+    mujoco.mj_getState(model, data, out, STATE)
+    return out
+
+
+def test_performing_is_mujocos_steps(simulation):
+    expected = step_by_step(simulation, PLAN.commands)
+    performance = simulation.perform(PLAN)
+    assert simulation.state().tobytes() == expected.tobytes()
+    assert not performance.fallen and performance.duration_s == pytest.approx(PLAN.duration_s)
+
+
+def test_taking_pictures_changes_nothing(simulation):
+    start = simulation.state()
+    whole = simulation.perform(PLAN)
+    end = simulation.state()
+    simulation.load_state(start)
+    heights = []
+    parts = simulation.perform(PLAN, lambda: heights.append(simulation.data.time), 12)
+    assert simulation.state().tobytes() == end.tobytes()
+    for one, other in zip(whole, parts, strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert len(heights) == -(-len(PLAN.commands) // 15) and np.all(np.diff(heights) > 0)
+
+
+@pytest.mark.parametrize("on_frame", [None, lambda: None])
+def test_a_fall_ends_it_where_it_is_seen(simulation, on_frame):
+    simulation.data.qvel[0] = 2.0
+    start = pickle.loads(pickle.dumps(simulation))
+    performance = simulation.perform(PLAN, on_frame)
+    assert performance.fallen and performance.duration_s < PLAN.duration_s
+    n_steps = round(performance.duration_s / simulation.model.opt.timestep)
+    expected = step_by_step(start, PLAN.commands[:n_steps])
+    assert simulation.state().tobytes() == expected.tobytes()
+    assert len(performance.zmp_margin_m) == n_steps // 5
+
+
+def test_applied_forces_go_on_acting(simulation):
+    simulation.data.xfrc_applied[1, 0] = 30.0
+    expected = step_by_step(simulation, PLAN.commands)
+    simulation.perform(PLAN)
+    assert simulation.state().tobytes() == expected.tobytes()
