@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from typing import Any
 
+from ..errors import InvalidValueError
 from ..recording import FloatArray, Segment
 
 
@@ -39,6 +41,22 @@ class Segmenter(ABC):
             InvalidValueError: The state belongs to another kind or width of segmenter.
         """
 
+    @abstractmethod
+    def scaffold(self, weights: FloatArray | None = None, ending: float = 0.5) -> None:
+        """Tell the segmenter what is known about the motion now; it holds until told otherwise.
+
+        Known primitives modify the distance, by the joints that are active in them, and the cost
+        of a boundary ([Kulic2012], end of 2.1).
+
+        Args:
+            weights: How much each channel counts, shape (D,), at least 0; only ratios matter. All
+                alike by default.
+            ending: Probability that the motion is in its last phase; 0.5 where nothing is known.
+
+        Raises:
+            InvalidValueError: An argument is out of range.
+        """
+
     def segment(self, frames: FloatArray) -> list[Segment]:
         """Segment a whole recording, shape (T, D), as the on-line loop does, and flush."""
         closed: list[Segment] = []
@@ -51,3 +69,19 @@ class Segmenter(ABC):
 def frames_of(seconds: float, rate_hz: float) -> int:
     """Return a duration [s] as a number of frames, at least one."""
     return max(1, round(seconds * rate_hz))
+
+
+def check_positive(config: object, *names: str) -> None:
+    """Raise an InvalidValueError where a setting is not positive and finite."""
+    for name in names:
+        value = getattr(config, name)
+        if not (math.isfinite(value) and value > 0):
+            raise InvalidValueError(f"{name} must be positive, not {value}")
+
+
+def check_share(config: object, *names: str) -> None:
+    """Raise an InvalidValueError where a setting does not lie strictly between 0 and 1."""
+    for name in names:
+        value = getattr(config, name)
+        if not 0 < value < 1:
+            raise InvalidValueError(f"{name} must lie in (0, 1), not {value}")

@@ -50,7 +50,8 @@ def smooth_velocity(frame: FloatArray, c: FloatArray, memory: FloatArray, first:
     Args:
         frame: The new measurement, shape (D,).
         c: `LowPass.coefficients`.
-        memory: Two delay lines, the last filtered frame and the velocity, shape (4, D).
+        memory: Two delay lines, the last filtered frame, the velocity, and how much each channel
+            counts in the speed, shape (5, D).
         first: Whether this is the first frame; the filter starts as if it had always been there.
     """
     b0, b1, b2, a1, a2, rate = c[0], c[1], c[2], c[3], c[4], c[5]
@@ -67,5 +68,5 @@ def smooth_velocity(frame: FloatArray, c: FloatArray, memory: FloatArray, first:
         v = (y - memory[2, i]) * rate
         memory[2, i] = y
         memory[3, i] = v
-        total += v * v
+        total += memory[4, i] * v * v
     return math.sqrt(total)

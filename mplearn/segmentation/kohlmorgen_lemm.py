@@ -13,7 +13,6 @@ evidence, and the boundary is set, and confirmed, by the minimum of the speed.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -21,14 +20,16 @@ import numpy as np
 
 from ..errors import InvalidValueError
 from ..recording import FloatArray
-from .base import frames_of
-from .kohlmorgen_lemm_steps import step_direction, step_posture
+from .base import check_positive, check_share, frames_of
+from .envelope import ROWS
+from .kohlmorgen_lemm_steps import ENVELOPE, EXACT, PLAIN, step_direction, step_posture
 from .speed import ZeroVelocityConfig
 from .speed_segmenter import SpeedSegmenter
 from .viterbi import path_arrays
 from .windows import window_arrays
 
 Density = Literal["direction", "posture"]
+START_COST_S = 0.05  # C until the envelope has been seen
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class KohlmorgenLemmConfig:
         window_s: Length W of a window [s].
         fifo_s: Time over which windows are kept as states [s].
         switch_cost_s: Cost C of a change of state, times the frame interval: that of being at
-            distance 1 for this long [s].
+            distance 1 for this long [s]. None lets the motion itself choose it, see `envelope`.
         sigma: Width of the kernels. For directions absolute, they have unit length; for postures a
             multiple of the running mean distance of a point to its nearest neighbours.
         neighbours_s: The number of those neighbours, as a stretch of frames [s].
@@ -62,7 +63,7 @@ class KohlmorgenLemmConfig:
     delay_s: float = 0.02
     window_s: float = 0.06
     fifo_s: float = 2.0
-    switch_cost_s: float = 0.05
+    switch_cost_s: float | None = 0.05
     sigma: float = 1.2
     neighbours_s: float = 0.1
     exact: bool = False
@@ -80,21 +81,13 @@ class KohlmorgenLemmConfig:
             )
         if self.embedding < 1:
             raise InvalidValueError(f"embedding must be at least 1, not {self.embedding}")
-        for name in (
-            "delay_s",
-            "window_s",
-            "switch_cost_s",
-            "sigma",
-            "neighbours_s",
-            "still_direction",
-            "tolerance_s",
-        ):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise InvalidValueError(f"{name} must be positive, not {getattr(self, name)}")
-        if not 0 < self.hysteresis_turned < 1:
-            raise InvalidValueError(
-                f"hysteresis_turned must lie in (0, 1), not {self.hysteresis_turned}"
-            )
+        check_positive(self, "delay_s", "window_s", "sigma", "neighbours_s", "still_direction")
+        check_positive(
+            self, "tolerance_s", *(() if self.switch_cost_s is None else ("switch_cost_s",))
+        )
+        check_share(self, "hysteresis_turned")
+        if self.exact and self.switch_cost_s is None:
+            raise InvalidValueError("the exact path needs a switch_cost_s, not None")
         if not self.fifo_s >= 4 * self.window_s:
             raise InvalidValueError(
                 f"fifo_s must be at least 4 window_s ({4 * self.window_s}), not {self.fifo_s}"
@@ -121,7 +114,8 @@ SETTINGS = np.dtype(
         ("cost", "f8"),
         ("sigma", "f8"),
         ("neighbours", "i8"),
-        ("exact", "i8"),
+        ("mode", "i8"),
+        ("every", "i8"),
         ("still_direction", "f8"),
         ("hysteresis", "f8"),
         ("hysteresis_turned", "f8"),
@@ -151,49 +145,50 @@ class KohlmorgenLemm(SpeedSegmenter):
         self._model = settings = np.zeros(1, dtype=SETTINGS)
         settings["delay"] = frames_of(config.delay_s, rate_hz)
         settings["window"] = max(2, frames_of(config.window_s, rate_hz))
-        settings["cost"] = config.switch_cost_s * rate_hz
+        settings["cost"] = (config.switch_cost_s or START_COST_S) * rate_hz
         settings["neighbours"] = frames_of(config.neighbours_s, rate_hz)
         settings["tolerance"] = frames_of(config.tolerance_s, rate_hz)
         settings["forget"] = 1.0 / frames_of(config.zero_velocity.memory_s, rate_hz)
         settings["hysteresis"] = config.zero_velocity.hysteresis
-        for name in ("sigma", "exact", "still_direction", "hysteresis_turned"):
+        for name in ("sigma", "still_direction", "hysteresis_turned"):
             settings[name] = getattr(config, name)
+        settings["mode"] = EXACT if config.exact else PLAIN
+        if config.switch_cost_s is None:
+            settings["mode"] = ENVELOPE
         self._step_kernel = step_direction if config.density == "direction" else step_posture
         self._reset()
 
-    def _reset(self) -> None:
-        super()._reset()
-        length = int(self._model["window"][0])
+    def _new_arrays(self) -> dict[str, Any]:
+        q, embedding = self._model[0], self.config.embedding
+        length, delay, mode = int(q["window"]), int(q["delay"]), int(q["mode"])
         count = max(4 * length, frames_of(self.config.fifo_s, self.rate_hz))
         size = count + length
-        span = (self.config.embedding - 1) * int(self._model["delay"][0]) + 1
-        speeds = (
-            int(self._settings["longest"][0]) + size if self._step_kernel is step_posture else 1
-        )
-        self._arrays.update(window_arrays(self.config.embedding * self.n_channels, length, count))
-        self._arrays.update(path_arrays(size))
-        self._arrays["history"] = np.zeros((span, self.n_channels))
-        self._arrays["speeds"] = np.zeros(speeds)
-        self._arrays["spread"] = np.zeros(3)  # running mean, mean root; the sigma in use
-        self._arrays["matrix"] = np.zeros((size, size) if self.config.exact else (1, 1))
+        self._model["every"] = every = -(-size // ROWS)
+        shape = {PLAIN: (1, 1), EXACT: (size, size), ENVELOPE: (size // every + 1, size)}[mode]
+        arrays = super()._new_arrays()
+        arrays |= window_arrays(embedding * self.n_channels, length, count) | path_arrays(size)
+        arrays["history"] = np.zeros(((embedding - 1) * delay + 1, self.n_channels))
+        arrays["spread"] = np.zeros(4)  # running mean, mean root; the sigma, the C in use
+        arrays["matrix"] = np.zeros(shape)
+        arrays["speeds"] = np.zeros(len(arrays["speeds"]) + size)  # postures are judged late
+        return arrays
+
+    def _bind(self) -> None:
+        super()._bind()
+        a = self._arrays
+        windows = (a["points"], a["kernel_rows"], a["row_sums"], a["self_sums"], a["squared"])
+        path = (a["costs"], a["entered"], a["best_costs"], a["best_entered"], a["switch_costs"])
+        self._kit = (windows, a["distances"], path, a["matrix"])
 
     def _step(self, frame: FloatArray) -> int:
-        a: dict[str, Any] = self._arrays
         return int(
             self._step_kernel(
                 frame,
-                self._filter,
+                self._watcher,
                 self._model,
-                self._settings,
-                a["memory"],
-                a["state"],
-                (a["points"], a["kernel_rows"], a["row_sums"], a["self_sums"], a["squared"]),
-                a["distances"],
-                (a["costs"], a["entered"], a["best_costs"], a["best_entered"]),
-                a["matrix"],
-                a["history"],
-                a["speeds"],
-                a["spread"],
+                self._kit,
+                self._arrays["history"],
+                self._arrays["spread"],
                 self._out,
             )
         )

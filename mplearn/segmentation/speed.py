@@ -1,9 +1,7 @@
-"""Rests and reversals of a stream, found in its speed as it arrives.
+"""The speed of the whole body as it arrives: its settings, its running measure, and its segments.
 
-One state machine over the speed of the whole body. While something moves, it looks for a reversal
-(a local minimum far below the peaks on both sides) or a pause (a low speed that lasts); while
-nothing moves, for the rise that ends the pause. What is low is measured against the running speed
-of the moving part, so that the unit of the channels does not matter.
+What is low is measured against the running speed of the moving part, so that the unit of the
+channels does not matter.
 """
 
 from __future__ import annotations
@@ -17,7 +15,8 @@ from numba import njit
 
 from ..errors import InvalidValueError
 from ..recording import FloatArray
-from .base import frames_of
+from .base import check_positive, check_share, frames_of
+from .kernels import all_finite, smooth_velocity
 
 
 @dataclass(frozen=True)
@@ -33,6 +32,8 @@ class ZeroVelocityConfig:
         min_length_s: Shortest motion [s].
         max_length_s: An open segment is closed at this length [s].
         memory_s: Time constant of the running speed [s].
+        trust: How much what is known about the motion's end counts, see `Segmenter.scaffold`:
+            hysteresis times this where the end is sure, divided by it where it is sure not to be.
     """
 
     cutoff_hz: float = 6.0
@@ -42,14 +43,11 @@ class ZeroVelocityConfig:
     min_length_s: float = 0.3
     max_length_s: float = 10.0
     memory_s: float = 30.0
+    trust: float = 1.5
 
     def __post_init__(self) -> None:
-        for name in ("cutoff_hz", "still_s", "min_length_s", "memory_s"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise InvalidValueError(f"{name} must be positive, not {getattr(self, name)}")
-        for name in ("hysteresis", "still_share"):
-            if not 0 < getattr(self, name) < 1:
-                raise InvalidValueError(f"{name} must lie in (0, 1), not {getattr(self, name)}")
+        check_positive(self, "cutoff_hz", "still_s", "min_length_s", "memory_s", "trust")
+        check_share(self, "hysteresis", "still_share")
         if not self.max_length_s > 2 * max(self.min_length_s, self.still_s):
             raise InvalidValueError(
                 f"max_length_s must exceed twice min_length_s and still_s, not {self.max_length_s}"
@@ -71,6 +69,7 @@ STATE = np.dtype(
         ("mean_root", "f8"),
         ("rest", "f8"),  # mean speed of the open pause, and over how many frames
         ("rest_frames", "i8"),
+        ("ending", "f8"),  # how likely the open segment is at its end, as far as others know
     ]
 )
 SETTINGS = np.dtype(
@@ -81,6 +80,7 @@ SETTINGS = np.dtype(
         ("longest", "i8"),
         ("forget", "f8"),
         ("lag", "i8"),
+        ("trust", "f8"),
     ]
 )
 
@@ -94,6 +94,7 @@ def settings_of(config: ZeroVelocityConfig, rate_hz: float, lag_frames: float) -
     settings["longest"] = frames_of(config.max_length_s, rate_hz)
     settings["forget"] = 1.0 / frames_of(config.memory_s, rate_hz)
     settings["lag"] = round(lag_frames)
+    settings["trust"] = config.trust
     return settings
 
 
@@ -102,6 +103,7 @@ def initial_state() -> Any:
     state = np.zeros(1, dtype=STATE)
     state["mode"] = OPENING
     state["dip_frame"] = -1
+    state["ending"] = 0.5
     return state
 
 
@@ -123,6 +125,35 @@ def see_speed(m: Any, p: Any, s: float) -> None:
 
 
 @njit(cache=True)
+def readiness(m: Any, p: Any) -> float:
+    """By how much a boundary is likelier than without knowledge: 1 where nothing is known."""
+    return float(p.trust ** (2.0 * m.ending - 1.0))
+
+
+@njit(cache=True)
+def take_speed(
+    frame: FloatArray, filter_: FloatArray, memory: FloatArray, m: Any, p: Any, speeds: FloatArray
+) -> float:
+    """Filter and count a frame, keep its speed in the ring `speeds`; -1 if it is not finite."""
+    if not all_finite(frame):
+        return -1.0
+    s = smooth_velocity(frame, filter_, memory, m.frames == 0)
+    see_speed(m, p, s)
+    speeds[(m.frames - 1) % speeds.shape[0]] = s
+    return float(s)
+
+
+@njit(cache=True)
+def all_low(m: Any, end: int, low: float, speeds: FloatArray) -> bool:
+    """Whether no speed of the open segment up to filtered frame `end` exceeds `low`."""
+    size = speeds.shape[0]
+    for u in range(max(m.start, m.frames - size), end):  # noqa: SIM110 (numba)
+        if speeds[u % size] > low:
+            return False
+    return True
+
+
+@njit(cache=True)
 def close(m: Any, p: Any, end: int, confidence: float, still: bool, out: FloatArray) -> int:
     """Write the open segment, closed at filtered frame `end`, into `out`; the next starts there."""
     first = max(m.start - p.lag, 0)
@@ -134,93 +165,3 @@ def close(m: Any, p: Any, end: int, confidence: float, still: bool, out: FloatAr
     out[0, 4] = still
     m.start = last + p.lag
     return 1
-
-
-@njit(cache=True)
-def _watch_motion(m: Any, p: Any, s: float, low: float, hysteresis: float, out: FloatArray) -> int:
-    """Look for the reversal or the pause that ends a motion."""
-    t = m.frames - 1
-    if s > m.peak:
-        m.peak = s
-        m.valley = s
-        m.valley_frame = t
-    elif s < m.valley:
-        m.valley = s
-        m.valley_frame = t
-    if s >= 1.5 * low:
-        m.dip_frame = -1
-    elif s < low and m.dip_frame < 0:
-        m.dip_frame = t
-    n = 0
-    if m.dip_frame >= 0 and t - m.dip_frame >= p.still:
-        if m.dip_frame - m.start >= p.shortest:
-            n = close(m, p, m.dip_frame, 1.0 - m.valley / low, False, out)
-        m.mode = STILL
-        m.rest = 0.5 * low
-        m.rest_frames = p.still
-        m.dip_frame = -1
-    elif m.valley < hysteresis * m.peak and s >= max(m.valley / hysteresis, low):
-        if m.valley_frame - m.start >= p.shortest:
-            sure = 1.0 - m.valley / (hysteresis * m.peak)
-            n = close(m, p, m.valley_frame, sure, False, out)
-            m.peak = s
-            m.mode = MOVING
-        m.valley = s
-        m.valley_frame = t
-    return n
-
-
-@njit(cache=True)
-def _watch_pause(m: Any, p: Any, s: float, low: float, out: FloatArray) -> int:
-    """Look for the rise that ends a pause."""
-    t = m.frames - 1
-    if m.mode == OPENING:  # no motion has been seen yet: the rest itself is the only measure
-        low = 2.0 * m.rest
-    if s <= low or m.mode == OPENING:
-        m.rest_frames += 1
-        m.rest += (s - m.rest) / m.rest_frames
-    if s <= low:
-        m.dip_frame = -1
-    elif m.dip_frame < 0:
-        m.dip_frame = t
-    if s <= max(2.0 * low, 4.0 * m.rest) or m.dip_frame - m.start < p.still:
-        return 0
-    n = close(m, p, m.dip_frame, 1.0 - low / s, True, out)
-    m.mode = MOVING
-    m.peak = s
-    m.valley = s
-    m.valley_frame = t
-    m.dip_frame = -1
-    return n
-
-
-@njit(cache=True)
-def watch(m: Any, p: Any, s: float, hysteresis: float, out: FloatArray) -> int:
-    """Judge speed `s` of the frame that `see_speed` has counted.
-
-    Args:
-        m: The state, a record of `STATE`.
-        p: The settings, a record of `SETTINGS`.
-        s: Speed.
-        hysteresis: A minimum is a reversal if it lies below this share of the peaks around it.
-        out: Receives ``start, end, confidence, decided_at, still`` of what closes, shape (n, 5).
-
-    Returns:
-        How many segments closed, 0 or 1.
-    """
-    low = p.still_share * running_speed(m)
-    n = 0
-    if m.mode != MOVING:
-        n = _watch_pause(m, p, s, low, out)
-    if n == 0 and m.mode != STILL:
-        n = _watch_motion(m, p, s, low, hysteresis, out)
-    if n == 0 and m.frames - 1 - m.start >= p.longest:
-        end = m.frames - 1
-        if m.mode != STILL and m.valley_frame - m.start >= p.shortest:
-            end = m.valley_frame
-        n = close(m, p, end, 0.0, m.mode == STILL or m.peak <= low, out)
-        m.dip_frame = -1
-        m.peak = s
-        m.valley = s
-        m.valley_frame = m.frames - 1
-    return n

@@ -12,7 +12,7 @@ from ..errors import FrameError, InvalidValueError
 from ..recording import FloatArray, Segment
 from .base import Segmenter
 from .kernels import design_low_pass
-from .speed import STILL, ZeroVelocityConfig, initial_state, running_speed, settings_of
+from .speed import STILL, ZeroVelocityConfig, all_low, initial_state, running_speed, settings_of
 
 
 class SpeedSegmenter(Segmenter):
@@ -45,8 +45,24 @@ class SpeedSegmenter(Segmenter):
         self._out = np.zeros((1, 5))
 
     def _reset(self) -> None:
-        """Return to the state before the first frame; a subclass adds arrays of its own."""
-        self._arrays = {"memory": np.zeros((4, self.n_channels)), "state": initial_state()}
+        """Return to the state before the first frame."""
+        self._arrays = self._new_arrays()
+        self._bind()
+
+    def _new_arrays(self) -> dict[str, Any]:
+        """Allocate the state before the first frame; a subclass adds arrays of its own."""
+        arrays = {
+            "memory": np.zeros((5, self.n_channels)),
+            "state": initial_state(),
+            "speeds": np.zeros(int(self._settings["longest"][0]) + 1),
+        }
+        arrays["memory"][4] = 1.0
+        return arrays
+
+    def _bind(self) -> None:
+        """Bundle the arrays as the kernels take them; a subclass bundles its own, too."""
+        a = self._arrays
+        self._watcher = (self._filter, self._settings, a["memory"], a["state"], a["speeds"])
 
     @abstractmethod
     def _step(self, frame: FloatArray) -> int:
@@ -78,12 +94,26 @@ class SpeedSegmenter(Segmenter):
             for row in self._out[:n]
         ]
 
+    def scaffold(self, weights: FloatArray | None = None, ending: float = 0.5) -> None:
+        """Tell the segmenter what is known about the motion now; see `Segmenter.scaffold`."""
+        if not 0.0 <= ending <= 1.0:
+            raise InvalidValueError(f"ending must lie in [0, 1], not {ending}")
+        counts = np.ones(self.n_channels) if weights is None else np.asarray(weights, np.float64)
+        if counts.shape != (self.n_channels,):
+            raise InvalidValueError(
+                f"weights must have shape ({self.n_channels},), not {counts.shape}"
+            )
+        if not (np.isfinite(counts).all() and (counts >= 0).all() and counts.any()):
+            raise InvalidValueError("weights must be finite, at least 0, and not all 0")
+        self._arrays["state"]["ending"] = ending
+        self._arrays["memory"][4] = counts / counts.mean()
+
     def flush(self) -> list[Segment]:
         """Close what is open, as at the end of a stream, and start afresh at frame 0."""
         m, p = self._arrays["state"][0], self._settings[0]
         start, end = max(int(m["start"] - p["lag"]), 0), int(m["frames"])
         low = float(p["still_share"] * running_speed(m))
-        still = bool(m["mode"] == STILL or m["peak"] <= low)
+        still = bool(m["mode"] == STILL or all_low(m, end, low, self._arrays["speeds"]))
         self._reset()
         if start >= end:
             return []
@@ -117,3 +147,4 @@ class SpeedSegmenter(Segmenter):
                 )
             loaded[name] = value
         self._arrays = loaded
+        self._bind()

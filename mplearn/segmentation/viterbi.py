@@ -22,6 +22,7 @@ def path_arrays(size: int) -> dict[str, Any]:
         "entered": np.full(size, -1),  # when that path changed into s; -1: before the FIFO
         "best_costs": np.zeros(size),  # o(t), the least of the costs at time t
         "best_entered": np.full(size, -1),  # `entered` of the state that is best at time t
+        "switch_costs": np.zeros(size),  # C, as it was at time t
     }
 
 
@@ -30,7 +31,7 @@ def extend_path(
     t: int,
     first: int,
     oldest: int,
-    cost: float,
+    switch_costs: FloatArray,
     distances: FloatArray,
     costs: FloatArray,
     entered: IntArray,
@@ -47,7 +48,7 @@ def extend_path(
         t: Time of the new window.
         first: Time of the first window of the stream.
         oldest: Oldest state that is still kept.
-        cost: C.
+        switch_costs: C at each time, shape (P,); that of t is set.
         distances: d(s, t), shape (P,).
         costs: As in `path_arrays`.
         entered: As in `path_arrays`.
@@ -59,13 +60,13 @@ def extend_path(
     running, since = base, -1
     for u in range(oldest, t):
         i = u % size
-        if u > oldest and best_costs[(u - 1) % size] + cost < running:
-            running, since = best_costs[(u - 1) % size] + cost, u
+        if u > oldest and best_costs[(u - 1) % size] + switch_costs[i] < running:
+            running, since = best_costs[(u - 1) % size] + switch_costs[i], u
         running += distances[i]
         if running < best_costs[i]:
             best_costs[i] = running
             best_entered[i] = since
-    switch = best_costs[(t - 1) % size] + cost if t > first else 0.0
+    switch = best_costs[(t - 1) % size] + switch_costs[t % size] if t > first else 0.0
     least, least_entered = running, since
     if t > oldest and switch < running:
         least, least_entered = switch, t
@@ -104,12 +105,12 @@ def last_changes(t: int, oldest: int, best_entered: IntArray, changes: IntArray)
 
 
 @njit(cache=True)
-def exact_path(distances: FloatArray, cost: float, states: IntArray) -> float:
+def exact_path(distances: FloatArray, switch_costs: FloatArray, states: IntArray) -> float:
     """Find the cheapest sequence of states by dynamic programming over all of them.
 
     Args:
         distances: d(s, t) of state s at time t, shape (T, N).
-        cost: Cost C of a change of state.
+        switch_costs: Cost C of a change of state at each time, shape (T,).
         states: Receives the best state at each time, shape (T,).
 
     Returns:
@@ -121,7 +122,7 @@ def exact_path(distances: FloatArray, cost: float, states: IntArray) -> float:
     best = np.zeros(steps, dtype=np.int64)
     best[0] = np.argmin(costs)
     for t in range(1, steps):
-        switch = costs[best[t - 1]] + cost
+        switch = costs[best[t - 1]] + switch_costs[t]
         row = distances[t]
         for s in range(n):
             if switch < costs[s]:
@@ -139,20 +140,22 @@ def exact_path(distances: FloatArray, cost: float, states: IntArray) -> float:
 
 
 @njit(cache=True)
-def exact_changes(matrix: FloatArray, oldest: int, t: int, cost: float, changes: IntArray) -> int:
+def exact_changes(
+    matrix: FloatArray, switch_costs: FloatArray, oldest: int, t: int, changes: IntArray
+) -> int:
     """Write the times of change on the exact path over the windows [oldest, t], latest first.
 
     Args:
         matrix: d(s, t) of the windows at slots s and t of a ring, shape (P, P).
+        switch_costs: Cost C of a change of state at each slot, shape (P,).
         oldest: Oldest window.
         t: Newest window.
-        cost: Cost C of a change of state.
         changes: Receives the times; what does not fit is left out.
     """
     size = matrix.shape[0]
     slots = np.arange(oldest, t + 1) % size
     states = np.empty(slots.shape[0], dtype=np.int64)
-    exact_path(matrix[slots][:, slots], cost, states)
+    exact_path(matrix[slots][:, slots], switch_costs[slots], states)
     n = 0
     for i in range(slots.shape[0] - 1, 0, -1):
         if states[i] != states[i - 1] and n < changes.shape[0]:

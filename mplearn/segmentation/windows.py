@@ -41,20 +41,27 @@ def window_arrays(n_dims: int, length: int, count: int) -> dict[str, Any]:
 
 
 @njit(cache=True)
-def squared_distances(x: FloatArray, points: FloatArray, squared: FloatArray) -> None:
-    """Write |x_i - x|^2 for every point of the ring into `squared`."""
+def squared_distances(
+    x: FloatArray, weights: FloatArray, points: FloatArray, squared: FloatArray
+) -> None:
+    """Write the weighted |x_i - x|^2 for every point of the ring into `squared`.
+
+    The weights of the D channels hold for each frame that makes up a point of n = m D values.
+    """
     squared[:] = 0.0
     for k in range(points.shape[0]):
         value = x[k]
+        weight = weights[k % weights.shape[0]]
         row = points[k]
         for i in range(row.shape[0]):  # over points: this vectorises without reordering any sum
             difference = row[i] - value
-            squared[i] += difference * difference
+            squared[i] += weight * difference * difference
 
 
 @njit(cache=True)
 def push_point(
     x: FloatArray,
+    weights: FloatArray,
     t: int,
     sigma: float,
     points: FloatArray,
@@ -66,6 +73,7 @@ def push_point(
 ) -> None:
     """Add the point of time t, shape (n,), and write d(s, t) for all windows s into `distances`.
 
+    Where the weights of the channels change, kernels keep those of their newer point.
     The windows are complete from t = W - 1 on; `distances` holds those that end in
     [max(W - 1, t - P + W), t], each at slot ``s % P``.
     """
@@ -74,7 +82,7 @@ def push_point(
     slot = t % size
     for k in range(points.shape[0]):
         points[k, slot] = x[k]
-    squared_distances(x, points, squared)
+    squared_distances(x, weights, points, squared)
     scale = -0.25 / (sigma * sigma)
     row = kernel_rows[t % length]
     for i in range(size):

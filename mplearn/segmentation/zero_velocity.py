@@ -13,28 +13,20 @@ from typing import Any
 from numba import njit
 
 from ..recording import FloatArray
-from .kernels import all_finite, smooth_velocity
-from .speed import ZeroVelocityConfig, see_speed, watch
+from .speed import ZeroVelocityConfig, readiness, take_speed
 from .speed_segmenter import SpeedSegmenter
+from .watch import watch
 
 
 @njit(cache=True)
-def _step(
-    frame: FloatArray,
-    filter_: FloatArray,
-    hysteresis: float,
-    memory: FloatArray,
-    state: Any,
-    settings: Any,
-    out: FloatArray,
-) -> int:
+def _step(frame: FloatArray, watcher: Any, hysteresis: float, out: FloatArray) -> int:
     """Take one frame; return the number of segments written to `out`, or -1 if it is not finite."""
+    filter_, settings, memory, state, speeds = watcher
     m, p = state[0], settings[0]
-    if not all_finite(frame):
+    s = take_speed(frame, filter_, memory, m, p, speeds)
+    if s < 0.0:
         return -1
-    s = smooth_velocity(frame, filter_, memory, m.frames == 0)
-    see_speed(m, p, s)
-    return int(watch(m, p, s, hysteresis, out))
+    return int(watch(m, p, s, hysteresis * readiness(m, p), speeds, out))
 
 
 class ZeroVelocity(SpeedSegmenter):
@@ -58,14 +50,4 @@ class ZeroVelocity(SpeedSegmenter):
         self._reset()
 
     def _step(self, frame: FloatArray) -> int:
-        return int(
-            _step(
-                frame,
-                self._filter,
-                self.config.hysteresis,
-                self._arrays["memory"],
-                self._arrays["state"],
-                self._settings,
-                self._out,
-            )
-        )
+        return int(_step(frame, self._watcher, self.config.hysteresis, self._out))

@@ -19,6 +19,15 @@ from mplearn.segmentation.viterbi import (
 from mplearn.segmentation.windows import density_distance, push_point, window_arrays
 
 
+ONE = np.ones(1)  # all channels alike
+
+
+def extend(t, first, distances, path):
+    """One step of the on-line path over a ring that loses nothing."""
+    costs = [path[name] for name in ("costs", "entered", "best_costs", "best_entered")]
+    extend_path(t, first, first, path["switch_costs"], distances, *costs)
+
+
 def cost_of(distances, states, cost):
     switches = sum(a != b for a, b in pairwise(states))
     return sum(distances[t, s] for t, s in enumerate(states)) + cost * switches
@@ -29,7 +38,7 @@ def test_exact_path_is_the_cheapest_of_all(seed):
     rng = np.random.default_rng(seed)
     distances, cost = rng.uniform(size=(6, 4)), rng.uniform(0.05, 0.8)
     states = np.zeros(6, dtype=np.int64)
-    total = exact_path(distances, cost, states)
+    total = exact_path(distances, np.full(6, cost), states)
     cheapest = min(cost_of(distances, path, cost) for path in product(range(4), repeat=6))
     assert total == pytest.approx(cheapest, abs=1e-12)
     assert cost_of(distances, list(states), cost) == pytest.approx(cheapest, abs=1e-12)
@@ -58,13 +67,14 @@ def test_online_path_costs_hardly_more_than_the_exact_one():
         points = centres[np.repeat(rng.integers(0, 3, 5), 10)] + rng.normal(size=(50, 2)) * 0.3
         length, cost, size = 3, 1.5, 90
         windows, path = window_arrays(2, length, size - length), path_arrays(size)
+        path["switch_costs"][:] = cost
         for t in range(len(points)):
-            push_point(points[t], t, 1.0, *windows.values())
+            push_point(points[t], ONE, t, 1.0, *windows.values())
             if t >= length - 1:
-                extend_path(t, length - 1, length - 1, cost, windows["distances"], *path.values())
+                extend(t, length - 1, windows["distances"], path)
         distances = windows_of(points, length, 1.0)
         states = np.zeros(len(distances), dtype=np.int64)
-        exact = exact_path(distances, cost, states)
+        exact = exact_path(distances, np.full(len(distances), cost), states)
         online = path["best_costs"][(len(points) - 1) % size]
         assert online >= exact - 1e-9
         same += abs(online - exact) < 1e-9
@@ -78,10 +88,11 @@ def test_changes_of_a_clear_switch():
     length, size = 4, 100
     windows, path = window_arrays(1, length, size - length), path_arrays(size)
     matrix = np.zeros((size, size))
+    path["switch_costs"][:] = 2.0
     for t in range(90):
-        push_point(points[t], t, 0.5, *windows.values())
+        push_point(points[t], ONE, t, 0.5, *windows.values())
         if t >= length - 1:
-            extend_path(t, length - 1, length - 1, 2.0, windows["distances"], *path.values())
+            extend(t, length - 1, windows["distances"], path)
             for s in range(length - 1, t + 1):
                 matrix[s, t] = matrix[t, s] = windows["distances"][s]
     found = np.zeros(8, dtype=np.int64)
@@ -89,7 +100,7 @@ def test_changes_of_a_clear_switch():
     assert n == 2
     assert abs(found[0] - 60 - length // 2) <= 2
     assert abs(found[1] - 30 - length // 2) <= 2
-    assert exact_changes(matrix, length - 1, 89, 2.0, found) == 2
+    assert exact_changes(matrix, path["switch_costs"], length - 1, 89, found) == 2
     assert abs(found[0] - 60 - length // 2) <= 2
 
 
@@ -112,11 +123,11 @@ def test_switching_mackey_glass_series_exactly():
         windows = window_arrays(m, length, n)
         distances = np.zeros((n, n))
         for t in range(n):
-            push_point(points[t], t, sigma, *windows.values())
+            push_point(points[t], ONE, t, sigma, *windows.values())
             distances[t, :t] = distances[:t, t] = windows["distances"][:t]
         distances = distances[length - 1 :, length - 1 :]
         states = np.zeros(len(distances), dtype=np.int64)
-        exact_path(distances, 40 * distances.mean(), states)
+        exact_path(distances, np.full(len(distances), 40 * distances.mean()), states)
         changes = np.flatnonzero(np.diff(states)) + length + m - 1 - length // 2 - (m - 1) // 2
         found_all += list(changes + 10_000 * seed)
         truth_all += [t + 10_000 * seed for t in truth]

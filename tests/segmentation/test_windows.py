@@ -7,6 +7,9 @@ from scipy.integrate import dblquad, quad
 from mplearn.segmentation.windows import density_distance, push_point, window_arrays
 
 
+ONE = np.ones(1)  # all channels alike
+
+
 def parzen(points, sigma, x):
     n = points.shape[1]
     squared = ((points - x) ** 2).sum(axis=1)
@@ -44,7 +47,7 @@ def test_incremental_distances_are_those_of_the_windows(length, count):
     arrays = window_arrays(3, length, count)
     size = length + count
     for t in range(len(x)):
-        push_point(x[t], t, 0.8, *arrays.values())
+        push_point(x[t], ONE, t, 0.8, *arrays.values())
         if t < length - 1 or t % 7:
             continue
         for s in range(max(length - 1, t - count + 1), t + 1):
@@ -56,7 +59,7 @@ def test_rounding_does_not_build_up():
     x = np.random.default_rng(4).normal(size=(20_000, 2))
     arrays = window_arrays(2, 5, 50)
     for t in range(len(x)):
-        push_point(x[t], t, 1.0, *arrays.values())
+        push_point(x[t], ONE, t, 1.0, *arrays.values())
     t = len(x) - 1
     for s in range(t - 49, t + 1):
         expected = density_distance(x[s - 4 : s + 1], x[t - 4 : t + 1], 1.0)
