@@ -185,6 +185,23 @@ def _score(models: Any, batch: Any, m: int, s: int, complete: bool) -> float:
 
 
 @njit(cache=True)
+def score_frames(
+    frames: FloatArray,
+    weights: FloatArray,
+    means: FloatArray,
+    variances: FloatArray,
+    norms: FloatArray,
+    log_stay: FloatArray,
+    log_next: FloatArray,
+    complete: bool,
+) -> float:
+    """Return log P(O) of frames (T, D) under one model: one call, since calls cost as much."""
+    columns = frames.T.copy()
+    densities = log_densities(columns, weights, 0, len(frames), means, variances, norms, len(means))
+    return float(log_likelihood(densities, log_stay, log_next, complete))
+
+
+@njit(cache=True)
 def score_pairs(models: Any, batch: Any, pairs: IntArray, complete: bool) -> FloatArray:
     """Return log P(O_s | lambda_m) for each pair (m, s), shape (P, 2) -> (P,), on one core.
 

@@ -93,8 +93,10 @@ class LeftRightHMM:
         Returns:
             The log-likelihood; -inf where a complete motion has fewer frames than states.
         """
-        densities = self._densities(frames, weights)
-        return float(kernels.log_likelihood(densities, self.log_stay, self.log_next, complete))
+        frames = as_frames(frames, self.n_channels)
+        weights = as_weights(weights, len(frames))
+        parameters = self.means, self.variances, self.log_norms, self.log_stay, self.log_next
+        return float(kernels.score_frames(frames, weights, *parameters, complete))
 
     def decode(
         self, frames: FloatArray, weights: FloatArray | None = None, *, complete: bool = True
