@@ -2,46 +2,32 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
-from pathlib import Path
-from typing import NamedTuple
+from threading import RLock
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mplearn.errors import InvalidValueError, LibraryError, RobotError
 from mplearn.generation import StyleName
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import FloatArray
 
+from .choices import Choices, choose_among
 from .control.controller import tracked_columns
 from .control.planner import Motion, Plan, Planner
 from .control.reference import Reference
 from .feasibility import Feasibility, FeasibilityCheck, FeasibilityConfig
+from .slots import Slots
 
-HOLD = 0
 ENTRY_GAP = 0.5  # largest difference of a tracked coordinate [rad]
 HEIGHT_SCALE = 5.0  # 0.2 m of height count as much as 1 rad
 
 
-class Choices(NamedTuple):
-    """What may be done next.
-
-    Attributes:
-        mask: 1 where an action is legal, shape (capacity,).
-        prior: How likely the demonstrator makes each legal choice, shape (capacity,); sums to 1.
-        refused: Slots that the demonstrator might choose and the robot cannot perform, and why.
-        dead_end: Whether nothing but holding is left.
-    """
-
-    mask: NDArray[np.int8]
-    prior: FloatArray
-    refused: dict[int, tuple[str, ...]]
-    dead_end: bool
-
-
 class Repertoire:
     """The primitives of a library, in slots of a fixed number: slot 0 is hold.
+
+    What is found out about a primitive is kept until it changes. Several environments may share a
+    repertoire, in threads too.
 
     Args:
         library: The primitives and their transitions.
@@ -50,6 +36,11 @@ class Repertoire:
         speed: Speed of performance, as a share of the human's.
         style: How motions are generated from primitives.
         limits: What counts as feasible.
+        novel: Whether transitions are allowed that were never observed.
+        growing: Whether the library will be replaced by `update`; it may be empty then.
+
+    Attributes:
+        slots: Slot of each primitive.
 
     Raises:
         LibraryError: The library is empty, is for another body, or holds more than fits.
@@ -64,72 +55,132 @@ class Repertoire:
         speed: float = 0.5,
         style: StyleName = "deterministic",
         limits: FeasibilityConfig | None = None,
+        *,
+        novel: bool = False,
+        growing: bool = False,
     ) -> None:
-        _require_fit(library, planner)
         if not (np.isfinite(speed) and speed > 0):
             raise InvalidValueError(f"speed must be positive and finite, not {speed}")
-        needed = len(library) + 1
-        if capacity is None:
-            capacity = max(32, 1 << (needed - 1).bit_length())
-        if isinstance(capacity, bool) or not isinstance(capacity, (int, np.integer)):
-            raise InvalidValueError(f"capacity must be an integer, not {capacity!r}")
-        if capacity < needed:
-            raise LibraryError(
-                f"the library holds {len(library)} primitives and needs a capacity of at least "
-                f"{needed}, one slot more for hold; capacity is {capacity}"
-            )
-        self.library = library
+        if not len(library) and not growing:
+            raise LibraryError("the library is empty: there is nothing to perform")
         self.planner = planner
-        self.capacity = int(capacity)
         self.speed = float(speed)
         self.style = style
         self.limits = limits
-        self.ids = tuple(sorted(library.ids))
-        self.slots = {id: slot for slot, id in enumerate(self.ids, start=1)}
-        columns = {name: i for i, name in enumerate(library.channels)}
-        self._columns = [columns[name] for name in planner.robot.channels]
+        self.novel = novel
         self._tracked = tracked_columns(planner.robot)
+        self._slots = Slots(capacity, len(library))
+        self.capacity = self._slots.capacity
+        self._slots.require_room(len(library))
         self._frames: dict[int, tuple[FloatArray, float]] = {}
         self._verdicts: dict[int, Feasibility] = {}
-        self._after: dict[int, Choices] = {}
+        self._revision: dict[int, int] = {}
         self._check: FeasibilityCheck | None = None
+        self._lock = RLock()
+        self.update(library)
+
+    def update(self, library: PrimitiveLibrary) -> tuple[int, ...]:
+        """Take a newer snapshot; primitives that live on keep their slots.
+
+        Returns:
+            Ids of primitives for which there was no slot: they cannot be chosen.
+
+        Raises:
+            LibraryError: The library is for another body.
+        """
+        _require_fit(library, self.planner)
+        with self._lock:
+            left_out = self._slots.update(library.ids)
+            self.library = library
+            self.slots = self._slots.of
+            self.ids = tuple(sorted(self.slots))
+            columns = {name: i for i, name in enumerate(library.channels)}
+            self._columns = [columns[name] for name in self.planner.robot.channels]
+            self._frames = {id: self._frames[id] for id in self.ids if id in self._frames}
+            self._verdicts = {id: self._verdicts[id] for id in self.ids if id in self._verdicts}
+            self._fresh: set[int] = set()  # ids whose frames are known to be this library's
+            self._after: dict[int, Choices] = {}
+            self._starts: FloatArray | None = None
+        return left_out
+
+    def require_room(self, n_primitives: int) -> None:
+        """Check that so many primitives fit.
+
+        Raises:
+            LibraryError: They do not.
+        """
+        self._slots.require_room(n_primitives)
 
     def primitive(self, slot: int) -> int | None:
         """Return the id of the primitive in a slot; None for hold and for free slots."""
-        return self.ids[slot - 1] if 1 <= slot <= len(self.ids) else None
+        return self._slots.primitive(slot)
 
     def frames(self, id: int) -> tuple[FloatArray, float]:
         """Return a primitive's motion in the robot's channels, (T, 3 + n), and its rate [1/s]."""
-        if id not in self._frames:
-            motion = self.library.generate([id], style=self.style)
-            frames = motion.frames[:, self._columns]
-            if len(frames) == 1:
-                frames = np.repeat(frames, 2, axis=0)
+        with self._lock:
+            if id not in self._fresh:
+                self._generate(id)
+                self._fresh.add(id)
+            return self._frames[id]
+
+    def _generate(self, id: int) -> None:
+        motion = self.library.generate([id], style=self.style)
+        frames = motion.frames[:, self._columns]
+        if len(frames) == 1:
+            frames = np.repeat(frames, 2, axis=0)
+        known = self._frames.get(id)
+        if known is None or known[1] != motion.rate_hz or not np.array_equal(known[0], frames):
             self._frames[id] = (np.ascontiguousarray(frames), motion.rate_hz)
-        return self._frames[id]
+            self._verdicts.pop(id, None)
+            self._revision[id] = self._revision.get(id, 0) + 1
 
     def feasibility(self, id: int) -> Feasibility:
         """Return whether the robot can perform a primitive; judged once."""
-        if id not in self._verdicts:
-            if self._check is None:
-                self._check = FeasibilityCheck(self.planner, self.limits)
-            self._verdicts[id] = self._check.judge(*self.frames(id), self.speed)
-        return self._verdicts[id]
+        with self._lock:
+            frames, rate_hz = self.frames(id)
+            if id not in self._verdicts:
+                if self._check is None:
+                    self._check = FeasibilityCheck(self.planner, self.limits)
+                self._verdicts[id] = self._check.judge(frames, rate_hz, self.speed)
+            return self._verdicts[id]
+
+    @property
+    def feasible_ids(self) -> tuple[int, ...]:
+        """Ids of the primitives that the robot can perform; judges them all."""
+        return tuple(id for id in self.ids if self.feasibility(id).feasible)
+
+    def key(self, id: int) -> tuple[int, int]:
+        """Return what tells a primitive's motion from all others, earlier versions included."""
+        self.frames(id)
+        return id, self._revision[id]
 
     def plan(self, start: Reference, id: int) -> Plan:
         """Return the commands that perform a primitive from the present reference."""
+        with self._lock:
+            frames, rate_hz = self.frames(id)
+            motion = Motion(frames[:, self._tracked], rate_hz)
+            return self.planner.plan(start, motion, self.feasibility(id).speed, self.key(id))
+
+    def hold(self, start: Reference, duration_s: float) -> Plan:
+        """Return the commands that come to rest in the present posture."""
+        with self._lock:
+            return self.planner.hold(start, duration_s)
+
+    def duration_s(self, id: int) -> float:
+        """Return how long the robot takes for a primitive that it can perform [s]."""
         frames, rate_hz = self.frames(id)
-        motion = Motion(frames[:, self._tracked], rate_hz)
-        return self.planner.plan(start, motion, self.feasibility(id).speed, id)
+        return (len(frames) - 1) / rate_hz / self.feasibility(id).speed
 
     def after(self, id: int) -> Choices:
         """Return what may follow a primitive: observed transitions that are feasible, and hold."""
-        if id not in self._after:
-            graph = self.library.graph
-            row = graph.prior(id)
-            weights = {graph.ids[i]: float(row[i]) for i in np.flatnonzero(row)}
-            self._after[id] = self._choices(weights)
-        return self._after[id]
+        with self._lock:
+            if id not in self._after:
+                graph = self.library.graph
+                row = graph.prior(id)
+                self._after[id] = self._choices(
+                    {graph.ids[i]: float(row[i]) for i in np.flatnonzero(row)}
+                )
+            return self._after[id]
 
     def entries(self, posture: FloatArray) -> Choices:
         """Return with which primitives a walk may begin in a posture: those that start near it.
@@ -141,55 +192,57 @@ class Repertoire:
             posture: Tracked coordinates, shape (U,) [m, rad].
 
         Raises:
-            RobotError: The robot can perform none of the primitives.
+            RobotError: There are primitives, and the robot can perform none of them.
         """
-        gaps = {id: self._gap(posture, id) for id in self.ids}
-        nearest = sorted(self.ids, key=lambda id: (gaps[id], id))
-        first = next((id for id in nearest if self.feasibility(id).feasible), None)
-        if first is None:
-            reasons = "; ".join(
-                f"{self.library[id].name}: {self.feasibility(id).problems[0]}" for id in nearest[:6]
-            )
-            raise RobotError(
-                f"robot {self.planner.robot.name!r} can perform none of the library's "
-                f"{len(self.ids)} primitives ({reasons})"
-            )
-        return self._choices(
-            {
-                id: float(self.library[id].n_exemplars)
-                for id in nearest
-                if gaps[id] <= gaps[first] + ENTRY_GAP
-            }
+        if not self.ids:
+            return self._choices({})
+        with self._lock:
+            if self._starts is None:
+                self._starts = np.array([self.frames(id)[0][0, self._tracked] for id in self.ids])
+            apart = np.abs(self._starts - posture)
+            apart[:, 0] *= HEIGHT_SCALE
+            gaps = apart.max(axis=1)
+            near = [self.ids[k] for k in np.argsort(gaps, kind="stable")]
+            gap = dict(zip(self.ids, gaps.tolist(), strict=True))
+            first = next((id for id in near if self.feasibility(id).feasible), None)
+            if first is None:
+                raise RobotError(self._nothing_feasible(near))
+            within = [id for id in near if gap[id] <= gap[first] + ENTRY_GAP]
+            return self._choices({id: float(self.library[id].n_exemplars) for id in within})
+
+    def _nothing_feasible(self, ids: list[int]) -> str:
+        reasons = "; ".join(
+            f"{self.library[id].name}: {self.feasibility(id).problems[0]}" for id in ids[:6]
+        )
+        return (
+            f"robot {self.planner.robot.name!r} can perform none of the library's "
+            f"{len(self.ids)} primitives ({reasons})"
         )
 
-    def _gap(self, posture: FloatArray, id: int) -> float:
-        difference = self.frames(id)[0][0, self._tracked] - posture
-        difference[0] *= HEIGHT_SCALE
-        return float(np.abs(difference).max())
-
     def _choices(self, weights: dict[int, float]) -> Choices:
-        mask, prior = np.zeros(self.capacity, np.int8), np.zeros(self.capacity)
-        mask[HOLD] = 1
-        refused = {}
+        possible, refused = {}, {}
         for id, weight in weights.items():
+            slot = self.slots.get(id)
+            if slot is None:
+                continue
             verdict = self.feasibility(id)
             if verdict.feasible:
-                mask[self.slots[id]] = 1
-                prior[self.slots[id]] = weight
+                possible[slot] = weight
             else:
-                refused[self.slots[id]] = tuple(str(problem) for problem in verdict.problems)
-        total = prior.sum()
-        if total == 0:
-            prior[HOLD] = 1.0
-        else:
-            prior /= total
-        return Choices(mask, prior, refused, bool(total == 0))
+                refused[slot] = tuple(str(problem) for problem in verdict.problems)
+        novel = tuple(self.slots[id] for id in self.feasible_ids) if self.novel else ()
+        return choose_among(possible, refused, novel, self.capacity)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_lock"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._lock = RLock()
 
 
 def _require_fit(library: PrimitiveLibrary, planner: Planner) -> None:
     robot = planner.robot
-    if not len(library):
-        raise LibraryError("the library is empty: there is nothing to perform")
     missing = [name for name in robot.channels if name not in library.channels]
     if missing or library.body not in ("", robot.name):
         raise LibraryError(
@@ -197,20 +250,3 @@ def _require_fit(library: PrimitiveLibrary, planner: Planner) -> None:
             f"robot {robot.name!r} needs {len(robot.channels)} channels"
             + (f" and misses {missing[:4]}" if missing else "")
         )
-
-
-def open_library(library: PrimitiveLibrary | str | Path | None) -> PrimitiveLibrary:
-    """Return a library, the one of a file, or the built-in one.
-
-    Raises:
-        LibraryError: The file is missing or damaged, or this is no library.
-    """
-    if library is None:
-        return PrimitiveLibrary.load(Path(str(files(__package__) / "data" / "default.mplearn")))
-    if isinstance(library, (str, Path)):
-        return PrimitiveLibrary.load(library)
-    if not isinstance(library, PrimitiveLibrary):
-        raise LibraryError(
-            f"library must be a PrimitiveLibrary, a file or None, not {type(library).__name__}"
-        )
-    return library

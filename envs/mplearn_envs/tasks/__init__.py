@@ -3,10 +3,19 @@
 from mplearn.errors import InvalidValueError
 
 from .base import Choice as Choice
+from .base import Scene as Scene
 from .base import Task as Task
+from .follow import FollowTask as FollowTask
 from .free import FreeTask as FreeTask
+from .goal import GoalTask as GoalTask
+from .recite import ReciteTask as ReciteTask
 
-TASKS: dict[str, type[Task]] = {"free": FreeTask}
+TASKS: dict[str, type[Task]] = {
+    "free": FreeTask,
+    "goal": GoalTask,
+    "follow": FollowTask,
+    "recite": ReciteTask,
+}
 
 
 def make_task(task: str | Task) -> Task:
@@ -17,6 +26,6 @@ def make_task(task: str | Task) -> Task:
     """
     if isinstance(task, Task):
         return task
-    if task not in TASKS:
+    if not isinstance(task, str) or task not in TASKS:
         raise InvalidValueError(f"task must be a Task or one of {tuple(TASKS)}, not {task!r}")
     return TASKS[task]()

@@ -1,12 +1,18 @@
-"""What a task is: rewards for what is chosen and for how it is performed."""
+"""What a task is: what it shows, what it rewards, and when it is done."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from gymnasium import spaces
 
 from mplearn.recording import FloatArray
-from mplearn_envs.simulation import Performance
+from mplearn_envs.measurement import Measured
+from mplearn_envs.performance import Performance
+from mplearn_envs.repertoire import Repertoire
 
 
 class Choice(NamedTuple):
@@ -16,7 +22,7 @@ class Choice(NamedTuple):
         primitive: Id of the primitive; None for hold.
         legal: Whether the mask allowed it.
         probability: How likely the transition prior makes it.
-        history: Ids of the primitives performed before, the latest last.
+        history: Ids of the primitives performed before, the latest last, at most 100.
     """
 
     primitive: int | None
@@ -25,17 +31,60 @@ class Choice(NamedTuple):
     history: tuple[int, ...]
 
 
-class Task(ABC):
-    """A reward.
+class Scene(NamedTuple):
+    """Where an episode is between two actions.
 
-    A macro step pays the bonuses at its start, and the rates integrated over its duration T with
-    the discount gamma per second: R = sum of bonuses + integral over [0, T] of gamma^t rates(t) dt.
-    Bonuses of a fall are discounted by gamma^T.
+    Attributes:
+        repertoire: What the robot can perform, in which slots, and what may follow what.
+        measured: How the robot stands.
+        target: Tracked coordinates of the reference robot, shape (U,) [m, rad].
+        current: Id of the primitive performed last; None at the start and after a dead end.
+        history: Ids of the primitives performed in this episode, the latest last, at most 100.
+        time_s: Time since the start of the episode [s].
+        rng: The environment's source of randomness.
+        options: What was given to the environment's ``reset``.
     """
 
-    def reset(self) -> None:
+    repertoire: Repertoire
+    measured: Measured
+    target: FloatArray
+    current: int | None
+    history: tuple[int, ...]
+    time_s: float
+    rng: np.random.Generator
+    options: Mapping[str, Any]
+
+
+class Task(ABC):
+    """A reward; derive your own, and give an object of it to the environment.
+
+    A macro step pays the bonuses at its start, the rates integrated over its duration T with the
+    discount gamma per second, and what its end earns discounted by gamma^T:
+    R = bonuses + integral over [0, T] of gamma^t rates(t) dt + gamma^T arrive.
+
+    In an episode the environment calls `reset`; then for every action `bonuses`, `rates`, `fall`
+    (after a fall only) and `arrive`; after each of these steps `observe`, `done` and `report`. An
+    environment has its task to itself: objects are not shared.
+    """
+
+    def space(self, repertoire: Repertoire) -> spaces.Box | None:
+        """Return the bounds of what `observe` returns; None if the task shows nothing.
+
+        Args:
+            repertoire: What the robot can perform; it may grow until the episode starts.
+        """
+        return None
+
+    def reset(self, scene: Scene) -> None:
         """Start an episode."""
         return
+
+    def observe(self) -> FloatArray:
+        """Return what must be known to solve the task, a fresh array within the bounds of `space`.
+
+        It becomes the ``task`` of the observation.
+        """
+        return np.zeros(0)
 
     @abstractmethod
     def bonuses(self, choice: Choice) -> dict[str, float]:
@@ -48,3 +97,19 @@ class Task(ABC):
     @abstractmethod
     def fall(self) -> float:
         """Return what a fall earns."""
+
+    def arrive(self, scene: Scene) -> dict[str, float]:
+        """Return what the end of a macro step earns, by term."""
+        return {}
+
+    @property
+    def done(self) -> bool:
+        """Whether the episode ends here."""
+        return False
+
+    def report(self) -> dict[str, Any]:
+        """Return what is known of the episode, for ``info["task"]``; not for the agent to see.
+
+        ``"success"`` (bool), if there, is also ``info["is_success"]``.
+        """
+        return {}

@@ -1,46 +1,67 @@
-"""Move freely: stay upright, do what is likely, and do not repeat yourself."""
+"""Move freely: stay upright and balanced, do what is likely, and do not repeat yourself."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from gymnasium import spaces
 
 from mplearn.recording import FloatArray
-from mplearn_envs.simulation import Performance
+from mplearn_envs.performance import Performance
+from mplearn_envs.repertoire import Repertoire
 
-from .base import Choice, Task
+from .base import Choice, Scene, Task
 
 
 @dataclass
 class FreeTask(Task):
     """Free motion.
 
-    ======== =================================================== ============ ==================
-    term     formula                                             paid         extremes
-    ======== =================================================== ============ ==================
-    alive    ``alive``                                           per second   0 .. ``alive``
-    likely   ``likely`` * P(choice | what was performed before)  per choice   0 .. ``likely``
-    varied   ``varied`` * (1 - share of this primitive among     per choice   0 .. ``varied``
-             the last ``memory`` ones)
-    fall     - ``fallen``                                        at a fall    - ``fallen`` .. 0
-    ======== =================================================== ============ ==================
+    ========= ================================================== ============ ==================
+    term      formula                                            paid         extremes
+    ========= ================================================== ============ ==================
+    alive     ``alive``                                          per second   0 .. ``alive``
+    balanced  ``balanced`` * min(max(m / ``safe_m``, 0), 1),     per second   0 .. ``balanced``
+              m: distance of the ZMP from the edge of the soles
+    likely    ``likely`` * P(choice | what was performed before) per choice   0 .. ``likely``
+    varied    ``varied`` * (1 - share of this primitive among    per choice   0 .. ``varied``
+              the last ``memory`` ones)
+    fall      - ``fallen``                                       at a fall    - ``fallen`` .. 0
+    ========= ================================================== ============ ==================
 
-    Holding and illegal actions earn no ``likely`` and no ``varied``.
+    Holding and illegal actions earn no ``likely`` and no ``varied``. The task's observation is the
+    share of each slot among the last ``memory`` primitives, shape (capacity,), in [0, 1].
 
     Attributes:
         alive: Reward of a second upright.
+        balanced: Reward of a second in safe balance.
         likely: Reward of a certain choice.
         varied: Reward of a primitive that was not performed lately.
         fallen: Price of a fall.
+        safe_m: Margin of the zero-moment point that is safe [m].
         memory: Number of primitives in which repetitions count.
     """
 
-    alive: float = 0.1
+    alive: float = 0.05
+    balanced: float = 0.05
     likely: float = 0.5
     varied: float = 0.5
     fallen: float = 10.0
+    safe_m: float = 0.05
     memory: int = 10
+
+    def space(self, repertoire: Repertoire) -> spaces.Box:
+        """Return the bounds of the shares."""
+        return spaces.Box(0.0, 1.0, (repertoire.capacity,), np.float64)
+
+    def reset(self, scene: Scene) -> None:
+        """Nothing was performed yet."""
+        self.arrive(scene)
+
+    def observe(self) -> FloatArray:
+        """Return the share of each slot among the last primitives."""
+        return self._shares.copy()
 
     def bonuses(self, choice: Choice) -> dict[str, float]:
         """Return the terms ``likely`` and ``varied``."""
@@ -51,9 +72,24 @@ class FreeTask(Task):
         return {"likely": self.likely * choice.probability, "varied": self.varied * (1.0 - share)}
 
     def rates(self, performance: Performance) -> dict[str, FloatArray]:
-        """Return the term ``alive``."""
-        return {"alive": np.full(len(performance.time_s), self.alive)}
+        """Return the terms ``alive`` and ``balanced``."""
+        safe = np.minimum(np.maximum(performance.zmp_margin_m / self.safe_m, 0.0), 1.0)
+        return {
+            "alive": np.full(len(performance.time_s), self.alive),
+            "balanced": self.balanced * safe,
+        }
 
     def fall(self) -> float:
         """Return the price of a fall."""
         return -self.fallen
+
+    def arrive(self, scene: Scene) -> dict[str, float]:
+        """Count what was performed lately."""
+        self._shares = np.zeros(scene.repertoire.capacity)
+        lately = scene.history[-self.memory :]
+        for id in lately:
+            slot = scene.repertoire.slots.get(id)
+            if slot is not None:
+                self._shares[slot] += 1.0
+        self._shares /= max(len(lately), 1)
+        return {}

@@ -1,0 +1,277 @@
+"""The core of the environments: one action performs a whole primitive."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, SupportsFloat
+
+import gymnasium
+import mujoco
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from mplearn.errors import InvalidValueError
+from mplearn.library import PrimitiveLibrary
+
+from .choices import HOLD, Choices
+from .measurement import Measured
+from .observation import Eyes, Observation
+from .performance import Performance
+from .performer import Performer
+from .repertoire import Repertoire
+from .screen import RENDER_MODES, Screen
+from .simulation import Simulation
+from .tasks import Choice, Scene, Task
+
+_HISTORY = 100  # primitives that tasks may look back
+
+
+class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
+    """Chooses and performs primitives of a repertoire, and rewards it by a task.
+
+    See `PrimitiveHumanoidEnv` for the meaning of everything. An environment derived from this one
+    builds the parts, and may override `_begin` and `_meanwhile`.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 (gymnasium declares it so)
+        "render_modes": list(RENDER_MODES),
+        "render_fps": 25,
+    }
+
+    repertoire: Repertoire
+    performer: Performer
+    task: Task
+    max_steps: int
+    discount: float
+    illegal: Literal["hold", "raise"]
+    illegal_penalty: float
+    novel_penalty: float | None
+    frame_rate_hz: float
+
+    def _set_up(self, flat: bool, screen: Screen) -> None:
+        """Complete the construction, once all parts are there."""
+        repertoire = self.repertoire
+        self.capacity = repertoire.capacity
+        self.action_space = spaces.Discrete(self.capacity)
+        n_joints = len(repertoire.planner.robot.joint_names)
+        self._eyes = Eyes(n_joints, self.capacity, self.task.space(repertoire), flat)
+        self.observation_space = self._eyes.space
+        self._screen = screen
+        self.render_mode = screen.mode
+        period_s = repertoire.planner.config.period_s
+        self._frame_steps = max(1, round(1.0 / (self.frame_rate_hz * period_s)))
+        self.frame_callback: Callable[[], object] | None = None
+        self._running = False
+
+    # ---- what derived environments do besides
+
+    def _begin(self) -> None:
+        """Prepare an episode, before the robot is put upright."""
+
+    def _meanwhile(self, duration_s: float) -> dict[str, Any]:
+        """Let the world go on for the duration of a macro step; return what to add to ``info``."""
+        return {}
+
+    # ---- gymnasium's interface
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Put the robot upright, at rest; returns observation and info.
+
+        Args:
+            seed: Seed of the episodes from here on.
+            options: For the task: see there.
+
+        Raises:
+            RobotError: The robot can perform nothing of the library.
+            NoPathError: The task's goal cannot be reached.
+        """
+        super().reset(seed=seed)
+        self._running = False
+        self._begin()
+        self._measured: Measured = self.performer.reset()
+        self._current: int | None = None
+        self._history: tuple[int, ...] = ()
+        self._time_s = 0.0
+        self._n_steps = 0
+        self._choices: Choices = self.repertoire.entries(self.performer.reference.target)
+        self.task.reset(self._scene(options or {}))
+        self._running = True
+        self._show()
+        return self._observation(), self._info()
+
+    def step(
+        self, action: np.int64 | int
+    ) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Perform a primitive, or hold; see the class.
+
+        Raises:
+            InvalidValueError: The action is no integer of the action space, or illegal with
+                ``illegal="raise"``; or the episode has not begun or is over.
+        """
+        slot = self._slot(action)
+        legal = bool(self._choices.mask[slot])
+        novel = bool(self._choices.novel[slot])
+        chosen = self.repertoire.primitive(slot) if legal else None
+        terms = self.task.bonuses(
+            Choice(chosen, legal, float(self._choices.prior[slot]), self._history)
+        )
+        if not legal:
+            terms["illegal"] = -self.illegal_penalty
+        if novel:
+            terms["novel"] = -(self.novel_penalty or 0.0)
+        watched = self.frame_callback is not None or self.render_mode == "human"
+        outcome = self.performer.perform(
+            chosen, self._frame if watched else None, self._frame_steps
+        )
+        performance, self._measured = outcome.performance, outcome.measured
+        duration_s = performance.duration_s
+        self._time_s += duration_s
+        self._n_steps += 1
+        self._add_moments(terms, performance)
+        besides = self._meanwhile(duration_s)
+        self._advance(chosen)
+        remaining = self.discount**duration_s
+        for name, value in self.task.arrive(self._scene({})).items():
+            terms[name] = terms.get(name, 0.0) + remaining * value
+        terminated = performance.fallen or self.task.done
+        self._running = not terminated
+
+        info = self._info()
+        info["duration_s"] = duration_s
+        info["discount"] = remaining
+        info["reward_terms"] = terms
+        info["illegal"] = not legal
+        info["novel"] = novel
+        info["fallen"] = performance.fallen
+        info.update(outcome.figures)
+        info.update(besides)
+        truncated = self._n_steps >= self.max_steps
+        return self._observation(), sum(terms.values()), terminated, truncated, info
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Return which actions are legal, shape (capacity,): the convention of sb3-contrib."""
+        return self._choices.mask.astype(np.bool_)
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture, shape (height, width, 3), or show the window.
+
+        Raises:
+            InvalidValueError: There is no render mode.
+        """
+        self.performer.show()
+        return self._screen.picture(self.simulation)
+
+    def close(self) -> None:
+        """Free what drawing needed; a second time does nothing."""
+        self._screen.close()
+
+    # ---- what others may look at
+
+    @property
+    def library(self) -> PrimitiveLibrary:
+        """The library of now."""
+        return self.repertoire.library
+
+    @property
+    def simulation(self) -> Simulation:
+        """The robot in MuJoCo."""
+        return self.performer.simulation
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The simulation's model."""
+        return self.simulation.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """The simulation's state."""
+        return self.simulation.data
+
+    # ---- inside
+
+    def _slot(self, action: np.int64 | int) -> int:
+        if not self._running:
+            raise InvalidValueError("the episode has not begun or is over: call reset first")
+        value = np.asarray(action)
+        if value.shape != () or value.dtype.kind not in "iu" or not 0 <= value < self.capacity:
+            raise InvalidValueError(
+                f"an action is an integer in [0, {self.capacity}), not {action!r}"
+            )
+        slot = int(value)
+        if self.illegal == "raise" and not self._choices.mask[slot]:
+            allowed = np.flatnonzero(self._choices.mask).tolist()
+            raise InvalidValueError(f"action {slot} is illegal here; legal are {allowed}")
+        return slot
+
+    def _advance(self, chosen: int | None) -> None:
+        """Find out what may be done after an action; None is hold."""
+        if chosen is not None:
+            self._current = chosen
+            self._history = (*self._history[1 - _HISTORY :], chosen)
+        gone = self._current is not None and self._current not in self.repertoire.slots
+        if gone or (chosen is None and self._choices.dead_end):
+            self._current = None
+        if self._current is None:
+            self._choices = self.repertoire.entries(self.performer.reference.target)
+        else:
+            self._choices = self.repertoire.after(self._current)
+
+    def _add_moments(self, terms: dict[str, float], performance: Performance) -> None:
+        """Add the terms of a macro step's moments: the discounted integral of the rates."""
+        time_s = performance.time_s
+        weight = self.discount**time_s
+        weight[1:] *= time_s[1:] - time_s[:-1]
+        weight[0] *= time_s[0]
+        for name, rate in self.task.rates(performance).items():
+            terms[name] = terms.get(name, 0.0) + float(rate @ weight)
+        if performance.fallen:
+            terms["fall"] = self.task.fall() * self.discount**performance.duration_s
+
+    def _scene(self, options: Mapping[str, Any]) -> Scene:
+        return Scene(
+            self.repertoire,
+            self._measured,
+            self.performer.reference.target,
+            self._current,
+            self._history,
+            self._time_s,
+            self.np_random,
+            options,
+        )
+
+    def _observation(self) -> Observation:
+        slot = HOLD if self._current is None else self.repertoire.slots[self._current]
+        return self._eyes.see(self._measured, slot, self._choices, self.task.observe())
+
+    def _info(self) -> dict[str, Any]:
+        choices, current = self._choices, self._current
+        report = self.task.report()
+        info = {
+            "action_mask": choices.mask.copy(),
+            "transition_prior": choices.prior.copy(),
+            "infeasible": dict(choices.refused),
+            "dead_end": choices.dead_end,
+            "library_version": self.library.version,
+            "primitive": current,
+            "primitive_name": "" if current is None else self.library[current].name,
+            "task": report,
+        }
+        if "success" in report:
+            info["is_success"] = report["success"]
+        return info
+
+    def _frame(self) -> None:
+        if self.frame_callback is not None:
+            self.frame_callback()
+        self._show()
+
+    def _show(self) -> None:
+        if self.render_mode == "human":
+            self.performer.show()
+            self._screen.show(self.simulation)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "frame_callback": None}

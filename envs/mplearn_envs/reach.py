@@ -1,0 +1,62 @@
+"""Where on the graph the robot can be, how soon, and how it stands there."""
+
+from __future__ import annotations
+
+import heapq
+from typing import NamedTuple
+
+import numpy as np
+
+from .choices import HOLD, Choices
+from .control.reference import Reference, rest_reference
+from .measurement import Measured, Sensors
+from .repertoire import Repertoire
+from .simulation import Simulation
+
+
+class Arrival(NamedTuple):
+    """The soonest end of a primitive.
+
+    Attributes:
+        time_s: Least time until then [s].
+        reference: Where the reference robot is then.
+        measured: How it stands.
+    """
+
+    time_s: float
+    reference: Reference
+    measured: Measured
+
+
+def soonest_arrivals(repertoire: Repertoire, choices: Choices) -> dict[int, Arrival]:
+    """Follow the legal transitions from rest in order of time (Dijkstra, on plans).
+
+    Args:
+        repertoire: What the robot can perform.
+        choices: What may be done first.
+
+    Returns:
+        The soonest end of each primitive that can be reached without holding.
+    """
+    robot = repertoire.planner.robot
+    sensors = Sensors(Simulation(robot))
+    found: dict[int, Arrival] = {}
+    queue: list[tuple[float, int, float, Reference]] = []
+
+    def offer(time_s: float, here: Reference, following: Choices) -> None:
+        for slot in np.flatnonzero(following.mask).tolist():
+            id = repertoire.primitive(slot)
+            if slot != HOLD and id is not None and id not in found:
+                expected_s = time_s + repertoire.duration_s(id)
+                heapq.heappush(queue, (expected_s, id, time_s, here))
+
+    offer(0.0, rest_reference(robot), choices)
+    while queue:
+        _, id, time_s, here = heapq.heappop(queue)
+        if id in found:
+            continue
+        plan = repertoire.plan(here, id)
+        time_s += plan.duration_s
+        found[id] = Arrival(time_s, plan.end, sensors.at(plan.end.q))
+        offer(time_s, plan.end, repertoire.after(id))
+    return found

@@ -1,0 +1,221 @@
+"""Do what the demonstrator is doing now."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from mplearn.errors import InvalidValueError, NoPathError
+from mplearn.library import PrimitiveLibrary
+from mplearn.recording import FloatArray
+from mplearn_envs.choices import HOLD, Choices
+from mplearn_envs.performance import Performance
+from mplearn_envs.repertoire import Repertoire
+
+from .base import Choice, Scene, Task
+
+_LONGEST_TIME = 3.0  # of the time since the last recognition, in typical durations
+
+
+@dataclass
+class FollowTask(Task):
+    """Mirror a demonstrator who moves on while the robot acts.
+
+    The demonstrator performs primitives that the robot can perform too, in an order drawn from the
+    library's transitions, at the ``pace`` of the robot, each a little faster or slower than usual.
+    A motion is recognised ``delay_s`` after its end, so what the demonstrator is doing now must be
+    predicted from what was recognised.
+
+    ======== ============================================== =========== ====================
+    term     formula                                        paid        extremes
+    ======== ============================================== =========== ====================
+    agree    ``agree`` while the robot performs the          per second  0 .. ``agree``
+             primitive that the demonstrator performs
+    fall     - ``fallen``                                   at a fall   - ``fallen`` .. 0
+    ======== ============================================== =========== ====================
+
+    So a return lies between - ``fallen`` and ``agree`` / (-ln gamma). The episode ends after
+    ``deadline_s``.
+
+    The task's observation, C = capacity:
+
+    =========== =========================================================== ========
+    num         meaning                                                     bounds
+    =========== =========================================================== ========
+    0..C-1      1 at the slot of what was recognised last                   0, 1
+    C..2C-1     how likely the demonstrator is doing each primitive now     0 .. 1
+    2C..3C-1    how likely each primitive comes next, after this one        0 .. 1
+    3C          time since what is done now began, in typical durations     0 .. 3
+                of a primitive
+    =========== =========================================================== ========
+
+    "Now" is the primitive after the one recognised last: in the first ``delay_s`` of a motion it
+    is still the one before.
+
+    Attributes:
+        pace: Speed of the demonstrator as a share of the human's; None is the robot's.
+        variation: Standard deviation of the logarithm of how long a motion takes.
+        delay_s: Time from a motion's end until it is recognised [s].
+        deadline_s: When the episode ends [s].
+        agree: Reward of a second in agreement.
+        fallen: Price of a fall.
+    """
+
+    pace: float | None = None
+    variation: float = 0.1
+    delay_s: float = 0.2
+    deadline_s: float = 60.0
+    agree: float = 1.0
+    fallen: float = 10.0
+
+    def __post_init__(self) -> None:
+        if self.pace is not None and not (np.isfinite(self.pace) and self.pace > 0):
+            raise InvalidValueError(f"pace must be positive and finite, not {self.pace}")
+        for name in ("variation", "delay_s"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and 0 <= value <= 10):
+                raise InvalidValueError(f"{name} must lie in [0, 10], not {value}")
+        if not (np.isfinite(self.deadline_s) and self.deadline_s > 0):
+            raise InvalidValueError(f"deadline_s must be positive, not {self.deadline_s}")
+        self._library: PrimitiveLibrary | None = None
+
+    def space(self, repertoire: Repertoire) -> spaces.Box:
+        """Return the bounds of the observation, see the table."""
+        high = np.ones(3 * repertoire.capacity + 1)
+        high[-1] = _LONGEST_TIME
+        return spaces.Box(np.zeros_like(high), high, dtype=np.float64)
+
+    def reset(self, scene: Scene) -> None:
+        """Let the demonstrator begin.
+
+        Raises:
+            NoPathError: There is nothing that the robot could do too.
+        """
+        repertoire = scene.repertoire
+        self._repertoire, self._rng = repertoire, scene.rng
+        if self._library is not repertoire.library:
+            self._library = repertoire.library
+            self._first = repertoire.entries(scene.target)
+            if self._first.dead_end:
+                raise NoPathError("the demonstrator can begin with nothing that the robot can do")
+            self._predicted: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
+            self._typical_s = float(
+                np.median([repertoire.duration_s(id) for id in repertoire.feasible_ids])
+            )
+        self._ids: list[int] = []
+        self._ends_s: list[float] = []
+        self._n_recognised = 0
+        self._doing: int | None = None
+        self._time_s, self._agreed_s = 0.0, 0.0
+        self._go_on(scene.time_s)
+
+    def observe(self) -> FloatArray:
+        """Return what was recognised, what is predicted, and since when, see the table."""
+        n, capacity = self._n_recognised, self._repertoire.capacity
+        out = np.zeros(3 * capacity + 1)
+        if n:
+            out[self._repertoire.slots[self._ids[n - 1]]] = 1.0
+        out[capacity : 2 * capacity], out[2 * capacity : -1] = self._prediction()
+        began_s = self._ends_s[n - 1] if n else 0.0
+        out[-1] = min((self._time_s - began_s) / self._typical_s, _LONGEST_TIME)
+        return out
+
+    def bonuses(self, choice: Choice) -> dict[str, float]:
+        """Return nothing: agreement is paid while it lasts."""
+        self._doing = choice.primitive
+        return {}
+
+    def rates(self, performance: Performance) -> dict[str, FloatArray]:
+        """Return the term ``agree``."""
+        time_s = self._time_s + performance.time_s
+        self._go_on(float(time_s[-1]))
+        together = np.zeros(len(time_s))
+        if self._doing is not None:
+            turn = np.searchsorted(self._ends_s, time_s, side="left")
+            same = np.array([id == self._doing for id in self._ids])
+            together[same[turn]] = 1.0
+            self._agreed_s += float(together.mean() * performance.duration_s)
+        return {"agree": self.agree * together}
+
+    def fall(self) -> float:
+        """Return the price of a fall."""
+        return -self.fallen
+
+    def arrive(self, scene: Scene) -> dict[str, float]:
+        """Let time pass: more is recognised."""
+        self._time_s = scene.time_s
+        self._go_on(scene.time_s)
+        known = np.searchsorted(self._ends_s, scene.time_s - self.delay_s, side="right")
+        self._n_recognised = int(known)
+        return {}
+
+    @property
+    def done(self) -> bool:
+        """Whether the time is over."""
+        return self._time_s >= self.deadline_s
+
+    def report(self) -> dict[str, Any]:
+        """Return the share of time in agreement, and the slot of what the demonstrator does now."""
+        now = int(np.searchsorted(self._ends_s, self._time_s, side="right"))
+        return {
+            "agreement": self._agreed_s / self._time_s if self._time_s > 0 else 0.0,
+            "demonstrator": self._repertoire.slots[self._ids[now]],
+        }
+
+    # ---- the demonstrator
+
+    def _go_on(self, time_s: float) -> None:
+        """Perform until after a time."""
+        repertoire = self._repertoire
+        pace = repertoire.speed if self.pace is None else self.pace
+        while not self._ends_s or self._ends_s[-1] <= time_s:
+            prior = self._following(self._ids[-1] if self._ids else None).prior
+            slot = int(np.searchsorted(np.cumsum(prior), self._rng.random(), side="right"))
+            id = repertoire.primitive(min(slot, int(np.flatnonzero(prior)[-1])))
+            assert id is not None  # `_following` never leaves hold alone
+            usual_s = self._library_duration_s(id) / pace
+            lasts_s = usual_s * float(np.exp(self.variation * self._rng.standard_normal()))
+            self._ends_s.append((self._ends_s[-1] if self._ends_s else 0.0) + lasts_s)
+            self._ids.append(id)
+
+    def _library_duration_s(self, id: int) -> float:
+        frames, rate_hz = self._repertoire.frames(id)
+        return (len(frames) - 1) / rate_hz
+
+    def _following(self, id: int | None) -> Choices:
+        """Return what the demonstrator may do next; at a dead end he begins anew."""
+        if id is None:
+            return self._first
+        choices = self._repertoire.after(id)
+        return self._first if choices.dead_end else choices
+
+    # ---- the prediction
+
+    def _prediction(self) -> tuple[FloatArray, FloatArray]:
+        """Return how likely each slot is now, and after that, shape (capacity,) each."""
+        n = self._n_recognised
+        library = self._repertoire.library
+        history = tuple(self._ids[max(0, n - library.graph.order) : n])
+        if history not in self._predicted:
+            now = self._predict(history)
+            after = np.zeros_like(now)
+            for slot in np.flatnonzero(now > 0.01).tolist():
+                after += now[slot] * self._predict((*history, self._repertoire.primitive(slot)))
+            self._predicted[history] = now, after / max(after.sum(), 1e-300)
+        return self._predicted[history]
+
+    def _predict(self, history: tuple[int | None, ...]) -> FloatArray:
+        """Return the library's prediction among what the robot can do, shape (capacity,)."""
+        if not history or self._repertoire.after(history[-1] or 0).dead_end:
+            return self._first.prior
+        repertoire = self._repertoire
+        graph = repertoire.library.graph
+        out = np.zeros(repertoire.capacity)
+        for id, probability in zip(graph.ids, graph.probabilities(history), strict=True):
+            if id in repertoire.slots and repertoire.feasibility(id).feasible:
+                out[repertoire.slots[id]] = probability
+        out[HOLD] = 0.0
+        return np.asarray(out / out.sum()) if out.sum() > 0 else self._first.prior
