@@ -91,7 +91,7 @@ def move_zero(spec: Any, attention: Mapping[str, float], name: str) -> None:
 
 
 def add_soles(spec: Any, feet: tuple[str, str], name: str) -> None:
-    """Give each foot one box, around its shapes (those that collide, if any); only it collides then.
+    """Give each foot one box around its shapes, those that collide if any do; only soles collide.
 
     Raises:
         RobotError: A foot is tilted, or has no shape.
