@@ -6,10 +6,12 @@ from collections.abc import Callable
 
 from ..errors import InvalidValueError
 from .base import Segmenter
+from .kinematic_centroid import KinematicCentroid
 from .kohlmorgen_lemm import KohlmorgenLemm, KohlmorgenLemmConfig
 from .zero_velocity import ZeroVelocity
 
 SEGMENTERS: dict[str, Callable[[int, float], Segmenter]] = {
+    "kinematic-centroid": KinematicCentroid,
     "kohlmorgen-lemm": KohlmorgenLemm,
     "kohlmorgen-lemm-posture": lambda n_channels, rate_hz: KohlmorgenLemm(
         n_channels, rate_hz, KohlmorgenLemmConfig.posture()
