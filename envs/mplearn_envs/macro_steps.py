@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping
-from typing import Any, Literal, SupportsFloat
+from typing import Any, Literal, NamedTuple, SupportsFloat
 
 import gymnasium
 import mujoco
@@ -18,13 +19,28 @@ from .choices import HOLD, Choices
 from .measurement import Measured
 from .observation import Eyes, Observation
 from .performance import Performance
-from .performer import Performer
+from .performer import Dynamics, Performer, PerformerState
 from .repertoire import Repertoire
 from .screen import RENDER_MODES, Screen
 from .simulation import Simulation
 from .tasks import Choice, Scene, Task
 
 _HISTORY = 100  # primitives that tasks may look back
+
+
+class EpisodeState(NamedTuple):
+    """Where an episode is, all that its future depends on."""
+
+    performer: PerformerState
+    measured: Measured
+    current: int | None
+    history: tuple[int, ...]
+    time_s: float
+    n_steps: int
+    choices: Choices
+    task: Task
+    rng: np.random.Generator
+    running: bool
 
 
 class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
@@ -42,6 +58,7 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
     repertoire: Repertoire
     performer: Performer
     task: Task
+    dynamics: Dynamics
     max_steps: int
     discount: float
     illegal: Literal["hold", "raise"]
@@ -167,6 +184,43 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
     def close(self) -> None:
         """Free what drawing needed; a second time does nothing."""
         self._screen.close()
+
+    def state(self) -> EpisodeState:
+        """Return where the episode is: with `load_state`, actions can be tried."""
+        shared = {id(part): part for part in (self.repertoire, self.library)}
+        task, rng = copy.deepcopy((self.task, self.np_random), shared)
+        return EpisodeState(
+            self.performer.state(),
+            self._measured,
+            self._current,
+            self._history,
+            self._time_s,
+            self._n_steps,
+            self._choices,
+            task,
+            rng,
+            self._running,
+        )
+
+    def load_state(self, state: EpisodeState) -> tuple[Observation, dict[str, Any]]:
+        """Go on from there, bit for bit; returns observation and info, as `reset` does.
+
+        The state may be another environment's with the same library, robot and task; a simulated
+        one's may be loaded into a kinematic one, to look ahead.
+
+        Raises:
+            InvalidValueError: A kinematic state is loaded into a simulated environment.
+        """
+        measured = self.performer.load_state(state.performer)
+        same_kind = (state.performer.simulated is None) == (self.dynamics == "kinematic")
+        self._measured = state.measured if same_kind else measured
+        self._current, self._history = state.current, state.history
+        self._time_s, self._n_steps = state.time_s, state.n_steps
+        self._choices = state.choices
+        shared = {id(part): part for part in (self.repertoire, self.library)}
+        self.task, self.np_random = copy.deepcopy((state.task, state.rng), shared)
+        self._running = state.running
+        return self._observation(), self._info()
 
     # ---- what others may look at
 

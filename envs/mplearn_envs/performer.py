@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
@@ -21,7 +20,6 @@ from .repertoire import Repertoire
 from .simulation import Simulation
 
 Dynamics: TypeAlias = Literal["simulated", "kinematic"]
-_MEMORY = 4096  # outcomes that are kept, of about 6 kB each
 
 
 class Outcome(NamedTuple):
@@ -49,6 +47,18 @@ class Outcome(NamedTuple):
             "zmp_margin_m": float(performance.zmp_margin_m.min()),
         }
         return cls(performance, measured, figures)
+
+
+class PerformerState(NamedTuple):
+    """Where a performer is.
+
+    Attributes:
+        reference: Where the reference robot is.
+        simulated: State of the simulation; None where nothing is simulated.
+    """
+
+    reference: Reference
+    simulated: FloatArray | None
 
 
 class Performer(ABC):
@@ -86,6 +96,18 @@ class Performer(ABC):
         """
 
     @abstractmethod
+    def state(self) -> PerformerState:
+        """Return all that the future depends on."""
+
+    @abstractmethod
+    def load_state(self, state: PerformerState) -> Measured:
+        """Go on from there, bit for bit; return how the robot stands.
+
+        Raises:
+            InvalidValueError: The state has no simulation's, and this performer needs it.
+        """
+
+    @abstractmethod
     def show(self) -> None:
         """Bring ``simulation`` up to date, to be drawn."""
 
@@ -117,6 +139,18 @@ class SimulatedPerformer(Performer):
         self.reference = plan.end
         return Outcome.of(performance, self._sensors.read(), plan.speed)
 
+    def state(self) -> PerformerState:
+        """Return all that the future depends on."""
+        return PerformerState(self.reference, self.simulation.state())
+
+    def load_state(self, state: PerformerState) -> Measured:
+        """Go on from there; see `Performer.load_state`."""
+        if state.simulated is None:
+            raise InvalidValueError("a kinematic state cannot be loaded into a simulation")
+        self.simulation.load_state(state.simulated)
+        self.reference = state.reference
+        return self._sensors.read()
+
     def show(self) -> None:
         """Nothing to do: the simulation is what there is."""
 
@@ -132,14 +166,13 @@ class KinematicPerformer(Performer):
     """Takes plans at their word: the robot is where its reference is, without contact or delay.
 
     COG and zero-moment point come from the plan; nothing ever falls. What comes of an action
-    depends on the reference posture at its start and the motion alone, so it is remembered: the
-    latest ``_MEMORY`` outcomes, exactly.
+    depends on the reference posture at its start and the motion alone, so it is remembered,
+    exactly, in the repertoire's memory.
     """
 
     def __init__(self, repertoire: Repertoire, hold_s: float) -> None:
         super().__init__(repertoire, hold_s)
         self._sensors = Sensors(self.simulation)
-        self._known: OrderedDict[Hashable, _Known] = OrderedDict()
         self._rest = self._arrive(rest_reference(self.simulation.robot))
         self._here = self._rest
 
@@ -153,20 +186,28 @@ class KinematicPerformer(Performer):
         self, id: int | None, on_frame: Callable[[], None] | None, frame_steps: int
     ) -> Outcome:
         """Perform a primitive; None holds. See `Performer.perform`."""
-        key = (self._here.key, None if id is None else self.repertoire.key(id))
-        known = self._known.get(key)
+        motion = ("hold", self.hold_s) if id is None else self.repertoire.key(id)
+        key = (self._here.key, motion)
+        known: _Known | None = self.repertoire.recall(key)
         if known is None or on_frame is not None:
             plan = self._plan(id)
             known = self._performed(plan)
-            self._known[key] = known
-            if len(self._known) > _MEMORY:
-                self._known.popitem(last=False)
+            self.repertoire.remember(key, known)
             if on_frame is not None:
                 self._play(plan, on_frame, frame_steps)
-        self._known.move_to_end(key)
         self._here = known.place
         self.reference = known.place.reference
         return known.outcome
+
+    def state(self) -> PerformerState:
+        """Return all that the future depends on."""
+        return PerformerState(self.reference, None)
+
+    def load_state(self, state: PerformerState) -> Measured:
+        """Go on from there, from the reference where the state is a simulation's."""
+        self._here = self._arrive(state.reference)
+        self.reference = state.reference
+        return self._here.measured
 
     def show(self) -> None:
         """Put the simulated robot where the reference is."""
@@ -203,13 +244,11 @@ class KinematicPerformer(Performer):
                 on_frame()
 
     def __getstate__(self) -> dict[str, Any]:
-        left_out = ("_sensors", "_known")
-        return {name: value for name, value in self.__dict__.items() if name not in left_out}
+        return {name: value for name, value in self.__dict__.items() if name != "_sensors"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._sensors = Sensors(self.simulation)
-        self._known = OrderedDict()
 
 
 class _Place(NamedTuple):

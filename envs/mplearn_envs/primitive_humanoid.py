@@ -6,13 +6,13 @@ from typing import Literal
 
 from mplearn.generation import StyleName
 
-from .control.planner import Planner, PlannerConfig
+from .control.planner import Planner
 from .feasibility import FeasibilityConfig
 from .library_source import LibrarySource, Source
 from .macro_steps import MacroStepEnv
 from .options import require_options
 from .performer import Dynamics, make_performer
-from .repertoire import Repertoire
+from .repertoire import Repertoire, shared_repertoire
 from .robot import Robot, humanoid
 from .screen import Screen
 from .tasks import Task, make_task
@@ -157,16 +157,7 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
         self.feasibility = feasibility
         self.flat = flat
         self.frame_rate_hz = frame_rate_hz
-        self.repertoire = Repertoire(
-            self.source.now(),
-            Planner(self.robot, PlannerConfig()),
-            capacity,
-            speed,
-            style,
-            feasibility,
-            novel=novel_penalty is not None,
-            growing=self.source.live,
-        )
+        self.repertoire = self._repertoire(capacity)
         self.performer = make_performer(dynamics, self.repertoire, hold_s)
         self._set_up(flat, Screen(render_mode, width, height))
 
@@ -175,3 +166,11 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
             library = self.source.now()
             self.repertoire.require_room(len(library))
             self.repertoire.update(library)
+
+    def _repertoire(self, capacity: int | None) -> Repertoire:
+        library, novel = self.source.now(), self.novel_penalty is not None
+        what = (capacity, self.speed, self.style, self.feasibility)
+        if self.source.live:
+            planner = Planner(self.robot)
+            return Repertoire(library, planner, *what, novel=novel, growing=True)
+        return shared_repertoire(library, self.robot, *what, novel)

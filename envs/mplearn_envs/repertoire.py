@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import copy
+from collections import OrderedDict
+from collections.abc import Hashable
 from threading import RLock
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -17,17 +21,19 @@ from .control.controller import tracked_columns
 from .control.planner import Motion, Plan, Planner
 from .control.reference import Reference
 from .feasibility import Feasibility, FeasibilityCheck, FeasibilityConfig
+from .robot import Robot
 from .slots import Slots
 
 ENTRY_GAP = 0.5  # largest difference of a tracked coordinate [rad]
+_MEMORY = 4096  # outcomes of about 6 kB each
 HEIGHT_SCALE = 5.0  # 0.2 m of height count as much as 1 rad
 
 
 class Repertoire:
     """The primitives of a library, in slots of a fixed number: slot 0 is hold.
 
-    What is found out about a primitive is kept until it changes. Several environments may share a
-    repertoire, in threads too.
+    What is found out about a primitive is kept until it changes; it depends on nothing else, so
+    several environments may share a repertoire, in threads too.
 
     Args:
         library: The primitives and their transitions.
@@ -41,6 +47,10 @@ class Repertoire:
 
     Attributes:
         slots: Slot of each primitive.
+        ids: Ids of the primitives that have one.
+        growing: See above.
+        memory: What performers remember; see `remember` and `recall`.
+        lock: Held while anything here changes.
 
     Raises:
         LibraryError: The library is empty, is for another body, or holds more than fits.
@@ -68,6 +78,7 @@ class Repertoire:
         self.style = style
         self.limits = limits
         self.novel = novel
+        self.growing = growing
         self._tracked = tracked_columns(planner.robot)
         self._slots = Slots(capacity, len(library))
         self.capacity = self._slots.capacity
@@ -76,7 +87,8 @@ class Repertoire:
         self._verdicts: dict[int, Feasibility] = {}
         self._revision: dict[int, int] = {}
         self._check: FeasibilityCheck | None = None
-        self._lock = RLock()
+        self.memory: OrderedDict[Hashable, Any] = OrderedDict()
+        self.lock = RLock()
         self.update(library)
 
     def update(self, library: PrimitiveLibrary) -> tuple[int, ...]:
@@ -89,7 +101,7 @@ class Repertoire:
             LibraryError: The library is for another body.
         """
         _require_fit(library, self.planner)
-        with self._lock:
+        with self.lock:
             left_out = self._slots.update(library.ids)
             self.library = library
             self.slots = self._slots.of
@@ -117,7 +129,7 @@ class Repertoire:
 
     def frames(self, id: int) -> tuple[FloatArray, float]:
         """Return a primitive's motion in the robot's channels, (T, 3 + n), and its rate [1/s]."""
-        with self._lock:
+        with self.lock:
             if id not in self._fresh:
                 self._generate(id)
                 self._fresh.add(id)
@@ -136,7 +148,7 @@ class Repertoire:
 
     def feasibility(self, id: int) -> Feasibility:
         """Return whether the robot can perform a primitive; judged once."""
-        with self._lock:
+        with self.lock:
             frames, rate_hz = self.frames(id)
             if id not in self._verdicts:
                 if self._check is None:
@@ -156,15 +168,30 @@ class Repertoire:
 
     def plan(self, start: Reference, id: int) -> Plan:
         """Return the commands that perform a primitive from the present reference."""
-        with self._lock:
+        with self.lock:
             frames, rate_hz = self.frames(id)
             motion = Motion(frames[:, self._tracked], rate_hz)
             return self.planner.plan(start, motion, self.feasibility(id).speed, self.key(id))
 
     def hold(self, start: Reference, duration_s: float) -> Plan:
         """Return the commands that come to rest in the present posture."""
-        with self._lock:
+        with self.lock:
             return self.planner.hold(start, duration_s)
+
+    def recall(self, key: Hashable) -> Any:
+        """Return what was kept under a key; None if that is not, or no longer, in `memory`."""
+        with self.lock:
+            if key not in self.memory:
+                return None
+            self.memory.move_to_end(key)
+            return self.memory[key]
+
+    def remember(self, key: Hashable, value: Any) -> None:
+        """Keep a value in `memory`, of which the ``_MEMORY`` used last are kept."""
+        with self.lock:
+            self.memory[key] = value
+            if len(self.memory) > _MEMORY:
+                self.memory.popitem(last=False)
 
     def duration_s(self, id: int) -> float:
         """Return how long the robot takes for a primitive that it can perform [s]."""
@@ -173,7 +200,7 @@ class Repertoire:
 
     def after(self, id: int) -> Choices:
         """Return what may follow a primitive: observed transitions that are feasible, and hold."""
-        with self._lock:
+        with self.lock:
             if id not in self._after:
                 graph = self.library.graph
                 row = graph.prior(id)
@@ -196,7 +223,7 @@ class Repertoire:
         """
         if not self.ids:
             return self._choices({})
-        with self._lock:
+        with self.lock:
             if self._starts is None:
                 self._starts = np.array([self.frames(id)[0][0, self._tracked] for id in self.ids])
             apart = np.abs(self._starts - posture)
@@ -233,12 +260,28 @@ class Repertoire:
         novel = tuple(self.slots[id] for id in self.feasible_ids) if self.novel else ()
         return choose_among(possible, refused, novel, self.capacity)
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Repertoire:
+        """Share what does not change; copy what grows."""
+        if not self.growing:
+            return self
+        twin = object.__new__(Repertoire)
+        memo[id(self)] = twin
+        twin.__setstate__(copy.deepcopy(self.__getstate__(), memo))
+        return twin
+
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name != "_lock"}
+        """Leave out what can be worked out again, and is large."""
+        left_out = ("lock", "memory", "planner", "_check")
+        kept = {name: value for name, value in self.__dict__.items() if name not in left_out}
+        return kept | {"robot": self.planner.robot, "planner_config": self.planner.config}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._lock = RLock()
+        kept = dict(state)
+        self.planner = Planner(kept.pop("robot"), kept.pop("planner_config"))
+        self.__dict__.update(kept)
+        self._check = None
+        self.memory = OrderedDict()
+        self.lock = RLock()
 
 
 def _require_fit(library: PrimitiveLibrary, planner: Planner) -> None:
@@ -250,3 +293,27 @@ def _require_fit(library: PrimitiveLibrary, planner: Planner) -> None:
             f"robot {robot.name!r} needs {len(robot.channels)} channels"
             + (f" and misses {missing[:4]}" if missing else "")
         )
+
+
+_SHARED: WeakValueDictionary[Hashable, Repertoire] = WeakValueDictionary()
+
+
+def shared_repertoire(
+    library: PrimitiveLibrary,
+    robot: Robot,
+    capacity: int | None,
+    speed: float,
+    style: StyleName,
+    limits: FeasibilityConfig | None,
+    novel: bool,
+) -> Repertoire:
+    """Return the repertoire of a library that will not change; arguments as `Repertoire`'s.
+
+    All environments of a process that ask for the same get the same.
+    """
+    key = (library.version, robot, capacity, speed, style, limits, novel)
+    found = _SHARED.get(key)
+    if found is None:
+        found = Repertoire(library, Planner(robot), capacity, speed, style, limits, novel=novel)
+        _SHARED[key] = found
+    return found
