@@ -3,6 +3,7 @@
 from .chains import MergedGraph as MergedGraph
 from .levels import LevelledGraph as LevelledGraph
 from .levels import tree_levels as tree_levels
+from .plan import Criterion as Criterion
 from .prediction import History as History
 from .prediction import Prediction as Prediction
 from .transition_graph import TransitionGraph as TransitionGraph

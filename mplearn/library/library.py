@@ -3,44 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ..body import view_of
-from ..errors import InvalidValueError, UnknownPrimitiveError
+from ..errors import InvalidValueError
 from ..generation import StyleName, Trajectory, generate, retime
-from ..graph import History, Prediction, TransitionGraph
+from ..graph import Criterion, LevelledGraph, tree_levels
 from ..recording import FloatArray
 from . import storage
 from .content import from_content, to_content
-from .primitive import Primitive
-
-if TYPE_CHECKING:
-    from ..tree import Recogniser, Recognition
-
-Key: TypeAlias = int | str
-
-
-class TreeNode(NamedTuple):
-    """A node of the tree that the primitives were learned in.
-
-    Attributes:
-        id: Identity; that of its primitive, if it is a leaf.
-        parent: Node above it; None at the root.
-        n_exemplars: How many segments were placed in it.
-    """
-
-    id: int
-    parent: int | None
-    n_exemplars: int
+from .holdings import Key
+from .knowledge import Knowledge
 
 
 @dataclass(frozen=True, eq=False)
-class PrimitiveLibrary:
+class PrimitiveLibrary(Knowledge):
     """A snapshot of learned primitives and their transitions; nothing here changes.
 
     Wherever a primitive is asked for, its id or its name will do. Two libraries hold the same if
@@ -56,106 +36,10 @@ class PrimitiveLibrary:
         recogniser: What recognises segments; None in a library that only acts.
     """
 
-    primitives: tuple[Primitive, ...]
-    graph: TransitionGraph = field(repr=False)
-    channels: tuple[str, ...]
-    rate_hz: float
-    body: str = ""
-    tree: tuple[TreeNode, ...] = field(default=(), repr=False)
-    recogniser: Recogniser | None = field(default=None, repr=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "primitives", tuple(self.primitives))
-        object.__setattr__(self, "channels", tuple(self.channels))
-        object.__setattr__(self, "tree", tuple(TreeNode(*node) for node in self.tree))
-        ids = [primitive.id for primitive in self.primitives]
-        names = [primitive.name for primitive in self.primitives]
-        for what, values in (("ids", ids), ("names", names), ("channels", self.channels)):
-            if len(set(values)) != len(values):
-                raise InvalidValueError(f"{what} of a library must differ, not {values}")
-        for primitive in self.primitives:
-            if primitive.hmm.n_channels != len(self.channels):
-                raise InvalidValueError(
-                    f"primitive {primitive.id} has {primitive.hmm.n_channels} channels, "
-                    f"the library {len(self.channels)}"
-                )
-            if primitive.rate_hz != self.rate_hz:
-                raise InvalidValueError(
-                    f"primitive {primitive.id} has rate_hz {primitive.rate_hz}, "
-                    f"the library {self.rate_hz}"
-                )
-        strangers = set(self.graph.ids) - set(ids)
-        if strangers:
-            raise InvalidValueError(f"the graph names {sorted(strangers)}, which are no primitives")
-        graph = self.graph.copy()
-        for id in ids:
-            graph.add_node(id)
-        object.__setattr__(self, "graph", graph.snapshot())
-
-    # ---- looking
-
-    def __len__(self) -> int:
-        """Number of primitives."""
-        return len(self.primitives)
-
-    def __getitem__(self, key: Key) -> Primitive:
-        """Return a primitive by id or name.
-
-        Raises:
-            UnknownPrimitiveError: There is none.
-        """
-        found = self._by_key.get(key)
-        if found is None:
-            names = ", ".join(primitive.name for primitive in self.primitives[:30])
-            raise UnknownPrimitiveError(
-                f"no primitive {key!r} in the library; it holds {len(self)}: {names}"
-            )
-        return found
-
-    def __contains__(self, key: object) -> bool:
-        """Whether there is a primitive of this id or name."""
-        return key in self._by_key
-
-    @property
-    def ids(self) -> tuple[int, ...]:
-        """Ids of the primitives."""
-        return tuple(primitive.id for primitive in self.primitives)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the primitives."""
-        return tuple(primitive.name for primitive in self.primitives)
-
     @cached_property
     def version(self) -> str:
         """Hash of all that the library holds, names included: 16 hexadecimal digits."""
         return storage.digest(to_content(self))[:16]
-
-    def recognise(self, frames: FloatArray) -> Recognition:
-        """Recognise a segment, shape (T, D).
-
-        Raises:
-            InvalidValueError: The library was made without a recogniser, or the segment has other
-                channels.
-        """
-        if self.recogniser is None:
-            raise InvalidValueError("this library holds no recogniser")
-        frames = np.asarray(frames, dtype=np.float64)
-        if frames.ndim != 2 or frames.shape[1] != len(self.channels):
-            raise InvalidValueError(
-                f"a segment must have shape (T, {len(self.channels)}), not {frames.shape}"
-            )
-        return self.recogniser.recognise(view_of(self.channels).see(frames))
-
-    def predict_next(self, history: Sequence[Key | None], k: int = 3) -> tuple[Prediction, ...]:
-        """Return the ``k`` primitives most likely to come next, see `TransitionGraph.predict`.
-
-        Args:
-            history: The latest primitives, oldest first; None where one was not recognised.
-            k: How many to return at most.
-        """
-        known: History = [None if key is None else self[key].id for key in history]
-        return self.graph.predict(known, k)
 
     # ---- planning
 
@@ -164,12 +48,25 @@ class PrimitiveLibrary:
         start: Key,
         goal: Key,
         *,
+        by: Criterion = "probability",
         avoid: Collection[Key] = (),
         visit: Collection[Key] = (),
         length: int | None = None,
+        duration_s: tuple[float, float] | None = None,
+        novel: bool = False,
     ) -> tuple[int, ...]:
-        """Return the most likely path, see `TransitionGraph.path`."""
-        return self.k_paths(start, goal, 1, avoid=avoid, visit=visit, length=length)[0]
+        """Return the best path, see `TransitionGraph.path`."""
+        return self.k_paths(
+            start,
+            goal,
+            1,
+            by=by,
+            avoid=avoid,
+            visit=visit,
+            length=length,
+            duration_s=duration_s,
+            novel=novel,
+        )[0]
 
     def k_paths(
         self,
@@ -177,23 +74,35 @@ class PrimitiveLibrary:
         goal: Key,
         k: int,
         *,
+        by: Criterion = "probability",
         avoid: Collection[Key] = (),
         visit: Collection[Key] = (),
         length: int | None = None,
+        duration_s: tuple[float, float] | None = None,
+        novel: bool = False,
     ) -> tuple[tuple[int, ...], ...]:
-        """Return up to ``k`` most likely paths, see `TransitionGraph.k_paths`."""
+        """Return up to ``k`` paths, best first, see `TransitionGraph.k_paths`."""
         return self.graph.k_paths(
             self[start].id,
             self[goal].id,
             k,
+            by=by,
             avoid=[self[key].id for key in avoid],
             visit=[self[key].id for key in visit],
             length=length,
+            duration_s=duration_s,
+            novel=novel,
         )
 
     def walk(self, start: Key | None, length: int, rng: np.random.Generator) -> tuple[int, ...]:
         """Draw a walk of exactly ``length`` primitives, see `TransitionGraph.walk`."""
         return self.graph.walk(None if start is None else self[start].id, length, rng)
+
+    @cached_property
+    def levels(self) -> LevelledGraph:
+        """The graph with those over the tree's inner nodes above it, to search on above first."""
+        parents = {node.id: node.parent for node in self.tree}
+        return LevelledGraph(self.graph, tree_levels(parents))
 
     # ---- acting
 
@@ -269,8 +178,3 @@ class PrimitiveLibrary:
             LibraryError: The file is missing, damaged, foreign, or of a newer version.
         """
         return from_content(cls, storage.read(Path(path)), str(path))
-
-    @cached_property
-    def _by_key(self) -> dict[Key, Primitive]:
-        keyed: dict[Key, Primitive] = {p.name: p for p in self.primitives}
-        return keyed | {p.id: p for p in self.primitives}
