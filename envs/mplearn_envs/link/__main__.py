@@ -1,0 +1,88 @@
+"""Two processes perform a path of primitives: ``python -m mplearn_envs.link both``.
+
+``lower`` is the lower body's process, with the simulated robot; start it first. ``upper`` generates
+the path, tracks the upper body and sends. ``both`` starts both on this machine. All numbers of the
+link are printed at the end.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from functools import partial
+
+from mplearn.errors import MPLearnError
+
+from .disturbance import Disturbance
+from .run import PATH, run_lower, run_upper
+from .sender import HOST, PORT
+
+_READY = "listening"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run one of the processes, or both; returns the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="python -m mplearn_envs.link", description=__doc__, formatter_class=_Formatter
+    )
+    parser.add_argument("role", choices=("upper", "lower", "both"))
+    parser.add_argument("--host", default=HOST, help="the lower body's address")
+    parser.add_argument("--port", type=int, default=PORT, help="its UDP port")
+    parser.add_argument("--robot", choices=("humanoid", "unitree_g1"), default="humanoid")
+    parser.add_argument("--path", nargs="+", default=PATH, help="primitives, by name")
+    parser.add_argument("--speed", type=float, default=0.5, help="share of the human's")
+    parser.add_argument(
+        "--seconds", type=float, default=None, help="when lower stops at the latest"
+    )
+    for name in vars(Disturbance()):
+        parser.add_argument(f"--{name}", type=float, default=0.0, help="share of the datagrams")
+    parser.add_argument("--seed", type=int, default=0, help="of the disturbance")
+    options = parser.parse_args(arguments)
+    try:
+        if options.role == "lower":
+            ready = partial(print, _READY, flush=True)
+            print(
+                run_lower(options.robot, options.host, options.port, options.seconds, ready).table()
+            )
+            return 0
+        disturbance = Disturbance(**{name: getattr(options, name) for name in vars(Disturbance())})
+        if options.role == "upper":
+            run_upper(
+                options.robot,
+                options.path,
+                options.host,
+                options.port,
+                options.speed,
+                disturbance,
+                options.seed,
+            )
+            return 0
+        return _both(sys.argv[1:] if arguments is None else arguments)
+    except MPLearnError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+
+
+def _both(arguments: list[str]) -> int:
+    command = [sys.executable, "-m", "mplearn_envs.link"]
+    rest = [word for word in arguments if word != "both"]
+    with subprocess.Popen([*command, "lower", *rest], stdout=subprocess.PIPE, text=True) as lower:
+        assert lower.stdout is not None
+        line = lower.stdout.readline()
+        if line.strip() != _READY:  # it could not begin, and has said why
+            return lower.wait() or 1
+        upper = subprocess.run([*command, "upper", *rest], check=False)
+        if upper.returncode:
+            lower.terminate()
+            return upper.returncode
+        print(lower.stdout.read(), end="")
+    return lower.returncode
+
+
+class _Formatter(argparse.ArgumentDefaultsHelpFormatter, argparse.RawDescriptionHelpFormatter):
+    """Keep the text's lines, and show defaults."""
+
+
+if __name__ == "__main__":
+    sys.exit(main())

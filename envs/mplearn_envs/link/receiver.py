@@ -1,0 +1,169 @@
+"""The receiving end of the link: the newest posture, and what went wrong on the way."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from mplearn.errors import InvalidValueError
+from mplearn_envs.robot import Robot
+
+from .datagram import Datagram, DatagramError, decode, robot_code
+from .sender import HOST, PORT, LinkError, open_socket
+
+_MOST_A_CALL = 256  # datagrams read in one call: a flood must not keep the controller waiting
+_LARGEST = 65_536
+_REMEMBERED = 1000  # skipped numbers that may still come
+
+
+@dataclass
+class LinkCounts:
+    """How many datagrams did what.
+
+    Attributes:
+        used: Newer than all before: their posture was taken.
+        late: Of those, came with more than the allowed delay.
+        lost: Numbers that never came, or not undamaged.
+        reordered: Came after a newer one; not used.
+        duplicate: Came again; not used.
+        malformed: Were damaged; not used.
+        foreign: Were something else, for another robot or from another sender; not used.
+    """
+
+    used: int = 0
+    late: int = 0
+    lost: int = 0
+    reordered: int = 0
+    duplicate: int = 0
+    malformed: int = 0
+    foreign: int = 0
+
+
+class Receiver:
+    """Receives postures of the upper body; a context manager, as it holds a socket.
+
+    It follows one sender's stream, the first that it hears. Another one is foreign to it until the
+    stream has ended or been silent for ``patience_s``. Delays are measured against the smallest one
+    of the stream, for the two clocks have no common zero.
+
+    Args:
+        robot: The robot.
+        host: Address to listen at; only this machine is heard by default.
+        port: UDP port; 0 takes any free one (see ``port``).
+        late_s: Delay beyond which a datagram counts as late [s].
+        patience_s: Silence after which another stream may take over [s].
+
+    Attributes:
+        port: The port that is listened at.
+        counts: What came of the datagrams.
+
+    Raises:
+        LinkError: Nobody can listen there.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        host: str = HOST,
+        port: int = PORT,
+        *,
+        late_s: float = 0.02,
+        patience_s: float = 1.0,
+    ) -> None:
+        if not (late_s > 0 and patience_s > 0):
+            raise InvalidValueError(
+                f"late_s and patience_s must be positive, not {late_s} and {patience_s}"
+            )
+        self.robot, self.host = robot, host
+        self.late_s, self.patience_s = late_s, patience_s
+        self.counts = LinkCounts()
+        self._code = robot_code([robot.joint_names[i] for i in robot.upper_joints])
+        self._stream: int | None = None
+        self._newest = -1
+        self._ended = False
+        self._missing: OrderedDict[int, None] = OrderedDict()
+        self._smallest_delay_s = np.inf
+        self._heard_s = 0.0
+        self._socket = open_socket()
+        try:
+            self._socket.bind((host, port))
+        except OSError as error:
+            self._socket.close()
+            raise LinkError(f"cannot listen at {host}, port {port}: {error}") from error
+        self.port: int = self._socket.getsockname()[1]
+
+    def receive(self, now_s: float) -> Datagram | None:
+        """Read what has come and return the newest posture; None where nothing newer came.
+
+        Args:
+            now_s: The time on this machine's clock [s].
+        """
+        newest = None
+        for _ in range(_MOST_A_CALL):
+            try:
+                data, _ = self._socket.recvfrom(_LARGEST)
+            except (BlockingIOError, ConnectionError):
+                break
+            newest = self.take(data, now_s) or newest
+        return newest
+
+    def take(self, data: bytes, now_s: float) -> Datagram | None:
+        """Judge one datagram; return it where it is the newest of the stream, else count it."""
+        counts = self.counts
+        try:
+            datagram = decode(data, self._code, len(self.robot.upper_joints))
+        except DatagramError as error:
+            if error.fault == "foreign":
+                counts.foreign += 1
+            else:
+                counts.malformed += 1
+            return None
+        if datagram.stream != self._stream:
+            silent = self._ended or now_s - self._heard_s > self.patience_s
+            if self._stream is not None and not silent:
+                counts.foreign += 1
+                return None
+            self._stream, self._newest = datagram.stream, datagram.sequence - 1
+            self._missing.clear()
+            self._smallest_delay_s = np.inf
+        self._heard_s = now_s
+        if datagram.sequence <= self._newest:
+            self._count_old(datagram.sequence)
+            return None
+        self._count_skipped(datagram.sequence)
+        self._newest, self._ended = datagram.sequence, datagram.last
+        delay_s = now_s - datagram.time_s
+        self._smallest_delay_s = min(self._smallest_delay_s, delay_s)
+        counts.used += 1
+        counts.late += int(delay_s - self._smallest_delay_s > self.late_s)
+        return datagram
+
+    def _count_old(self, sequence: int) -> None:
+        if sequence in self._missing:
+            del self._missing[sequence]
+            self.counts.lost -= 1
+            self.counts.reordered += 1
+        else:
+            self.counts.duplicate += 1
+
+    def _count_skipped(self, sequence: int) -> None:
+        self.counts.lost += sequence - self._newest - 1
+        for number in range(max(self._newest + 1, sequence - _REMEMBERED), sequence):
+            self._missing[number] = None
+        while len(self._missing) > _REMEMBERED:
+            self._missing.popitem(last=False)
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+    def __enter__(self) -> Self:
+        """Return the receiver itself."""
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Close the socket."""
+        self.close()

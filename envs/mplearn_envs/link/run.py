@@ -1,0 +1,151 @@
+"""The two processes of the link, each a loop in real time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from mplearn.errors import InvalidValueError
+from mplearn.generation import retime
+from mplearn.recording import FloatArray
+from mplearn_envs.library_source import LibrarySource
+from mplearn_envs.robot import Retargeting, Robot, humanoid, unitree_g1
+from mplearn_envs.simulation import Simulation
+
+from .disturbance import Disturbance, DisturbedSender
+from .lower_body import LowerBody
+from .receiver import LinkCounts, Receiver
+from .sender import HOST, PORT
+from .upper_body import UpperBody
+
+PATH = ("both arms raise", "both arms lower", "bow down", "bow up", "squat down", "squat raise")
+_REST_S = 1.0  # how long the lower body goes on after the last posture
+_START_S = 0.3  # how long the upper body sends the first posture
+_UPRIGHT = np.cos(0.6)
+
+
+class LinkReport(NamedTuple):
+    """What happened in the lower body's process.
+
+    Attributes:
+        counts: What came of the datagrams.
+        spent_s: Time spent waiting, following, holding and settling [s].
+        fallen: Whether the robot fell.
+        outside: How many commands were outside the joints' limits.
+        slowest_period_s: Longest computation of one period [s].
+    """
+
+    counts: LinkCounts
+    spent_s: dict[str, float]
+    fallen: bool
+    outside: int
+    slowest_period_s: float
+
+    def table(self) -> str:
+        """Return the report as lines of text."""
+        lines = [f"{name:>12} {value}" for name, value in vars(self.counts).items()]
+        lines += [f"{name:>12} {value:.2f} s" for name, value in self.spent_s.items()]
+        lines.append(f"{'fallen':>12} {'yes' if self.fallen else 'no'}")
+        lines.append(f"{'outside':>12} {self.outside}")
+        lines.append(f"{'period':>12} {1e3 * self.slowest_period_s:.1f} ms at most")
+        return "\n".join(lines)
+
+
+def make_robot(name: str) -> Robot:
+    """Return a robot by name.
+
+    Raises:
+        InvalidValueError: There is none of that name.
+    """
+    robots: dict[str, Callable[[], Robot]] = {"humanoid": humanoid, "unitree_g1": unitree_g1}
+    if name not in robots:
+        raise InvalidValueError(f"robot must be one of {tuple(robots)}, not {name!r}")
+    return robots[name]()
+
+
+def run_upper(
+    robot_name: str = "humanoid",
+    path: Sequence[str] = PATH,
+    host: str = HOST,
+    port: int = PORT,
+    speed: float = 0.5,
+    disturbance: Disturbance | None = None,
+    seed: int = 0,
+) -> DisturbedSender:
+    """Generate a path, track it and send it in real time; returns the closed sender."""
+    robot = make_robot(robot_name)
+    period_s = float(robot.model().opt.timestep)
+    frames = path_frames(robot, path, speed, period_s)
+    rng = np.random.default_rng(seed)
+    with DisturbedSender(robot, disturbance or Disturbance(), rng, host, port) as sender:
+        upper = UpperBody(robot, sender, period_s)
+        n_waiting = round(_START_S / period_s)
+        for k in _periods(period_s, n_waiting + len(frames)):
+            at = max(k - n_waiting, 0)
+            upper.update(frames[at], time.monotonic(), at == len(frames) - 1)
+    return sender
+
+
+def run_lower(
+    robot_name: str = "humanoid",
+    host: str = HOST,
+    port: int = PORT,
+    seconds: float | None = None,
+    on_ready: Callable[[], object] = lambda: None,
+) -> LinkReport:
+    """Balance the simulated robot in real time until the stream is over, or time is up.
+
+    ``on_ready`` is called when it begins to listen.
+    """
+    robot = make_robot(robot_name)
+    simulation = Simulation(robot)
+    simulation.reset()
+    model, data = simulation.model, simulation.data
+    period_s = float(model.opt.timestep)
+    limits = robot.position_limits
+    outside, slowest_s = 0, 0.0
+    n_periods = None if seconds is None else round(seconds / period_s)
+    with Receiver(robot, host, port) as receiver:
+        lower = LowerBody(robot, receiver, period_s)
+        lower.update(time.monotonic())  # compiles, before it matters
+        on_ready()
+        for _ in _periods(period_s, n_periods):
+            begin = time.perf_counter()
+            commands = lower.update(time.monotonic())
+            outside += int(((commands < limits[:, 0]) | (commands > limits[:, 1])).sum())
+            data.ctrl[:] = commands
+            mujoco.mj_step(model, data)
+            slowest_s = max(slowest_s, time.perf_counter() - begin)
+            if lower.phase == "settling" and lower.spent_s["settling"] >= _REST_S:
+                break
+    fallen = not data.xmat[1, 8] > _UPRIGHT
+    spent_s = {str(phase): spent for phase, spent in lower.spent_s.items()}
+    return LinkReport(receiver.counts, spent_s, fallen, outside, slowest_s)
+
+
+def path_frames(robot: Robot, path: Sequence[str], speed: float, period_s: float) -> FloatArray:
+    """Return a path of the built-in library, frame by frame, as the robot shall perform it.
+
+    Shape (T, 3 + n) [m, rad], one frame a period.
+    """
+    library = LibrarySource(None).now()
+    ids = [library[name].id for name in path]
+    motion = library.generate(ids, style="smooth", rate_hz=1.0 / period_s)
+    motion = retime(motion, speed=speed)
+    return Retargeting(library.channels, library.body, robot)(motion.frames)
+
+
+def _periods(period_s: float, n: int | None) -> Iterator[int]:
+    """Yield 0, 1, 2, ... at the beginning of each period; late ones follow at once."""
+    begin = time.monotonic()
+    k = 0
+    while n is None or k < n:
+        wait_s = begin + k * period_s - time.monotonic()
+        if wait_s > 0:
+            time.sleep(wait_s)
+        yield k
+        k += 1
