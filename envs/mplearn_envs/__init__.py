@@ -1,6 +1,7 @@
 """Gymnasium environments whose actions are motion primitives.
 
-``gym.make("mplearn/PrimitiveHumanoid-v0")``, after ``import mplearn_envs``.
+``gym.make("mplearn/PrimitiveHumanoid-v0")`` and ``gym.make("mplearn/OnlinePrimitiveHumanoid-v0")``,
+after ``import mplearn_envs``, or as ``gym.make("mplearn_envs:mplearn/PrimitiveHumanoid-v0")``.
 """
 
 from gymnasium.envs.registration import register
@@ -8,4 +9,9 @@ from gymnasium.envs.registration import register
 register(
     id="mplearn/PrimitiveHumanoid-v0",
     entry_point="mplearn_envs.primitive_humanoid:PrimitiveHumanoidEnv",
+    vector_entry_point="mplearn_envs.vector:PrimitiveHumanoidVectorEnv",
+)
+register(
+    id="mplearn/OnlinePrimitiveHumanoid-v0",
+    entry_point="mplearn_envs.online:OnlinePrimitiveHumanoidEnv",
 )

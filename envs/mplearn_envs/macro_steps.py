@@ -86,9 +86,8 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
     def _begin(self) -> None:
         """Prepare an episode, before the robot is put upright."""
 
-    def _meanwhile(self, duration_s: float) -> dict[str, Any]:
-        """Let the world go on for the duration of a macro step; return what to add to ``info``."""
-        return {}
+    def _meanwhile(self, duration_s: float) -> None:
+        """Let the world go on for the duration of a macro step."""
 
     # ---- gymnasium's interface
 
@@ -148,7 +147,7 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
         self._time_s += duration_s
         self._n_steps += 1
         self._add_moments(terms, performance)
-        besides = self._meanwhile(duration_s)
+        self._meanwhile(duration_s)
         self._advance(chosen)
         remaining = self.discount**duration_s
         for name, value in self.task.arrive(self._scene({})).items():
@@ -164,7 +163,6 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
         info["novel"] = novel
         info["fallen"] = performance.fallen
         info.update(outcome.figures)
-        info.update(besides)
         truncated = self._n_steps >= self.max_steps
         return self._observation(), sum(terms.values()), terminated, truncated, info
 

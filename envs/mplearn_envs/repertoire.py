@@ -115,6 +115,13 @@ class Repertoire:
             self._starts: FloatArray | None = None
         return left_out
 
+    def forget(self) -> None:
+        """Free all slots: what comes is another learner's, whose ids mean something else."""
+        with self.lock:
+            self._slots.clear()
+            self._frames.clear()
+            self._verdicts.clear()
+
     def require_room(self, n_primitives: int) -> None:
         """Check that so many primitives fit.
 

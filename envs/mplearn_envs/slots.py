@@ -37,6 +37,10 @@ class Slots:
         if capacity < 2:
             raise InvalidValueError(f"capacity must be at least 2, not {capacity}")
         self.capacity = int(capacity)
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget who was where."""
         self.of: dict[int, int] = {}
         self._primitives: list[int | None] = [None] * self.capacity
         self._free = list(range(1, self.capacity))  # never used ones first

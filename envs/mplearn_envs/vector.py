@@ -1,0 +1,109 @@
+"""Many humanoids at a time, each simulated in a thread."""
+
+from __future__ import annotations
+
+import copy
+import os
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from numpy.typing import NDArray
+
+from mplearn.errors import InvalidValueError
+
+from .primitive_humanoid import PrimitiveHumanoidEnv
+
+
+class PrimitiveHumanoidVectorEnv(SyncVectorEnv):
+    """Environments that are stepped in threads; results are those of single ones, bit for bit.
+
+    While a robot is simulated, MuJoCo leaves Python to the other threads. What is known of the
+    library is shared. ``gymnasium.make_vec("mplearn/PrimitiveHumanoid-v0", num_envs=8)`` makes it;
+    it is a `gymnasium.vector.SyncVectorEnv` in all else, autoreset and seeds included.
+
+    Args:
+        num_envs: Number of environments.
+        n_threads: Number of threads; None is the number of processors that may be used.
+        autoreset_mode: When an episode that is over begins anew, see gymnasium.
+        max_episode_steps: Another name of ``max_steps``.
+        **options: Of each environment, see `PrimitiveHumanoidEnv`. Each gets a copy of a task
+            object.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        n_threads: int | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
+        **options: Any,
+    ) -> None:
+        for name, value in (("num_envs", num_envs), ("n_threads", n_threads)):
+            if value is not None and (not isinstance(value, int) or value < 1):
+                raise InvalidValueError(f"{name} must be an integer from 1, not {value!r}")
+        if max_episode_steps is not None:
+            options["max_steps"] = max_episode_steps
+        self.options = options
+        self.n_threads = n_threads or _processors()
+        self._pool: ThreadPoolExecutor | None = None
+        super().__init__([_maker(options)] * num_envs, autoreset_mode=autoreset_mode)
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        """Step all environments at a time; see `gymnasium.vector.SyncVectorEnv.step`."""
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(self.n_threads, "mplearn-env")
+        next_step = self.autoreset_mode == AutoresetMode.NEXT_STEP
+        actions = np.asarray(actions)
+        if actions.shape != (self.num_envs,):
+            raise InvalidValueError(f"{self.num_envs} actions are needed, not {actions!r}")
+        for env, action, over in zip(self.envs, actions, self._autoreset_envs, strict=True):
+            if not (over and next_step):
+                env.begin(self._pool, action)  # type: ignore[attr-defined]
+        return super().step(actions)
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Return which actions are legal, shape (num_envs, capacity)."""
+        return np.stack(self.call("action_masks"))
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """End the threads and close the environments."""
+        if self._pool is not None:
+            self._pool.shutdown()
+            self._pool = None
+        super().close_extras(**kwargs)
+
+
+class _Begun(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """An environment whose next step may have begun already, in another thread."""
+
+    _result: Future[Any] | None = None
+
+    def begin(self, pool: ThreadPoolExecutor, action: np.int64) -> None:
+        """Begin the step that `step` will be asked for."""
+        self._result = pool.submit(self.env.step, action)
+
+    def step(self, action: Any) -> Any:
+        """Return what came of it."""
+        if self._result is None:
+            return self.env.step(action)
+        result, self._result = self._result, None
+        return result.result()
+
+
+def _maker(options: dict[str, Any]) -> Callable[[], gymnasium.Env[Any, Any]]:
+    def make() -> gymnasium.Env[Any, Any]:
+        own = {"task": copy.deepcopy(options["task"])} if "task" in options else {}
+        return _Begun(PrimitiveHumanoidEnv(**(options | own)))
+
+    return make
+
+
+def _processors() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
