@@ -1,4 +1,4 @@
-"""Left-right hidden Markov models of motions, in log space."""
+"""Left-right hidden Markov models of motions, in log space: plain, semi-Markov and factorial."""
 
 from .distance import distance as distance
 from .distance import distance_matrix as distance_matrix
@@ -6,8 +6,11 @@ from .fit import fit as fit
 from .interchange import from_hmmlearn as from_hmmlearn
 from .interchange import to_hmmlearn as to_hmmlearn
 from .model import LeftRightHMM as LeftRightHMM
+from .motion_model import MotionModel as MotionModel
 from .selection import SizeSelection as SizeSelection
 from .selection import select_size as select_size
+from .semi_markov import SemiMarkovHMM as SemiMarkovHMM
+from .semi_markov import fit_semi_markov as fit_semi_markov
 from .sequences import SequenceBatch as SequenceBatch
 from .stack import ModelStack as ModelStack
 from .stack import score_batch as score_batch

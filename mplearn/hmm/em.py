@@ -31,7 +31,7 @@ def equal_split(
                 else:
                     moves[n] += 1
             row = offsets[s] + t
-            _accumulate(frames, row, weights[row], n, mass, first, second)
+            accumulate(frames, row, weights[row], n, mass, first, second)
 
 
 @njit(cache=True)
@@ -79,15 +79,20 @@ def expectation(
                         moves[n] += _exp(
                             arrival + log_next[n] + densities[n + 1, t + 1] + beta[t + 1, n + 1]
                         )
-                _accumulate(frames, begin + t, share * weights[begin + t], n, mass, first, second)
+                accumulate(frames, begin + t, share * weights[begin + t], n, mass, first, second)
     return likelihood
 
 
 @njit(cache=True)
-def maximisation(statistics: Any, floor: FloatArray, duration_prior: float, model: Any) -> None:
-    """Write the most probable model, a state's unseen channels taking its neighbours' mean."""
-    mass, first, second, stays, moves = statistics
-    means, variances, log_stay, log_next = model
+def maximise_gaussians(
+    mass: FloatArray,
+    first: FloatArray,
+    second: FloatArray,
+    floor: FloatArray,
+    means: FloatArray,
+    variances: FloatArray,
+) -> None:
+    """Write the most probable Gaussians, a state's unseen channels taking its neighbours' mean."""
     n_states, n_channels = mass.shape
     for n in range(n_states):
         for d in range(n_channels):
@@ -98,12 +103,22 @@ def maximisation(statistics: Any, floor: FloatArray, duration_prior: float, mode
             else:
                 means[n, d] = np.nan
                 variances[n, d] = floor[d]
+    for d in range(n_channels):
+        _bridge(means, d)
+
+
+@njit(cache=True)
+def maximisation(statistics: Any, floor: FloatArray, duration_prior: float, model: Any) -> None:
+    """Write the most probable model."""
+    mass, first, second, stays, moves = statistics
+    means, variances, log_stay, log_next = model
+    n_states = len(mass)
+    maximise_gaussians(mass, first, second, floor, means, variances)
+    for n in range(n_states):
         stay, move = stays[n] + duration_prior, moves[n] + duration_prior
         log_stay[n] = np.log(stay / (stay + move))
         log_next[n] = np.log(move / (stay + move))
     log_stay[n_states - 1], log_next[n_states - 1] = 0.0, -np.inf
-    for d in range(n_channels):
-        _bridge(means, d)
 
 
 @njit(cache=True)
@@ -150,7 +165,7 @@ def _exp(x: float) -> float:
 
 
 @njit(cache=True)
-def _accumulate(
+def accumulate(
     frames: FloatArray,
     row: int,
     share: float,
@@ -159,6 +174,7 @@ def _accumulate(
     first: FloatArray,
     second: FloatArray,
 ) -> None:
+    """Add a frame of a certain share to the sums of state n, its missing channels left out."""
     for d in range(frames.shape[1]):
         x = frames[row, d]
         seen = share if x == x else 0.0

@@ -4,13 +4,36 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ..errors import ModelError
 from ..recording import FloatArray, IntArray
 from . import kernels
+from .motion_model import held
 from .sequences import as_frames, as_weights
+
+
+def checked_gaussians(model: Any) -> None:
+    """Make the means and variances of a model's states arrays of its own, unchangeable.
+
+    Raises:
+        ModelError: Shapes disagree, or a value is not finite or not positive.
+    """
+    for name in ("means", "variances"):
+        array = np.array(getattr(model, name), dtype=np.float64, order="C")
+        array.flags.writeable = False
+        object.__setattr__(model, name, array)
+    means, variances = model.means, model.variances
+    if means.ndim != 2 or 0 in means.shape:
+        raise ModelError(f"means must have shape (N, D), N, D >= 1, not {means.shape}")
+    if variances.shape != means.shape:
+        raise ModelError(f"means {means.shape} need variances of that shape, not {variances.shape}")
+    if not np.isfinite(means).all():
+        raise ModelError("means must be finite")
+    if not (np.isfinite(variances).all() and (variances > 0).all()):
+        raise ModelError(f"variances must be positive, not {variances.min()}")
 
 
 @dataclass(frozen=True)
@@ -35,21 +58,12 @@ class LeftRightHMM:
     log_stay: FloatArray
 
     def __post_init__(self) -> None:
-        for name in ("means", "variances", "log_stay"):
-            array = np.array(getattr(self, name), dtype=np.float64, order="C")
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
-        if self.means.ndim != 2 or 0 in self.means.shape:
-            raise ModelError(f"means must have shape (N, D), N, D >= 1, not {self.means.shape}")
-        if self.variances.shape != self.means.shape or self.log_stay.shape != self.means.shape[:1]:
-            raise ModelError(
-                f"means {self.means.shape} need variances of that shape and log_stay "
-                f"({self.n_states},), not {self.variances.shape} and {self.log_stay.shape}"
-            )
-        if not np.isfinite(self.means).all():
-            raise ModelError("means must be finite")
-        if not (np.isfinite(self.variances).all() and (self.variances > 0).all()):
-            raise ModelError(f"variances must be positive, not {self.variances.min()}")
+        checked_gaussians(self)
+        log_stay = np.array(self.log_stay, dtype=np.float64)
+        log_stay.flags.writeable = False
+        object.__setattr__(self, "log_stay", log_stay)
+        if log_stay.shape != self.means.shape[:1]:
+            raise ModelError(f"log_stay must have shape ({self.n_states},), not {log_stay.shape}")
         if self.log_stay[-1] != 0.0 or not (self.log_stay[:-1] < 0).all():
             raise ModelError(
                 f"log_stay must be negative in every state and 0 in the last, not {self.log_stay}"
@@ -79,6 +93,14 @@ class LeftRightHMM:
     def durations_frames(self) -> FloatArray:
         """Expected frames in each state but the last, 1 / (1 - stay), shape (N - 1,)."""
         return np.exp(-self.log_next[:-1])
+
+    def mean_motion(self) -> FloatArray:
+        """Return the means of the states, each held for its expected duration, shape (T, D).
+
+        The last state has no duration of its own: it is held as long as the others on average.
+        """
+        last = self.durations_frames.mean() if self.n_states > 1 else 1.0
+        return self.means[held(np.append(self.durations_frames, last))]
 
     def score(
         self, frames: FloatArray, weights: FloatArray | None = None, *, complete: bool = True
