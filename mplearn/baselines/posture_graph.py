@@ -35,7 +35,7 @@ class PostureGraph:
     edges: IntArray
 
     @classmethod
-    def build(cls, markers: FloatArray, rate_hz: float, smallest: int = 16) -> PostureGraph:
+    def build(cls, markers: FloatArray, rate_hz: float, smallest: int = 32) -> PostureGraph:
         """Build the graph of a stream.
 
         A frame's state is the positions and velocities of its virtual markers. All frames are
