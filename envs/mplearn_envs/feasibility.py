@@ -10,9 +10,10 @@ import numpy as np
 from mplearn.recording import FloatArray
 
 from .control.controller import tracked_columns
+from .control.footwork import sole_heights
 from .control.inverse_dynamics import InverseDynamics
 from .control.planner import Motion, Plan, Planner
-from .control.reference import Reference, reference_robot, rest_reference, sole_heights
+from .control.reference import Reference, reference_robot, rest_reference
 from .control.support import support_margin
 
 ProblemKind: TypeAlias = Literal["foot_lift", "limit", "velocity", "reach", "torque", "balance"]

@@ -65,7 +65,8 @@ class BalanceController:
         rows[HEIGHT] += later[HEIGHT] - now[HEIGHT]
         rows[ORIENTATION] += later[ORIENTATION] - now[ORIENTATION]
         q = advance(robot.stance, q, rates(robot.tree, robot.stance, pose, rows))
-        return Reference(target.copy(), (target - reference.target) / period_s, q)
+        velocity = (target - reference.target) / period_s
+        return reference._replace(target=target.copy(), velocity=velocity, q=q)
 
     def cog_error_m(self, reference: Reference) -> float:
         """Return how far the reference's COG is from where it shall stay, in the plane [m]."""

@@ -80,6 +80,45 @@ def _add_cross(
     out[2] += factor * (a[0] * y - a[1] * x)
 
 
+@njit(cache=True, nogil=True)
+def velocities(q: FloatArray, period_s: float) -> FloatArray:
+    """Return the velocities of a motion by central differences, in the layout of qvel.
+
+    Args:
+        q: Postures, shape (T, 7 + J), T >= 2.
+        period_s: Time between them [s].
+
+    Returns:
+        Velocities, shape (T, 6 + J); one-sided at both ends.
+    """
+    n_times = q.shape[0]
+    out = np.empty((n_times, q.shape[1] - 1))
+    for t in range(n_times):
+        before, after = max(t - 1, 0), min(t + 1, n_times - 1)
+        span = (after - before) * period_s
+        for i in range(3):
+            out[t, i] = (q[after, i] - q[before, i]) / span
+        w, x, y, z = q[before, 3], -q[before, 4], -q[before, 5], -q[before, 6]
+        a, b, c, d = q[after, 3], q[after, 4], q[after, 5], q[after, 6]
+        cosine = w * a - x * b - y * c - z * d
+        turn = np.array(
+            [
+                w * b + x * a + y * d - z * c,
+                w * c + y * a + z * b - x * d,
+                w * d + z * a + x * c - y * b,
+            ]
+        )
+        if cosine < 0:
+            turn, cosine = -turn, -cosine
+        sine = np.sqrt(np.sum(turn * turn))
+        factor = 2.0 if sine < 1e-9 else 2.0 * np.arctan2(sine, cosine) / sine
+        for i in range(3):
+            out[t, 3 + i] = factor * turn[i] / span
+        for i in range(7, q.shape[1]):
+            out[t, i - 1] = (q[after, i] - q[before, i]) / span
+    return out
+
+
 def ground_reaction(
     mass: float, cog: FloatArray, linear: FloatArray, angular: FloatArray, period_s: float
 ) -> FloatArray:

@@ -1,9 +1,9 @@
 """From a primitive's trajectory to servo commands for the whole robot: a pure function.
 
-With both feet down no measurement is fed back ([Kulic2012] 4.2.1 balances a kinematic reference),
-so what is commanded depends on the reference posture at the start, the motion and the speed alone.
-Plans are therefore cached, exactly: their ends are kept on a grid of 1e-6, so the same posture
-recurs.
+What is commanded depends on the reference posture at the start, the motion and the speed alone
+([Kulic2012] 4.2.1 balances a kinematic reference). Plans are therefore cached, exactly: their ends
+are kept on a grid of 1e-6, so the same posture recurs. Where a foot leaves the ground, `Plan.guide`
+says what the ankles correct while it is performed.
 """
 
 from __future__ import annotations
@@ -11,20 +11,33 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Hashable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mplearn.errors import InvalidValueError
-from mplearn.recording import FloatArray
+from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.robot import Robot
 
-from .reference import N_BASE, Reference, ReferenceRobot, base_rotation, reference_robot
+from .course import Course, lay_out, stretches
+from .footwork import Footwork, Lift, read_footwork
+from .kinematics import forward
+from .legs import balanced_path
+from .momentum import ground_reaction, momenta, velocities
+from .reference import N_BASE, Reference, reference_robot
+from .stride import (
+    CARRY_M,
+    plan_ground,
+    plan_rise,
+    plan_weight,
+    recentred,
+    sole_middles,
+    sole_outlines,
+)
+from .support import convex_hull, support_margin
 from .upper_body import limit_velocity, servo_commands
-from .velocity_ik import settle
 
-TOLERANCE = 1e-8  # [m, rad] to which the feet, COG and base follow
 GRID_DECIMALS = 6
 OUT_OF_REACH = 1e-3  # [m, rad]: an error that slowing down does not mend
 
@@ -35,10 +48,12 @@ class Motion(NamedTuple):
     Attributes:
         frames: Tracked coordinates at human speed, shape (T, U) [m, rad].
         rate_hz: Frames per second [1/s].
+        footwork: What the feet do; None where both stay down.
     """
 
     frames: FloatArray
     rate_hz: float
+    footwork: Footwork | None = None
 
     @property
     def duration_s(self) -> float:
@@ -76,6 +91,12 @@ class Plan(NamedTuple):
         error: Largest error of feet, COG and base that is left at each of them, shape (K + 1,).
         end: Where the reference robot is at the end.
         speed: Speed that was possible, as a share of the human's.
+        cog: COG of each posture, shape (K + 1, 3) [m].
+        zmp: Zero-moment point at each posture, all masses moving as planned, (K + 1, 2) [m].
+        zmp_margin_m: Its distance from the edge of the soles that stand, negative outside, shape
+            (K + 1,) [m].
+        ground: Where each foot stands or would: x, y [m] and yaw [rad], shape (K + 1, 2, 3).
+        up: Side of the foot in the air at each posture, 0 left, 1 right, -1 none, shape (K + 1,).
     """
 
     commands: FloatArray
@@ -84,11 +105,21 @@ class Plan(NamedTuple):
     error: FloatArray
     end: Reference
     speed: float
+    cog: FloatArray
+    zmp: FloatArray
+    zmp_margin_m: FloatArray
+    ground: FloatArray
+    up: IntArray
 
     @property
     def duration_s(self) -> float:
         """Length [s]."""
         return (len(self.q) - 1) * self.knot_s
+
+    @property
+    def steps(self) -> bool:
+        """Whether a foot is in the air or the weight moves."""
+        return bool((self.up >= 0).any() or np.ptp(self.cog[:, :2], axis=0).max() > 1e-3)
 
 
 class Planner:
@@ -103,15 +134,37 @@ class Planner:
         self.robot = robot
         self.config = config or PlannerConfig()
         self._reference = reference_robot(robot)
+        self._mass = float(self._reference.tree.mass.sum())
         self._velocity = np.concatenate(
             (self._reference.velocity[:N_BASE], robot.per_joint("velocity"))
         )
+        joints = robot.position_limits[robot.leg_joints].copy()
+        knees = np.isin(robot.leg_joints, [robot.joint_names.index(name) for name in robot.knees])
+        joints[knees, 0] = np.maximum(joints[knees, 0], 0.5 * robot.guard_knee_rad)
+        self._limits = np.vstack((self._reference.limits, joints, [[0.0, np.inf]] * 2))
+        rates = robot.per_joint("velocity")[robot.leg_joints]
+        self._rates = np.concatenate((self._reference.velocity, rates, [np.inf] * 2))
+        self._tracked = np.concatenate((np.arange(N_BASE), N_BASE + robot.upper_joints))
         self._cache: OrderedDict[Hashable, Plan] = OrderedDict()
+
+    def motion(self, frames: FloatArray, rate_hz: float) -> Motion:
+        """Return the motion of frames in the robot's channels, what its feet do included.
+
+        Args:
+            frames: Values of the robot's channels, shape (T, 3 + n) [m, rad].
+            rate_hz: Frames per second, at human speed [1/s].
+        """
+        footwork = read_footwork(self.robot, frames)
+        tracked = np.ascontiguousarray(frames[:, self._tracked])
+        return Motion(tracked, rate_hz, footwork if footwork.lifts else None)
 
     def plan(
         self, start: Reference, motion: Motion, speed: float = 0.5, key: Hashable = None
     ) -> Plan:
         """Return the commands that perform a motion from the present reference.
+
+        Where another foot is in the air than at the motion's start, it is lowered, and the motion's
+        raised, before the motion begins.
 
         Args:
             start: Where the reference robot is.
@@ -144,60 +197,133 @@ class Planner:
         return plan
 
     def hold(self, start: Reference, duration_s: float) -> Plan:
-        """Return the commands that come to rest in the present posture."""
+        """Return the commands that come to rest in the present posture, on one foot or on two."""
         here = np.clip(start.target, *self._reference.limits.T)
-        return self.plan(
-            start, Motion(np.stack((here, here)), 1.0 / duration_s), 1.0, ("hold", duration_s)
-        )
+        footwork = None
+        if start.lifted >= 0:
+            legs, rise = start.swing[:-2], start.swing[-2:]
+            lifts = (Lift(start.lifted, -1, 2),)
+            footwork = Footwork(
+                np.stack((legs, legs)), np.stack((rise, rise)), np.zeros((2, 3)), lifts, 0.0
+            )
+        motion = Motion(np.stack((here, here)), 1.0 / duration_s, footwork)
+        return self.plan(start, motion, 1.0, ("hold", duration_s))
 
     def _plan(self, start: Reference, motion: Motion, speed: float) -> Plan:
         knot_s = self.config.period_s * self.config.knot_steps
+        pose = forward(self._reference.tree, start.q)
+        here = pose.moment[0] / pose.carried[0]
         for _ in range(4):
-            targets = self._targets(start, motion, speed, knot_s)
-            q, error = balanced_path(self._reference, targets, start.q)
-            tracked = np.vstack((start.target, targets))
+            course, targets = self._targets(start, motion, speed, knot_s, here)
+            width = len(self._reference.limits)
+            ground = plan_ground(course, motion.footwork, start.ground)
+            carried = np.clip(targets[:, -2:] / CARRY_M, 0.0, 1.0)
+            carried = carried * carried * (3.0 - 2.0 * carried)
+            middles = sole_middles(self._reference, ground)
+            cog, _ = plan_weight(course, middles, here[:2], here[2], knot_s)
+            q, error = balanced_path(
+                self._reference,
+                targets[:, :width],
+                targets[:, width:],
+                ground,
+                carried,
+                cog,
+                start.q,
+            )
+            tracked = np.vstack((start.target, targets[:, :width]))
             path = np.hstack((tracked[:, :N_BASE], q[:, 7:]))  # (K + 1, 3 + n)
             velocity = np.diff(path, axis=0) / knot_s
             excess = float(np.max(np.abs(velocity) / self._velocity))
             if excess <= 1.0 or error.max() > OUT_OF_REACH:
                 break
             speed /= 1.02 * excess
-        last = (targets[-1], (targets[-1] - targets[-2]) / knot_s, q[-1])
-        end = Reference(*(np.round(part, GRID_DECIMALS) for part in last))
         position, rate = refine(q[:, 7:], knot_s, self.config.knot_steps)
-        return Plan(servo_commands(self.robot, position, rate), q, knot_s, error, end, speed)
+        commands = servo_commands(self.robot, position, rate)
+        ground = np.concatenate((start.ground[None], ground))
+        up = np.concatenate(([start.lifted], course.up))
+        balance, zmp, margin = self._balance(q, ground, up, knot_s)
+        end = self._end(targets, q[-1], ground[-1], int(up[-1]), knot_s)
+        return Plan(commands, q, knot_s, error, end, speed, balance, zmp, margin, ground, up)
 
-    def _targets(self, start: Reference, motion: Motion, speed: float, knot_s: float) -> FloatArray:
-        """Return the tracked coordinates at the knots after the start, shape (K, U)."""
-        limits, velocity = self._reference.limits, self._reference.velocity
-        frames = np.clip(motion.frames, limits[:, 0], limits[:, 1])
-        gap = start.target - frames[0]
+    def _targets(
+        self, start: Reference, motion: Motion, speed: float, knot_s: float, here: FloatArray
+    ) -> tuple[Course, FloatArray]:
+        """Return the plan's times, and tracked coordinates and swing at the knots after the start.
+
+        Returns:
+            The course, and targets of shape (K, U + n_legs + 2) [m, rad].
+        """
+        footwork = motion.footwork
+        n_frames = len(motion.frames)
+        before = np.concatenate((start.target, start.swing))
+        before_rate = np.concatenate((start.velocity, start.swing_velocity))
+        if footwork is None:
+            swing = np.broadcast_to(
+                np.append(start.swing[:-2], (0.0, 0.0)), (n_frames, len(start.swing))
+            )
+        else:
+            swing = np.hstack((footwork.legs, footwork.rise))
+        limits = self._limits
+        frames = np.clip(np.hstack((motion.frames, swing)), limits[:, 0], limits[:, 1])
+        gap = before - frames[0]
         length_s = motion.duration_s / speed
-        allowed = self.config.blend_velocity * velocity
+        allowed = self.config.blend_velocity * self._rates
         needed_s = float(np.max(1.875 * np.abs(gap) / allowed))  # a quintic's peak velocity
         blend_s = max(needed_s, min(self.config.blend_s, 0.6 * length_s))
         wait_s = max(0.0, needed_s - 0.6 * length_s)
-        ramp_s = 0.3 if wait_s > 0 else 0.0
-        n_knots = max(2, round((wait_s + 0.5 * ramp_s + length_s) / knot_s))
-        time = np.arange(1.0, n_knots + 1.0) * knot_s
-        progress = _progress(time, wait_s, ramp_s)
-        at = progress / progress[-1] * (len(frames) - 1)  # in frames
-        low = np.minimum(at.astype(np.int64), len(frames) - 2)
+
+        middles = sole_middles(self._reference, start.ground)
+        to_foot = float(np.linalg.norm(middles - here[:2], axis=1).max())
+        apart = float(np.linalg.norm(middles[0] - middles[1]))
+        parts = stretches(n_frames, footwork, start.lifted, to_foot, apart)
+        course = lay_out(parts, 1.0 / (motion.rate_hz * speed), knot_s, wait_s, 1.0)
+        at = course.progress
+        time = np.arange(1.0, len(at) + 1.0) * knot_s
+        low = np.minimum(at.astype(np.int64), n_frames - 2)
         share = (at - low)[:, None]
         path = frames[low] * (1 - share) + frames[low + 1] * share
-        first = (frames[1] - frames[0]) * motion.rate_hz * speed if wait_s == 0 else 0.0
-        path += _fading(time, blend_s, gap, start.velocity - first)
+        moves = wait_s == 0 and parts[0].first < parts[0].last
+        first = (frames[1] - frames[0]) * motion.rate_hz * speed if moves else 0.0
+        rise = path[:, -2:].copy()
+        path += _fading(time, blend_s, gap, before_rate - first)
+        path[:, -2:] = plan_rise(course, rise, start, path[:, -2:])
         path = np.clip(path, limits[:, 0], limits[:, 1])
-        return np.asarray(limit_velocity(path, start.target, velocity * knot_s))
+        width = len(self._rates) - 2
+        path[:, :width] = limit_velocity(
+            path[:, :width], before[:width], self._rates[:width] * knot_s
+        )
+        return course, path
 
+    def _balance(
+        self, q: FloatArray, ground: FloatArray, up: IntArray, knot_s: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return COG (K + 1, 3), zero-moment point (K + 1, 2) and its margin (K + 1,) [m]."""
+        ref = self._reference
+        cog, linear, angular = momenta(ref.tree, ref.inertia, q, velocities(q, knot_s))
+        between = ground_reaction(self._mass, cog, linear, angular, knot_s)
+        zmp = np.vstack((between[:1], 0.5 * (between[1:] + between[:-1]), between[-1:]))
+        corners = sole_outlines(ref, ground)
+        margin = np.empty(len(q))
+        moved = (np.diff(up) != 0) | (np.diff(ground, axis=0) != 0).any(axis=(1, 2))
+        edges = np.concatenate(([0], np.flatnonzero(moved) + 1, [len(q)]))
+        for first, last in pairwise(edges.tolist()):
+            standing = [side for side in range(2) if side != up[first]]
+            hull = convex_hull(corners[first, standing].reshape(-1, 2))
+            margin[first:last] = support_margin(hull, np.nan_to_num(zmp[first:last], nan=np.inf))
+        return cog, zmp, margin
 
-def _progress(time: FloatArray, wait_s: float, ramp_s: float) -> FloatArray:
-    """Integrate a speed that is 0 for ``wait_s`` and then rises smoothly to 1 in ``ramp_s``."""
-    if ramp_s == 0:
-        return time
-    x = (time - wait_s) / ramp_s
-    inside = np.clip(x, 0.0, 1.0)
-    return ramp_s * (inside**3 - 0.5 * inside**4 + np.maximum(x - 1.0, 0.0))
+    def _end(
+        self, targets: FloatArray, q: FloatArray, ground: FloatArray, up: int, knot_s: float
+    ) -> Reference:
+        """Return the reference after the last knot, seen from between the feet."""
+        width = len(self._reference.limits)
+        rate = (targets[-1] - targets[-2]) / knot_s
+        lifted = np.zeros(2)
+        if up >= 0:
+            lifted[up] = 1.0
+        q, ground = recentred(q, ground)
+        parts = (targets[-1, :width], rate[:width], q, targets[-1, width:], rate[width:], lifted)
+        return Reference(*(np.round(part, GRID_DECIMALS) for part in (*parts, ground)))
 
 
 def _fading(time: FloatArray, over_s: float, gap: FloatArray, rate: FloatArray) -> FloatArray:
@@ -205,40 +331,6 @@ def _fading(time: FloatArray, over_s: float, gap: FloatArray, rate: FloatArray) 
     x = np.minimum(time / over_s, 1.0)[:, None]
     left = 1.0 - x
     return np.asarray(left**3 * (gap * (1 + 3 * x + 6 * x**2) + rate * over_s * x * (1 + 3 * x)))
-
-
-@njit(cache=True)
-def balanced_path(
-    robot: ReferenceRobot, targets: FloatArray, start: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Balance the reference robot under every target.
-
-    Args:
-        robot: The reference robot.
-        targets: Tracked coordinates, shape (K, U) [m, rad].
-        start: Posture before them, shape (7 + n,).
-
-    Returns:
-        The postures, shape (K + 1, 7 + n), start included, and the largest error that is left in
-        each, shape (K + 1,) [m, rad].
-    """
-    n_knots = targets.shape[0]
-    out = np.empty((n_knots + 1, start.shape[0]))
-    worst = np.zeros(n_knots + 1)
-    out[0] = start
-    offset = robot.stance_height - robot.standing_height
-    for k in range(n_knots):
-        q = out[k].copy()
-        if k > 0:  # the legs go on as they went
-            for j in robot.stance.leg_joints:
-                q[7 + j] += out[k, 7 + j] - out[k - 1, 7 + j]
-        for u in range(robot.upper.shape[0]):
-            q[7 + robot.upper[u]] = targets[k, 3 + u]
-        orientation = base_rotation(targets[k, 1], targets[k, 2])
-        out[k + 1], worst[k + 1] = settle(
-            robot.tree, robot.stance, q, targets[k, 0] + offset, orientation, TOLERANCE, 12
-        )
-    return out, worst
 
 
 def refine(knots: FloatArray, knot_s: float, n_steps: int) -> tuple[FloatArray, FloatArray]:

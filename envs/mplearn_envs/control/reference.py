@@ -29,6 +29,8 @@ class ReferenceRobot(NamedTuple):
         inertia: Rotational inertia of each body about its centre of mass, in its own frame, shape
             (B, 3, 3) [kg m^2].
         stance: Both feet on the floor, symmetric about the origin.
+        corners: Lower corners of the soles in their feet's frames, shape (2, 4, 3) [m].
+        ground: Where the feet stand: x, y [m] and yaw [rad], shape (2, 3).
         upper: Hinges that are tracked, shape (U - 3,).
         limits: Smallest and largest value of the tracked coordinates, shape (U, 2) [m, rad].
         velocity: Their velocity limits, shape (U,) [m/s, rad/s].
@@ -40,6 +42,8 @@ class ReferenceRobot(NamedTuple):
     tree: MassTree
     inertia: FloatArray
     stance: Stance
+    corners: FloatArray
+    ground: FloatArray
     upper: IntArray
     limits: FloatArray
     velocity: FloatArray
@@ -54,12 +58,26 @@ class Reference(NamedTuple):
     Attributes:
         target: Tracked coordinates, shape (U,) [m, rad]; the height as the features have it.
         velocity: Their velocities, shape (U,) [m/s, rad/s].
-        q: The whole posture, shape (7 + n,).
+        q: The whole posture, shape (7 + n,); its origin is on the floor between the feet, x ahead.
+        swing: The legs as the motion has them, which a foot in the air follows: angles of the legs'
+            hinges [rad], then the heights of the left and the right sole [m], shape (n_legs + 2,).
+        swing_velocity: Their velocities, shape (n_legs + 2,) [rad/s, m/s].
+        up: 1 for the foot that is in the air, shape (2,).
+        ground: Where each foot stands or left the ground: x, y [m] and yaw [rad], shape (2, 3).
     """
 
     target: FloatArray
     velocity: FloatArray
     q: FloatArray
+    swing: FloatArray
+    swing_velocity: FloatArray
+    up: FloatArray
+    ground: FloatArray
+
+    @property
+    def lifted(self) -> int:
+        """Side of the foot that is in the air, 0 left, 1 right; -1 for none."""
+        return int(np.argmax(self.up)) if self.up.any() else -1
 
 
 @njit(cache=True)
@@ -110,6 +128,7 @@ def reference_robot(robot: Robot) -> ReferenceRobot:
         pose.rotation[feet],
         reach,
         sole_centre(robot, straight),
+        np.zeros(2),
     )
     length = np.linalg.norm(pose.position[thighs] - pose.position[feet], axis=1)
     stance_height = float(straight[2] - np.max(length - crouch))
@@ -129,6 +148,8 @@ def reference_robot(robot: Robot) -> ReferenceRobot:
         tree,
         np.einsum("bij,bj,bkj->bik", turn, model.body_inertia[1:], turn),
         stance,
+        sole_corners(robot),
+        np.column_stack((stance.foot_position[:, :2], np.zeros(2))),
         upper,
         np.vstack((base_limits, limits[upper])),
         np.concatenate((robot.base_velocity, robot.per_joint("velocity")[upper])),
@@ -143,7 +164,10 @@ def rest_reference(robot: Robot) -> Reference:
     ref = reference_robot(robot)
     target = np.zeros(len(ref.limits))
     target[0] = ref.standing_height
-    return Reference(target, np.zeros_like(target), ref.rest)
+    swing = np.append(ref.rest[7 + robot.leg_joints], np.zeros(2))
+    return Reference(
+        target, np.zeros_like(target), ref.rest, swing, 0.0 * swing, np.zeros(2), ref.ground
+    )
 
 
 def sole_corners(robot: Robot) -> FloatArray:
@@ -169,39 +193,6 @@ def soles(robot: Robot, q: FloatArray) -> FloatArray:
 def lowest_sole(robot: Robot, q: FloatArray) -> float:
     """Return the height of the lowest corner of the soles [m]."""
     return float(soles(robot, q)[..., 2].min())
-
-
-def sole_heights(robot: Robot, frames: FloatArray) -> FloatArray:
-    """Return the height of each sole's lowest corner along a motion, shape (T, 2) [m].
-
-    Args:
-        robot: The robot.
-        frames: Values of the robot's channels, shape (T, 3 + n) [m, rad].
-    """
-    model = robot.model()
-    feet = np.array([model.body(n).id - 1 for n in robot.feet])
-    return _lowest(mass_tree(model), feet, sole_corners(robot), np.ascontiguousarray(frames))
-
-
-@njit(cache=True)
-def _lowest(tree: MassTree, feet: IntArray, corners: FloatArray, frames: FloatArray) -> FloatArray:
-    out = np.full((frames.shape[0], 2), np.inf)
-    q = np.zeros(4 + frames.shape[1])
-    for t in range(frames.shape[0]):
-        q[2] = frames[t, 0]
-        cr, sr = np.cos(0.5 * frames[t, 1]), np.sin(0.5 * frames[t, 1])
-        cp, sp = np.cos(0.5 * frames[t, 2]), np.sin(0.5 * frames[t, 2])
-        q[3], q[4], q[5], q[6] = cp * cr, cp * sr, sp * cr, sp * sr
-        q[7:] = frames[t, 3:]
-        pose = forward(tree, q)
-        for side in range(2):
-            foot = feet[side]
-            for corner in range(corners.shape[1]):
-                z = pose.position[foot, 2]
-                for i in range(3):
-                    z += pose.rotation[foot, 2, i] * corners[side, corner, i]
-                out[t, side] = min(out[t, side], z)
-    return out
 
 
 def sole_centre(robot: Robot, q: FloatArray) -> FloatArray:

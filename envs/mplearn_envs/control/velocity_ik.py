@@ -39,11 +39,12 @@ class Stance(NamedTuple):
         limits: Their angles' limits, shape (n, 2) [rad].
         feet: Bodies of the feet, shape (2,).
         thighs: Bodies whose origins are the hips, shape (2,).
-        foot_position: Where the feet stand, shape (2, 3) [m].
-        foot_rotation: How they stand, shape (2, 3, 3).
+        foot_position: Where the feet shall be, shape (2, 3) [m].
+        foot_rotation: How they shall be turned, shape (2, 3, 3).
         reach: Longest distance from hip to ankle that the straight-knee guard allows, shape (2,)
             [m].
-        cog: Where the horizontal COG shall stay, shape (2,) [m].
+        cog: Where the horizontal COG shall be, shape (2,) [m].
+        carried: How far each foot moves with the base instead of standing, shape (2,), 0 to 1.
     """
 
     leg_joints: IntArray
@@ -55,6 +56,7 @@ class Stance(NamedTuple):
     foot_rotation: FloatArray
     reach: FloatArray
     cog: FloatArray
+    carried: FloatArray
 
 
 @njit(cache=True)
@@ -95,16 +97,18 @@ def solve_damped(jacobian: FloatArray, rows: FloatArray, damping: float) -> Floa
 def jacobian_rows(stance: Stance, pose: Pose) -> FloatArray:
     """Return the Jacobian of the rows over base twist and leg rates, shape (18, 6 + n).
 
-    The twist is the base origin's velocity [m/s] and the angular velocity [rad/s], world frame.
+    As far as a foot is carried by the base its target is, too, so that no error comes of it. The
+    twist is the base origin's velocity [m/s] and the angular velocity [rad/s], world frame.
     """
     n = stance.leg_joints.shape[0]
     out = np.zeros((N_ROWS, 6 + n))
     base = pose.position[0]
     for side in range(2):
-        arm = pose.position[stance.feet[side]] - base
+        stands = 1.0 - stance.carried[side]
+        arm = (pose.position[stance.feet[side]] - base) * stands
         for i in range(3):
-            out[6 * side + i, i] = 1.0
-            out[6 * side + 3 + i, 3 + i] = 1.0
+            out[6 * side + i, i] = stands
+            out[6 * side + 3 + i, 3 + i] = stands
         _minus_skew(out, 6 * side, arm)
     arm = pose.moment[0] / pose.carried[0] - base
     out[12, 0] = out[13, 1] = out[14, 2] = 1.0
@@ -154,6 +158,8 @@ def errors(stance: Stance, pose: Pose, height: float, orientation: FloatArray) -
         out[6 * side + 3 : 6 * side + 6] = rotation_error(
             stance.foot_rotation[side], pose.rotation[foot]
         )
+        if stance.carried[side] > 0.0:
+            continue
         span = pose.position[stance.thighs[side]] - stance.foot_position[side]
         flat = stance.reach[side] ** 2 - span[0] ** 2 - span[1] ** 2
         rise = min(rise, np.sqrt(max(flat, 1e-4)) - span[2])

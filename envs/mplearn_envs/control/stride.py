@@ -1,0 +1,188 @@
+"""Where feet, weight and base shall be at every knot of a plan."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mplearn.recording import FloatArray
+
+from .course import Course, shift_time_s
+from .footwork import Footwork
+from .kinematics import rotate_quaternion
+from .pendulum import plan_cog
+from .reference import Reference, ReferenceRobot
+
+SAME_PLACE_M = 0.07  # a foot that lands so near to where it stood lands there
+SAME_YAW_RAD = 0.2
+CARRY_M = 0.1  # from this height on a foot follows the motion of the leg alone
+RESTS_S = 0.4  # where the weight has so long to come to rest, it rests where it shall
+
+
+class Stride(NamedTuple):
+    """Targets at the K knots after the start.
+
+    Attributes:
+        ground: Where each foot stands or would: x, y [m] and yaw [rad], shape (K, 2, 3).
+        rise: Heights of the soles, shape (K, 2) [m].
+        carried: How far each foot follows its leg's motion instead, shape (K, 2), 0 to 1.
+        cog: Horizontal COG, shape (K, 2) [m].
+        zmp: Zero-moment points that it was planned for, shape (K, 2) [m].
+    """
+
+    ground: FloatArray
+    rise: FloatArray
+    carried: FloatArray
+    cog: FloatArray
+    zmp: FloatArray
+
+
+def plan_ground(course: Course, footwork: Footwork | None, start: FloatArray) -> FloatArray:
+    """Return where each foot stands or would, shape (K, 2, 3); see `Stride`.
+
+    Args:
+        course: The plan's times.
+        footwork: The motion's feet.
+        start: Where they stand at first, shape (2, 3).
+    """
+    out = np.empty((len(course.progress), 2, 3))
+    here, first = start.copy(), 0
+    for part, last in zip(course.stretches, course.ends, strict=True):
+        out[first:last] = here
+        if part.lands >= 0 and footwork is not None:
+            frame = min(part.lands, len(footwork.rise) - 1)
+            place = landing(here, part.up, footwork.left_from_right[frame])
+            x = ((np.arange(last - first) + 1.0) / (last - first))[:, None]
+            x = x * x * (3.0 - 2.0 * x)
+            out[first:last, part.up] = here[part.up] * (1.0 - x) + place * x
+            here[part.up] = place
+        first = last
+    return out
+
+
+def landing(ground: FloatArray, side: int, left_from_right: FloatArray) -> FloatArray:
+    """Return where a foot lands: x, y [m] and yaw [rad], shape (3,)."""
+    stands = ground[1 - side]
+    c, s = np.cos(stands[2]), np.sin(stands[2])
+    dx, dy, turn = left_from_right
+    if side == 1:  # the right foot in the left one's frame
+        ct, st = np.cos(turn), np.sin(turn)
+        dx, dy, turn = -(ct * dx + st * dy), -(ct * dy - st * dx), -turn
+    place = np.array([stands[0] + c * dx - s * dy, stands[1] + s * dx + c * dy, stands[2] + turn])
+    moved = place - ground[side]
+    moved[2] = np.arctan2(np.sin(moved[2]), np.cos(moved[2]))
+    if np.hypot(moved[0], moved[1]) < SAME_PLACE_M and abs(moved[2]) < SAME_YAW_RAD:
+        return ground[side].copy()
+    return np.asarray(ground[side] + moved)
+
+
+def sole_middles(robot: ReferenceRobot, ground: FloatArray) -> FloatArray:
+    """Return the middles of both soles, shape (..., 2, 2) [m], for feet at (..., 2, 3)."""
+    middle = robot.corners.mean(axis=1)[:, :2]
+    c, s = np.cos(ground[..., 2]), np.sin(ground[..., 2])
+    return np.stack(
+        (
+            ground[..., 0] + c * middle[:, 0] - s * middle[:, 1],
+            ground[..., 1] + s * middle[:, 0] + c * middle[:, 1],
+        ),
+        axis=-1,
+    )
+
+
+def sole_outlines(robot: ReferenceRobot, ground: FloatArray) -> FloatArray:
+    """Return the corners of both soles, shape (..., 2, 4, 2) [m], for feet at (..., 2, 3)."""
+    corners = robot.corners[..., :2]
+    c, s = np.cos(ground[..., 2])[..., None], np.sin(ground[..., 2])[..., None]
+    x, y = corners[..., 0], corners[..., 1]
+    place = ground[..., None, :2]
+    return np.asarray(place + np.stack((c * x - s * y, s * x + c * y), axis=-1))
+
+
+def recentred(q: FloatArray, ground: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a posture (7 + n,) and its feet (2, 3) seen from between the feet, x ahead."""
+    middle, yaw = ground[:, :2].mean(axis=0), float(ground[:, 2].mean())
+    if not (np.any(np.abs(middle) > 1e-9) or abs(yaw) > 1e-9):
+        return q, ground
+    c, s = np.cos(yaw), np.sin(yaw)
+    turn = np.array([[c, s], [-s, c]])
+    q, ground = q.copy(), ground.copy()
+    q[:2] = turn @ (q[:2] - middle)
+    q[3:7] = rotate_quaternion(q[3:7], np.array([0.0, 0.0, -yaw]))
+    ground[:, :2] = (ground[:, :2] - middle) @ turn.T
+    ground[:, 2] -= yaw
+    return q, ground
+
+
+def plan_weight(
+    course: Course, middles: FloatArray, start: FloatArray, height: float, knot_s: float
+) -> tuple[FloatArray, FloatArray]:
+    """Plan the COG so that the weight is over the foot that carries.
+
+    Args:
+        course: The plan's times.
+        middles: Middles of the soles, shape (K, 2, 2) [m].
+        start: Where the COG rests, shape (2,) [m].
+        height: Its height [m].
+        knot_s: Time between knots [s].
+
+    Returns:
+        COG and zero-moment points wanted, each of shape (K, 2) [m].
+    """
+    wanted = np.empty((len(middles), 2))
+    here, first, rests_s = start, 0, 0.0
+    for i, (part, last) in enumerate(zip(course.stretches, course.ends, strict=True)):
+        n = last - first
+        standing = middles[last - 1]
+        if part.up >= 0:
+            there = standing[1 - part.up]
+            begin, over = 0, 1
+        elif i + 1 < len(course.stretches):  # in the last moment, but not in less than it takes
+            there = standing[1 - course.stretches[i + 1].up]
+            over = min(n, round(shift_time_s(float(np.linalg.norm(there - here))) / knot_s))
+            begin = n - over
+        else:
+            there = standing.mean(axis=0)
+            over = min(n, round(shift_time_s(float(np.linalg.norm(there - here))) / knot_s))
+            begin = 0
+        x = np.clip((np.arange(n) + 1.0 - begin) / max(over, 1), 0.0, 1.0)[:, None]
+        wanted[first:last] = here * (1.0 - x) + there * x
+        still = np.linalg.norm(there - here) < 1e-9
+        rests_s = (rests_s + n * knot_s) if still else (n - begin - over) * knot_s
+        rests_s = np.inf if still and i == 0 else rests_s
+        here, first = there, last
+    if np.isinf(rests_s):
+        return np.broadcast_to(start, wanted.shape).copy(), wanted
+    path = plan_cog(np.vstack((start, wanted)), start, here, rests_s >= RESTS_S, height, knot_s)
+    return path[1:], wanted
+
+
+def plan_rise(
+    course: Course, rise: FloatArray, start: Reference, blended: FloatArray
+) -> FloatArray:
+    """Return the heights of the soles along a plan, shape (K, 2) [m].
+
+    Args:
+        course: The plan's times.
+        rise: Heights in the motion, shape (K, 2) [m].
+        start: Where the reference robot is.
+        blended: Heights when a foot stays up, blended with those at the start, shape (K, 2).
+    """
+    out, first = rise.copy(), 0
+    for i, (part, last) in enumerate(zip(course.stretches, course.ends, strict=True)):
+        side, here = part.up, slice(first, last)
+        if side < 0:
+            out[here] = 0.0
+        else:
+            out[here, 1 - side] = 0.0
+            x = ((np.arange(last - first) + 1.0) / (last - first)) ** 3
+            z = ((np.arange(last - first) + 1.0) / (last - first))[:, None][:, 0]
+            ramp = x * (10.0 - 15.0 * z + 6.0 * z * z)
+            if part.first == part.last and i == 0 and start.up[side] > 0:
+                out[here, side] = start.swing[side - 2] * (1.0 - ramp)
+            elif part.first == part.last:
+                out[here, side] = rise[last - 1, side] * ramp
+            elif i == 0 and start.up[side] > 0:
+                out[here, side] = blended[here, side]
+        first = last
+    return np.maximum(out, 0.0)
