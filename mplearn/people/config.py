@@ -1,0 +1,46 @@
+"""What makes motions of different people one primitive."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ..errors import InvalidValueError
+
+
+@dataclass(frozen=True)
+class PeopleConfig:
+    """Rules by which leaves of several people's trees become one primitive.
+
+    Distances are those between mean trajectories (`shapes`), in units of how far a person's own
+    primitives usually lie apart (`links.unit_of`): no label sets the scale, and neither does the
+    number of people.
+
+    Attributes:
+        posture: Weight of the mean posture beside the movement about it, in [0, 1].
+        scatter: That unit is at most this multiple of the distance at which executions usually lie
+            from their mean; it holds while few primitives are known, which lie far apart.
+        link: Two groups of leaves by different people are one primitive up to this tension
+            (`links.tension`), taken of the average distance over all pairs of leaves.
+        link_own: Two leaves of one person are one primitive only up to this distance.
+        join: A segment that is in none of its person's leaves joins another person's primitive up
+            to this tension.
+        reach: Distance up to which the next candidate counts in a tension.
+        offset_prior: Primitives that a person must share before half of his or her usual deviation
+            in posture is allowed for.
+    """
+
+    posture: float = 0.5
+    scatter: float = 4.0
+    link: float = 1.0
+    link_own: float = 0.3
+    join: float = 0.7
+    reach: float = 1.5
+    offset_prior: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("scatter", "link", "link_own", "join", "reach", "offset_prior"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise InvalidValueError(f"{name} must be positive, not {getattr(self, name)}")
+        if not 0 <= self.posture <= 1:
+            raise InvalidValueError(f"posture must lie in [0, 1], not {self.posture}")

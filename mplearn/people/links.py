@@ -1,0 +1,146 @@
+"""Which leaves of several people's trees are the same motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..recording import FloatArray, IntArray
+from .config import PeopleConfig
+from .shapes import Shape, distances
+
+_ROUNDS = 3  # links and people's offsets are found in turn
+
+
+def solve(
+    shapes: Shape, scatters: FloatArray, people: IntArray, n_people: int, config: PeopleConfig
+) -> tuple[IntArray, FloatArray, float]:
+    """Find the groups of leaves that are one primitive each.
+
+    Args:
+        shapes: Of all n leaves, stacked.
+        scatters: How far each leaf's executions usually lie from its shape, shape (n,).
+        people: Whose leaf each is, 0, 1, ..., shape (n,).
+        n_people: How many people there are.
+        config: The rules.
+
+    Returns:
+        The group of each leaf, shape (n,); each person's usual deviation in posture,
+        shape (n_people, D); the unit of distance, inf where no person has two leaves.
+    """
+    offsets = np.zeros((n_people, shapes.posture.shape[1]))
+    groups = np.arange(len(people))
+    unit = float("inf")
+    known = scatters[np.isfinite(scatters)]
+    usual = config.scatter * float(np.median(known)) if len(known) else float("inf")
+    for _ in range(_ROUNDS):
+        level = corrected(shapes, people, offsets)
+        matrix = distances(level, level, config.posture)
+        unit = min(unit_of(matrix, people), usual)
+        if not np.isfinite(unit):
+            break
+        before, groups = groups, agglomerate(matrix / unit, people, config)
+        if np.array_equal(before, groups):
+            break
+        offsets = offsets_of(shapes.posture, people, n_people, groups, config.offset_prior)
+    return groups, offsets, unit
+
+
+def corrected(shapes: Shape, people: IntArray, offsets: FloatArray) -> Shape:
+    """Return shapes less what their people's postures usually deviate by."""
+    return Shape(shapes.posture - offsets[people], shapes.movement)
+
+
+def unit_of(matrix: FloatArray, people: IntArray) -> float:
+    """Return the median distance from a leaf to the nearest other leaf of the same person."""
+    own = (people[:, None] == people) & ~np.eye(len(people), dtype=np.bool_)
+    nearest = np.where(own, matrix, np.inf).min(axis=1, initial=np.inf)
+    nearest = nearest[np.isfinite(nearest)]
+    return float(np.median(nearest)) if len(nearest) else float("inf")
+
+
+def tension(nearest: FloatArray, second: FloatArray, reach: float) -> FloatArray:
+    """Return how doubtful it is that a motion is its nearest neighbour.
+
+    Large motions differ more from person to person than small ones do, so nearness alone decides
+    nothing: it counts together with how much farther the next candidate is.
+
+    Args:
+        nearest: Distance to the nearest, in units.
+        second: Distance to the next.
+        reach: Distance up to which the next one counts: while few are known, it is far off.
+    """
+    return np.asarray(nearest**2 / np.clip(second, 1e-12, reach))
+
+
+def agglomerate(matrix: FloatArray, people: IntArray, config: PeopleConfig) -> IntArray:
+    """Join leaves by average link, the least doubtful first; of one person only what is very near.
+
+    Args:
+        matrix: Distances in units, shape (n, n).
+        people: Whose leaf each is, shape (n,).
+        config: The rules.
+
+    Returns:
+        The group of each leaf, named by its first one, shape (n,).
+    """
+    n = len(matrix)
+    groups = np.arange(n)
+    if n < 2:
+        return groups
+    itself = np.eye(n, dtype=np.bool_)
+    barred = ((people[:, None] == people) & (matrix > config.link_own)) | itself
+    total, sizes = matrix.copy(), np.ones(n)
+    np.fill_diagonal(total, 0.0)
+    mean = np.where(itself, np.inf, matrix)
+    while True:
+        two = np.partition(mean, 1, axis=1)[:, :2]
+        other = np.where(mean <= two[:, :1], two[:, 1:], two[:, :1])  # nearest but for the partner
+        doubt = tension(mean, np.minimum(other, other.T), config.reach)
+        doubt[barred] = np.inf
+        i, j = sorted(divmod(int(doubt.argmin()), n))
+        if not doubt[i, j] <= config.link:
+            return groups
+        total[i] += total[j]
+        total[:, i] += total[:, j]
+        sizes[i] += sizes[j]
+        barred[i] |= barred[j]
+        barred[:, i] = barred[i]
+        mean[i] = np.where(np.isinf(mean[j]), np.inf, total[i] / (sizes[i] * sizes))
+        mean[i, i] = np.inf
+        mean[:, i] = mean[i]
+        mean[j] = mean[:, j] = np.inf
+        barred[j] = barred[:, j] = True
+        groups[groups == j] = i
+
+
+def offsets_of(
+    postures: FloatArray, people: IntArray, n_people: int, groups: IntArray, prior: float
+) -> FloatArray:
+    """Return by how much each person's postures deviate from the others' in the same primitives.
+
+    Args:
+        postures: Mean posture of each leaf, shape (n, D).
+        people: Whose leaf each is, shape (n,).
+        n_people: How many people there are.
+        groups: The primitive of each leaf, shape (n,).
+        prior: Shared primitives for which half of it is believed.
+
+    Returns:
+        Shape (n_people, D); zero for a person who shares nothing.
+    """
+    offsets = np.zeros((n_people, postures.shape[1]))
+    shared = [
+        np.flatnonzero(groups == group)
+        for group in np.unique(groups)
+        if len(np.unique(people[groups == group])) > 1
+    ]
+    for _ in range(_ROUNDS):
+        sums, counts = np.zeros_like(offsets), np.zeros(n_people)
+        for leaves in shared:
+            level = postures[leaves] - offsets[people[leaves]]
+            mean = level.mean(axis=0)
+            for leaf in leaves:
+                sums[people[leaf]] += postures[leaf] - mean
+                counts[people[leaf]] += 1
+        offsets = sums / (counts + prior)[:, None]
+    return offsets

@@ -1,0 +1,199 @@
+"""The tree of several people: a tree a person, and primitives that their leaves share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..errors import InvalidValueError, UnknownPrimitiveError
+from ..hmm import LeftRightHMM
+from ..recording import FloatArray
+from ..tree import ROOT, Node, Placement, PrimitiveTree, Recogniser, TreeConfig
+from .common import common_model, common_recogniser
+from .config import PeopleConfig
+from .sharing import Sharing
+
+
+class PeopleTree:
+    """Groups segments of several people; a primitive is one node, with a leaf a person below it.
+
+    Each person has a tree as of a single person. A leaf that is born there is held against
+    everybody's leaves (`links`): it joins a primitive, or is one. A segment that is in none of its
+    person's leaves, as all of a newcomer's are, can join another person's primitive. As long as
+    there is one person, all is as in that person's tree.
+
+    Args:
+        config: The rules of each tree.
+        n_channels: Channels of a frame, D.
+        rate_hz: Frames per second [1/s].
+        groups: See `PrimitiveTree`.
+        people: What makes motions of different people one primitive.
+
+    Attributes:
+        n_seen: Segments seen, of all people.
+    """
+
+    def __init__(
+        self,
+        config: TreeConfig,
+        n_channels: int,
+        rate_hz: float,
+        groups: Sequence[int] | None = None,
+        people: PeopleConfig | None = None,
+    ) -> None:
+        self.config = config
+        self.n_channels = n_channels
+        self.rate_hz = rate_hz
+        self.groups = groups
+        self.people_config = people or PeopleConfig()
+        self.n_seen = 0
+        self._trees: dict[int, PrimitiveTree] = {0: self._new_tree()}
+        self._next_id = ROOT + 1
+        self._sharing: Sharing | None = None
+
+    def _new_tree(self) -> PrimitiveTree:
+        return PrimitiveTree(self.config, self.n_channels, self.rate_hz, self.groups)
+
+    # ---- looking
+
+    @property
+    def people(self) -> tuple[int, ...]:
+        """Numbers of the people whose motions were seen, in the order of their coming."""
+        return tuple(self._trees)
+
+    def of(self, person: int) -> PrimitiveTree:
+        """Return a person's own tree, whose ids are its own.
+
+        Raises:
+            InvalidValueError: Nothing was seen of this person.
+        """
+        if person not in self._trees:
+            raise InvalidValueError(f"no person {person}; known are {list(self._trees)}")
+        return self._trees[person]
+
+    @property
+    def leaves(self) -> tuple[int, ...]:
+        """Ids of the primitives, in the order of their birth."""
+        return self._only.leaves if self._sharing is None else self._sharing.primitives
+
+    @property
+    def nodes(self) -> tuple[Node, ...]:
+        """All nodes, the root first: primitives, and below them a leaf for each person."""
+        return self._only.nodes if self._sharing is None else self._sharing.nodes
+
+    def node(self, id: int) -> Node:
+        """Return a node.
+
+        Raises:
+            UnknownPrimitiveError: There is none of this id.
+        """
+        if self._sharing is None:
+            return self._only.node(id)
+        for node in self._sharing.nodes:
+            if node.id == id:
+                return node
+        raise UnknownPrimitiveError(
+            f"no node {id} in the tree; it holds {[node.id for node in self._sharing.nodes]}"
+        )
+
+    def radius(self, id: int) -> float:
+        """Return the radius of a node below the root: of a primitive, its widest leaf's."""
+        if self._sharing is None:
+            return self._only.radius(id)
+        return max(self._trees[p].radius(leaf) for p, leaf in self._leaves_of(id))
+
+    def exemplars(self, id: int) -> tuple[FloatArray, ...]:
+        """Return the kept segments of a node as they came, shape (L, D) each."""
+        if self._sharing is None:
+            return self._only.exemplars(id)
+        return tuple(
+            frames for p, leaf in self._leaves_of(id) for frames in self._trees[p].exemplars(leaf)
+        )
+
+    def model(self, id: int) -> LeftRightHMM:
+        """Return a node's group model: fitted to its exemplars as they came, at their rate."""
+        if self._sharing is None:
+            return self._only.model(id)
+        leaves = self._leaves_of(id)
+        if len(leaves) == 1:
+            person, leaf = leaves[0]
+            return self._trees[person].model(leaf)
+        return common_model([self._trees[p].model(leaf) for p, leaf in leaves], self.exemplars(id))
+
+    def recogniser(self) -> Recogniser:
+        """Return what would be recognised now, whoever moves, frozen."""
+        if self._sharing is None:
+            return self._only.recogniser()
+        return common_recogniser(
+            self._trees, {id: self._leaves_of(id) for id in self._sharing.primitives}
+        )
+
+    # ---- learning
+
+    def insert(self, frames: FloatArray, person: int = 0) -> Placement:
+        """Place a segment, shape (L, D), and let the trees grow.
+
+        Args:
+            frames: The segment.
+            person: Who moves.
+
+        Returns:
+            As `PrimitiveTree.insert`, of primitives; its distance is that to the nearest of the
+            person's own leaves, its ratio the smaller of that leaf's and that of the nearest of
+            the other people's primitives.
+
+        Raises:
+            FrameError: The frames have another width, or hold infinite values.
+        """
+        if self.n_seen == 0:
+            self._trees = {person: next(iter(self._trees.values()))}
+        elif person not in self._trees:
+            if self._sharing is None:
+                self._sharing = Sharing(self.config, self.people_config, self._trees, self._next_id)
+            self._trees[person] = self._new_tree()
+        placement = self._trees[person].insert(frames)
+        if placement.refused:
+            return placement
+        self.n_seen += 1
+        if self._sharing is None:
+            self._next_id = max((self._next_id, *(id + 1 for id in placement.born)))
+            return placement
+        return self._sharing.follow(person, placement, frames)
+
+    # ---- keeping
+
+    def state(self) -> dict[str, Any]:
+        """Return all of the state, plain values and arrays: `load_state` resumes bit for bit."""
+        return {
+            "n_seen": self.n_seen,
+            "next_id": self._next_id,
+            "trees": [[person, tree.state()] for person, tree in self._trees.items()],
+            "sharing": None if self._sharing is None else self._sharing.state(),
+        }
+
+    def load_state(self, state: dict[str, Any]) -> None:
+        """Resume from what `state` returned, under the same configuration."""
+        self.n_seen = int(state["n_seen"])
+        self._next_id = int(state["next_id"])
+        self._trees = {}
+        for person, kept in state["trees"]:
+            self._trees[int(person)] = self._new_tree()
+            self._trees[int(person)].load_state(kept)
+        self._sharing = None
+        if state["sharing"] is not None:
+            self._sharing = Sharing(self.config, self.people_config, self._trees, self._next_id)
+            self._sharing.load_state(state["sharing"])
+
+    # ---- inside
+
+    @property
+    def _only(self) -> PrimitiveTree:
+        return next(iter(self._trees.values()))
+
+    def _leaves_of(self, id: int) -> list[tuple[int, int]]:
+        """Return the leaves of a primitive, or that one leaf, as person and id in its tree."""
+        assert self._sharing is not None
+        found = self._sharing.leaves_of(id)
+        if not found:
+            raise UnknownPrimitiveError(f"no primitive {id}; known are {list(self.leaves)}")
+        return found

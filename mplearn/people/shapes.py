@@ -1,0 +1,68 @@
+"""The shape of a motion: what is compared across people.
+
+A shape is a mean trajectory of a fixed number of points: the mean posture, and the movement about
+it. The channels are those of the learner's view: positions of the parts of one standard body and
+its joint angles, so a person's size and place have fallen away already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from ..recording import FloatArray
+from ..tree import FormConfig, form
+
+
+class Shape(NamedTuple):
+    """A mean trajectory, or many, stacked.
+
+    Attributes:
+        posture: Mean over the time, shape (D,).
+        movement: Deviation from it, weighted, shape (P * D,).
+    """
+
+    posture: FloatArray
+    movement: FloatArray
+
+
+def shape_of(exemplars: Iterable[FloatArray], config: FormConfig) -> Shape:
+    """Return the shape of one motion's executions.
+
+    Args:
+        exemplars: Segments, shape (L, D) each; NaN counts for nothing.
+        config: The form in which segments are compared.
+    """
+    points = np.array([form.points_of(frames, config) for frames in exemplars])
+    seen = ~np.isnan(points)
+    mean = np.where(seen, points, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
+    weights = form.weights(config)
+    weights = weights / weights.sum()
+    posture = weights @ mean
+    return Shape(posture, (np.sqrt(weights)[:, None] * (mean - posture)).ravel())
+
+
+def scatter_of(exemplars: Iterable[FloatArray], config: FormConfig, posture: float) -> float:
+    """Return the usual distance of executions from their mean trajectory, root mean square.
+
+    NaN where there is only one.
+    """
+    each = [shape_of([frames], config) for frames in exemplars]
+    if len(each) < 2:
+        return float("nan")
+    postures, movements = (np.array(part) for part in zip(*each, strict=True))
+    variance = posture * postures.var(axis=0, ddof=1).sum() + movements.var(axis=0, ddof=1).sum()
+    return float(np.sqrt(variance))
+
+
+def squares(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the squared distances between rows, shape (n, D) and (m, D) to (n, m)."""
+    lengths = np.einsum("nd,nd->n", a, a)[:, None] + np.einsum("md,md->m", b, b)
+    return np.asarray(np.maximum(lengths - 2 * a @ b.T, 0.0))
+
+
+def distances(a: Shape, b: Shape, posture: float) -> FloatArray:
+    """Return the distances between stacked shapes, (n, ...) and (m, ...) to (n, m)."""
+    return np.sqrt(posture * squares(a.posture, b.posture) + squares(a.movement, b.movement))

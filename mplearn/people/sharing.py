@@ -1,0 +1,424 @@
+"""The primitives that people share: which leaves they are made of, and what becomes of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..recording import FloatArray, IntArray
+from ..tree import ROOT, Merge, Node, Placement, PrimitiveTree, Split, TreeConfig
+from .config import PeopleConfig
+from .links import corrected, solve, tension
+from .shapes import Shape, distances, scatter_of, shape_of
+
+
+@dataclass
+class Leaf:
+    """A leaf of a person's tree, and the primitive that it belongs to.
+
+    Attributes:
+        person: Whose it is.
+        local: Its id in that person's tree.
+        id: Its id among all nodes; that of its primitive, as long as it was never joined by others.
+        primitive: Id of the primitive; `ROOT` before it is known.
+        founded: Id of the primitive that was born with this leaf; `ROOT` if none was.
+        shape: Its mean trajectory.
+        scatter: How far its executions usually lie from that.
+    """
+
+    person: int
+    local: int
+    id: int
+    primitive: int
+    founded: int
+    shape: Shape
+    scatter: float
+
+
+class Sharing:
+    """Follows the trees of several people, and keeps the primitives that their leaves make up.
+
+    Which leaves are one primitive is solved again whenever a leaf comes or goes; a primitive keeps
+    its id for life: it stays with the leaf that it was born with, or else with most of its
+    executions.
+
+    Args:
+        config: Rules of the trees.
+        rules: What makes motions of different people one primitive.
+        trees: Each person's tree; one for now, others may be added by the owner.
+        next_id: First id that was never used.
+    """
+
+    def __init__(
+        self,
+        config: TreeConfig,
+        rules: PeopleConfig,
+        trees: dict[int, PrimitiveTree],
+        next_id: int,
+    ) -> None:
+        self.config = config
+        self.rules = rules
+        self.leaves: list[Leaf] = []
+        self._trees = trees
+        self._next_id = next_id
+        self._n_seen = 0
+        self._numbers: dict[int, dict[int, int]] = {}  # person -> number in the tree -> here
+        self._above: dict[int, Node] = {}  # nodes above primitives: what was split
+        self._parents: dict[int, int] = {}
+        self._joined: dict[int, int] = {}  # segments that wait in their tree's root: primitive
+        self._offsets: dict[int, FloatArray] = {}
+        self._unit = float("inf")
+        for person, tree in trees.items():
+            self._n_seen = tree.n_seen
+            self._numbers[person] = {n: n for node in tree.nodes for n in node.members}
+            for node in tree.nodes:
+                if node.id == ROOT:
+                    continue
+                self._parents[node.id] = node.parent or ROOT
+                if node.is_leaf:
+                    seen = self._seen(tree, node.id)
+                    self.leaves.append(Leaf(person, node.id, node.id, node.id, node.id, *seen))
+                else:
+                    self._above[node.id] = node
+        if self.leaves:
+            _, _, self._unit = self._solved()
+
+    # ---- looking
+
+    @property
+    def primitives(self) -> tuple[int, ...]:
+        """Ids of the primitives, in the order of their birth."""
+        return tuple(sorted({leaf.primitive for leaf in self.leaves}))
+
+    def leaves_of(self, id: int) -> list[tuple[int, int]]:
+        """Return the leaves of a primitive, or that one leaf, as person and id in its tree."""
+        return [
+            (leaf.person, leaf.local) for leaf in self.leaves if id in (leaf.id, leaf.primitive)
+        ]
+
+    @property
+    def nodes(self) -> tuple[Node, ...]:
+        """All nodes, by id: the root, what was split, primitives, and leaves below those."""
+        nodes = {ROOT: Node(ROOT, None, 0)}
+        for id, node in self._above.items():
+            nodes[id] = Node(id, self._parents[id], node.born_at, history=list(node.history))
+        for id in self.primitives:
+            nodes[id] = Node(id, self._parents[id], self._n_seen)
+        for person, tree in self._trees.items():
+            waiting = tree.node(ROOT)
+            nodes[ROOT].members += [self._numbers[person][n] for n in waiting.members]
+            nodes[ROOT].n_placed += waiting.n_placed
+            nodes[ROOT].n_frames += waiting.n_frames
+        for leaf in self.leaves:
+            own = self._trees[leaf.person].node(leaf.local)
+            numbers = [self._numbers[leaf.person][n] for n in own.members]
+            node = nodes[leaf.primitive]
+            node.members += numbers
+            node.n_placed += own.n_placed
+            node.n_frames += own.n_frames
+            node.born_at = min(node.born_at, own.born_at)
+            if leaf.id != leaf.primitive:
+                nodes[leaf.id] = Node(
+                    leaf.id,
+                    leaf.primitive,
+                    own.born_at,
+                    numbers,
+                    own.matrix,
+                    own.n_placed,
+                    own.n_frames,
+                    history=list(own.history),
+                )
+        for node in nodes.values():
+            if node.parent is not None:
+                nodes[node.parent].children.append(node.id)
+        return tuple(nodes[id] for id in sorted(nodes))
+
+    # ---- learning
+
+    def follow(self, person: int, placement: Placement, frames: FloatArray) -> Placement:
+        """Take note of what a person's tree did with a segment; return what it means for all."""
+        tree = self._trees[person]
+        number = self._n_seen
+        self._n_seen += 1
+        numbers = self._numbers.setdefault(person, {})
+        numbers[placement.number] = number
+        shape = shape_of([frames], self.config.form)
+        joined, ratio = (ROOT, np.inf)
+        if not placement.recognised:
+            joined, ratio = self._nearest(person, shape)
+            if joined != ROOT:
+                self._joined[number] = joined
+        before = {(leaf.person, leaf.local): leaf.primitive for leaf in self.leaves}
+        said = joined
+        if placement.recognised:
+            said = before.get((person, _recognised_as(placement)), ROOT)
+        changed = self._take_up(person, tree, placement)
+        born, splits, merges, moved = self._solve(before, person, placement) if changed else _NONE
+        self._tidy(person, tree)
+        home = self._home(person, placement.node_id, number)
+        return Placement(
+            number,
+            home if home != ROOT else said,
+            said != ROOT,
+            placement.distance,
+            min(placement.ratio, ratio),
+            born,
+            splits,
+            merges,
+            tuple(move for move in moved if move[0] != number),
+        )
+
+    def _nearest(self, person: int, shape: Shape) -> tuple[int, float]:
+        """Return the primitive that a segment joins, or `ROOT`; and how far out it lies."""
+        if not np.isfinite(self._unit):
+            return ROOT, float("inf")
+        ids, matrix = self._to_primitives(person, shape)
+        at = int(matrix.argmin())
+        nearest = matrix[at] / self._unit
+        second = np.delete(matrix, at).min(initial=np.inf) / self._unit
+        ratio = float(tension(nearest, second, self.rules.reach)) / self.rules.join
+        return (ids[at], ratio) if ratio <= 1 else (ROOT, ratio)
+
+    def _to_primitives(self, person: int, shape: Shape) -> tuple[list[int], FloatArray]:
+        """Return the distance from a shape to each primitive, averaged over its leaves."""
+        own = Shape((shape.posture - self._offset(person))[None], shape.movement[None])
+        row = distances(own, self._corrected(), self.rules.posture)[0]
+        ids, place = np.unique([leaf.primitive for leaf in self.leaves], return_inverse=True)
+        mean = np.bincount(place, row) / np.bincount(place)
+        return [int(id) for id in ids], mean
+
+    def _take_up(self, person: int, tree: PrimitiveTree, placement: Placement) -> bool:
+        """Bring a person's leaves up to date; say whether any came or went."""
+        known = {leaf.local for leaf in self.leaves if leaf.person == person}
+        now = set(tree.leaves)
+        touched = {placement.node_id, *(node for _, node in placement.moved)}
+        self.leaves = [leaf for leaf in self.leaves if leaf.person != person or leaf.local in now]
+        for leaf in self.leaves:
+            if leaf.person == person and leaf.local in touched:
+                leaf.shape, leaf.scatter = self._seen(tree, leaf.local)
+        for local in sorted(now - known):
+            self.leaves.append(Leaf(person, local, ROOT, ROOT, ROOT, *self._seen(tree, local)))
+        return now != known
+
+    def _solve(
+        self, before: Mapping[tuple[int, int], int], person: int, placement: Placement
+    ) -> tuple[tuple[int, ...], tuple[Split, ...], tuple[Merge, ...], tuple[tuple[int, int], ...]]:
+        """Find again which leaves are one primitive, and say what changed by it."""
+        groups, offsets, self._unit = self._solved()
+        self._offsets = dict(zip(self._trees, offsets, strict=True))
+        held = self._held(groups, before)
+        ids = _identities(held)
+        born, merges, splits = [], [], []
+        for group in dict.fromkeys(groups.tolist()):
+            if group not in ids:
+                ids[group] = self._next_id
+                self._next_id += 1
+                born.append(ids[group])
+                self.leaves[group].founded = ids[group]
+                self._parents[ids[group]] = ROOT
+        gone = set(before.values()) - set(ids.values())
+        for id in sorted(gone):
+            heirs = Counter({g: counts[id] for g, counts in held.items() if counts[id]})
+            into = self._split_into(id, before, person, placement, groups, ids)
+            if into:
+                splits.append(Split(id, into))
+                self._above[id] = Node(id, None, self._n_seen, history=[("split", self._n_seen)])
+                for child in into:
+                    if child in born:
+                        self._parents[child] = id
+            elif heirs:
+                merges.append(Merge(ids[heirs.most_common(1)[0][0]], id))
+        moved: list[tuple[int, int]] = []
+        absorbed = {merge.absorbed: merge.kept for merge in merges}
+        for leaf, group in zip(self.leaves, groups.tolist(), strict=True):
+            old = before.get((leaf.person, leaf.local), ROOT)
+            leaf.primitive = ids[group]
+            if absorbed.get(old, old) != leaf.primitive:
+                members = self._trees[leaf.person].node(leaf.local).members
+                moved += [(self._numbers[leaf.person][n], leaf.primitive) for n in members]
+        self._joined = {
+            number: absorbed.get(id, id)
+            for number, id in self._joined.items()
+            if absorbed.get(id, id) not in gone
+        }
+        self._name_leaves()
+        return tuple(born), tuple(splits), tuple(merges), tuple(moved)
+
+    def _held(
+        self, groups: IntArray, before: Mapping[tuple[int, int], int]
+    ) -> dict[int, Counter[int]]:
+        """Return how many executions of each old primitive are in each group of leaves.
+
+        The group of the leaf that a primitive was born with counts for as many as all others.
+        """
+        held: dict[int, Counter[int]] = {}
+        founders: dict[int, int] = {}
+        for leaf, group in zip(self.leaves, groups.tolist(), strict=True):
+            counts = held.setdefault(group, Counter())
+            node = self._trees[leaf.person].node(leaf.local)
+            old = before.get((leaf.person, leaf.local))
+            if old is not None:
+                counts[old] += node.n_placed
+                if leaf.founded == old:
+                    founders[old] = group
+                continue
+            for n in node.members:
+                joined = self._joined.get(self._numbers[leaf.person][n])
+                if joined is not None:
+                    counts[joined] += 1
+        for old, group in founders.items():
+            held[group][old] += sum(counts[old] for counts in held.values())
+        return held
+
+    def _split_into(
+        self,
+        id: int,
+        before: Mapping[tuple[int, int], int],
+        person: int,
+        placement: Placement,
+        groups: IntArray,
+        ids: Mapping[int, int],
+    ) -> tuple[int, ...]:
+        """Return what a primitive was split into by its only person's tree; empty if it was not."""
+        for split in placement.splits:
+            if before.get((person, split.node)) == id:
+                return tuple(
+                    ids[group]
+                    for leaf, group in zip(self.leaves, groups.tolist(), strict=True)
+                    if leaf.person == person and leaf.local in split.into
+                )
+        return ()
+
+    def _name_leaves(self) -> None:
+        """Give a leaf an id of its own as soon as it shares its primitive."""
+        sizes = Counter(leaf.primitive for leaf in self.leaves)
+        for leaf in self.leaves:
+            alone = sizes[leaf.primitive] == 1 and leaf.id in (ROOT, leaf.primitive)
+            if alone:
+                leaf.id = leaf.primitive
+            elif leaf.id in (ROOT, leaf.primitive) or leaf.id in sizes:
+                leaf.id = self._next_id
+                self._next_id += 1
+
+    # ---- keeping
+
+    def state(self) -> dict[str, Any]:
+        """Return everything as plain values and arrays."""
+        return {
+            "next_id": self._next_id,
+            "n_seen": self._n_seen,
+            "unit": self._unit,
+            "leaves": [
+                [
+                    leaf.person,
+                    leaf.local,
+                    leaf.id,
+                    leaf.primitive,
+                    leaf.founded,
+                    leaf.scatter,
+                    *leaf.shape,
+                ]
+                for leaf in self.leaves
+            ],
+            "numbers": [
+                [person, [list(pair) for pair in numbers.items()]]
+                for person, numbers in self._numbers.items()
+            ],
+            "above": [node.state() for node in self._above.values()],
+            "parents": [list(pair) for pair in self._parents.items()],
+            "joined": [list(pair) for pair in self._joined.items()],
+            "offsets": [[person, offset] for person, offset in self._offsets.items()],
+        }
+
+    def load_state(self, state: dict[str, Any]) -> None:
+        """Resume from what `state` returned, with the same trees."""
+        self._next_id, self._n_seen = int(state["next_id"]), int(state["n_seen"])
+        self._unit = float(state["unit"])
+        self.leaves = [
+            Leaf(
+                int(person),
+                int(local),
+                int(id),
+                int(primitive),
+                int(founded),
+                Shape(np.array(posture), np.array(movement)),
+                float(scatter),
+            )
+            for person, local, id, primitive, founded, scatter, posture, movement in state["leaves"]
+        ]
+        self._numbers = {
+            int(person): {int(there): int(here) for there, here in pairs}
+            for person, pairs in state["numbers"]
+        }
+        above = [Node.from_state(node) for node in state["above"]]
+        self._above = {node.id: node for node in above}
+        self._parents = {int(id): int(parent) for id, parent in state["parents"]}
+        self._joined = {int(number): int(id) for number, id in state["joined"]}
+        self._offsets = {int(person): np.array(offset) for person, offset in state["offsets"]}
+
+    # ---- inside
+
+    def _solved(self) -> tuple[IntArray, FloatArray, float]:
+        scatters = np.array([leaf.scatter for leaf in self.leaves])
+        return solve(self._stacked(), scatters, self._whose(), len(self._trees), self.rules)
+
+    def _seen(self, tree: PrimitiveTree, leaf: int) -> tuple[Shape, float]:
+        exemplars = tree.exemplars(leaf)
+        form = self.config.form
+        return shape_of(exemplars, form), scatter_of(exemplars, form, self.rules.posture)
+
+    def _home(self, person: int, node: int, number: int) -> int:
+        for leaf in self.leaves:
+            if (leaf.person, leaf.local) == (person, node):
+                return leaf.primitive
+        return self._joined.get(number, ROOT)
+
+    def _offset(self, person: int) -> FloatArray:
+        known = self._offsets.get(person)
+        return np.zeros(self.leaves[0].shape.posture.shape) if known is None else known
+
+    def _stacked(self) -> Shape:
+        return Shape(
+            *(np.array(part) for part in zip(*(leaf.shape for leaf in self.leaves), strict=True))
+        )
+
+    def _corrected(self) -> Shape:
+        offsets = np.array([self._offset(person) for person in self._trees])
+        return corrected(self._stacked(), self._whose(), offsets)
+
+    def _whose(self) -> IntArray:
+        places = {person: place for place, person in enumerate(self._trees)}
+        return np.array([places[leaf.person] for leaf in self.leaves], dtype=np.int64)
+
+    def _tidy(self, person: int, tree: PrimitiveTree) -> None:
+        """Forget the numbers of segments that the tree has forgotten."""
+        numbers = self._numbers[person]
+        held = {n for node in tree.nodes for n in node.members}
+        if len(numbers) > 2 * len(held) + 100:
+            for n in numbers.keys() - held:
+                self._joined.pop(numbers.pop(n), None)
+
+
+_NONE: tuple[tuple[()], tuple[()], tuple[()], tuple[()]] = ((), (), (), ())
+
+
+def _identities(held: Mapping[int, Counter[int]]) -> dict[int, int]:
+    """Return which group keeps the id of which primitive: most executions first."""
+    pairs = [(-count, id, group) for group, ids in held.items() for id, count in ids.items()]
+    kept: dict[int, int] = {}
+    for _, id, group in sorted(pairs):
+        if group not in kept and id not in kept.values():
+            kept[group] = id
+    return kept
+
+
+def _recognised_as(placement: Placement) -> int:
+    """Return the leaf that a segment was recognised as, which it may have split or merged."""
+    for split in placement.splits:
+        if placement.node_id in split.into:
+            return split.node
+    return placement.node_id
