@@ -1,6 +1,23 @@
 """Walks on the primitive graph: a policy chooses, the robot performs.
 
-As a program: ``python -m mplearn_agents.walk --policy random --steps 20 --video walk.mp4``.
+As a program: ``python -m mplearn_agents.walk --policy random --steps 20 --video walk.mp4``, or
+``--task goal --policy search --episodes 5``. What it does, to copy and to change::
+
+    import gymnasium as gym
+    import mplearn_envs
+    from mplearn_agents.policies import POLICIES
+
+    env = gym.make("mplearn/PrimitiveHumanoid-v0", task="goal")
+    policy = POLICIES["search"](env)
+    for episode in range(5):
+        policy.reset(seed=episode)
+        observation, info = env.reset(seed=episode)
+        over = False
+        while not over:
+            action = policy.act(observation, info)
+            observation, reward, terminated, truncated, info = env.step(action)
+            over = terminated or truncated
+        print("reached" if info["is_success"] else "not reached")
 """
 
 from __future__ import annotations
@@ -58,12 +75,16 @@ class WalkResult:
         postures: The robot's qpos at each moment recorded, shape (F, nq); F = 0 where nothing was.
         step_of: Step to which each posture belongs, shape (F,).
         rate_hz: Recorded postures per second [1/s].
+        episodes: How many episodes came to their end.
+        successes: In how many of them the task was solved; None if it does not say.
     """
 
     steps: tuple[WalkStep, ...]
     postures: FloatArray
     step_of: IntArray
     rate_hz: float
+    episodes: int = 0
+    successes: int | None = None
 
     @property
     def primitives(self) -> tuple[int, ...]:
@@ -87,11 +108,12 @@ def walk(
     steps: int,
     seed: int | None = None,
     *,
+    episodes: int | None = None,
     record: bool = False,
 ) -> WalkResult:
-    """Let a policy walk until it has performed a number of primitives.
+    """Let a policy walk until it has performed a number of primitives, or episodes.
 
-    After a fall, or where the environment cuts the episode, it starts again from standing. Holding
+    After a fall, or where the task or the environment ends the episode, it starts again. Holding
     does not count; a policy that holds in nine of ten steps is stopped at ten times the steps.
 
     Args:
@@ -99,14 +121,17 @@ def walk(
         policy: Who chooses.
         steps: How many primitives to perform.
         seed: Seed of the environment and the policy.
+        episodes: How many episodes to play to their end, whatever ``steps`` is.
         record: Whether to keep the robot's postures, as often as the environment's
             ``frame_rate_hz``, so that a film can be made.
 
     Raises:
-        InvalidValueError: ``steps`` is less than 1.
+        InvalidValueError: ``steps`` or ``episodes`` is less than 1.
     """
     if steps < 1:
         raise InvalidValueError(f"a walk has at least 1 step, not {steps}")
+    if episodes is not None and episodes < 1:
+        raise InvalidValueError(f"a walk has at least 1 episode, not {episodes}")
     base: Any = env.unwrapped
     done: list[WalkStep] = []
     postures: list[FloatArray] = []
@@ -120,10 +145,17 @@ def walk(
         base.frame_callback = keep
     policy.reset(seed)
     observation, info = env.reset(seed=seed)
-    performed = 0
-    while performed < steps and len(done) < 10 * steps:
+    performed = n_ended = 0
+    outcomes: list[bool] = []
+
+    def goes_on() -> bool:
+        if episodes is not None:
+            return n_ended < episodes
+        return performed < steps and len(done) < 10 * steps
+
+    while goes_on():
         action = policy.act(observation, info)
-        observation, reward, fallen, truncated, info = env.step(action)
+        observation, reward, terminated, truncated, info = env.step(action)
         held = action == HOLD or info["illegal"]
         done.append(
             WalkStep(
@@ -133,14 +165,17 @@ def walk(
                 duration_s=info["duration_s"],
                 reward=float(reward),
                 illegal=info["illegal"],
-                fallen=bool(fallen),
+                fallen=bool(info["fallen"]),
                 tracking_rmse_rad=info["tracking_rmse_rad"],
                 cog_deviation_m=info["cog_deviation_m"],
                 zmp_margin_m=info["zmp_margin_m"],
             )
         )
         performed += not held
-        if fallen or truncated:
+        if terminated or truncated:
+            n_ended += 1
+            if "is_success" in info:
+                outcomes.append(bool(info["is_success"]))
             observation, info = env.reset()
     if record:
         base.frame_callback = None
@@ -149,6 +184,8 @@ def walk(
         postures=np.array(postures),
         step_of=np.array(step_of, dtype=np.int64),
         rate_hz=float(base.frame_rate_hz) if record else 0.0,
+        episodes=n_ended,
+        successes=sum(outcomes) if len(outcomes) == n_ended else None,
     )
 
 

@@ -11,7 +11,7 @@ import mplearn_envs  # noqa: F401  (registers the environment)
 from mplearn.evaluation import Table
 from mplearn.library import PrimitiveLibrary
 
-from .policies import POLICIES
+from .policies import RandomWalk
 from .walk import WalkResult, walk
 
 STEPS = 20
@@ -48,8 +48,7 @@ def walk_table(
         feasible = sum(repertoire.feasibility(id).feasible for id in library.ids)
         known = f"{feasible} of {len(library)}"
         rows += [
-            _row((name, str(seed), known), walk(env, POLICIES["random"](), steps, seed))
-            for seed in seeds
+            _row((name, str(seed), known), walk(env, RandomWalk(), steps, seed)) for seed in seeds
         ]
         env.close()
     return Table(

@@ -48,14 +48,14 @@ def test_uniform_draws_evenly_among_legal_actions():
     assert chisquare(counts[[0, 1, 3, 4]]).pvalue > 1e-3
 
 
-@pytest.mark.parametrize("name", POLICIES)
+@pytest.mark.parametrize("name", ["random", "uniform", "greedy"])
 @settings(max_examples=60, deadline=None)
 @given(
     weights=st.lists(st.integers(0, 5), min_size=1, max_size=12).filter(any),
     seed=st.integers(0, 99),
 )
 def test_no_policy_ever_takes_an_illegal_action(name, weights, seed):
-    policy, info = POLICIES[name](), make_info(weights)
+    policy, info = POLICIES[name](None), make_info(weights)
     policy.reset(seed)
     actions = [policy.act(None, info) for _ in range(5)]
     assert all(info["action_mask"][action] for action in actions)

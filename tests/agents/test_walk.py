@@ -25,12 +25,13 @@ class Ring(gymnasium.Env):
     def step(self, action):
         info = {
             "illegal": False, "duration_s": 0.5, "tracking_rmse_rad": 0.01,
-            "cog_deviation_m": 0.002, "zmp_margin_m": 0.05,
+            "cog_deviation_m": 0.002, "zmp_margin_m": 0.05, "fallen": False,
         }  # fmt: skip
         if action == 0 or not self._info()["action_mask"][action]:
             return self.at, 0.0, False, False, self._info() | info | {"illegal": action != 0}
         self.at = action
-        return action, 1.0, action == 3, False, self._info() | info | {"duration_s": 2.0}
+        info |= {"duration_s": 2.0, "fallen": action == 3}
+        return action, 1.0, action == 3, False, self._info() | info
 
     def _info(self):
         mask, prior = np.zeros(5, np.int8), np.zeros(5)

@@ -1,13 +1,19 @@
-"""``mplearn perform``: the robot walks the graph of a library."""
+"""``mplearn perform``: the robot walks the graph of a library, or does a task."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import InvalidValueError, MissingDependencyError
 
-HELP = "Let the robot walk the graph of a library."
+if TYPE_CHECKING:
+    import gymnasium
+
+    from mplearn_agents.policies import Policy
+
+HELP = "Let the robot walk the graph of a library, or do a task."
 _GOAL = "path"
 
 
@@ -18,11 +24,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "library", type=Path, nargs="?", help="library file (default: the built-in one)"
     )
-    parser.add_argument(
+    who = parser.add_mutually_exclusive_group()
+    who.add_argument(
         "--policy", choices=[*POLICIES, _GOAL], default="random", help="who chooses what comes next"
     )
+    who.add_argument("--agent", type=Path, metavar="FOLDER", help="an agent of `mplearn train`")
     parser.add_argument("--goal", help=f"id or name of the primitive that --policy {_GOAL} goes to")
+    parser.add_argument("--task", help="task (default: the agent's, or free)")
+    parser.add_argument(
+        "--dynamics", choices=["simulated", "kinematic"], default="simulated", help="how it moves"
+    )
     parser.add_argument("--steps", type=int, default=20, help="how many primitives (default: 20)")
+    parser.add_argument("--episodes", type=int, help="how many episodes, instead of --steps")
     parser.add_argument("--seed", type=int, default=0, help="seed of the walk (default: 0)")
     parser.add_argument(
         "--speed", type=float, default=0.5, help="share of the human's speed (default: 0.5)"
@@ -47,27 +60,32 @@ def run(args: argparse.Namespace) -> None:
     import gymnasium
 
     import mplearn_envs  # noqa: F401  (registers the environment)
-    from mplearn_agents.policies import POLICIES, PathToGoal
+    from mplearn_agents.rl import TrainingConfig
+    from mplearn_agents.rl.trained import CONFIG
     from mplearn_agents.walk import walk
 
+    trained = TrainingConfig(task="free")
+    if args.agent is not None:
+        trained, _ = TrainingConfig.load(args.agent / CONFIG)
     env = gymnasium.make(
         "mplearn/PrimitiveHumanoid-v0",
-        library=args.library,
+        library=args.library or trained.library,
+        task=args.task or trained.task,
+        dynamics=args.dynamics,
         speed=args.speed,
         disable_env_checker=True,
     )
-    if args.goal is None:
-        policy = POLICIES[args.policy]()
-    else:
-        goal = int(args.goal) if args.goal.isdecimal() else args.goal
-        policy = PathToGoal.for_env(env, goal)
-    result = walk(env, policy, args.steps, args.seed, record=args.video is not None)
+    policy = _policy(args, env)
+    record = args.video is not None
+    result = walk(env, policy, args.steps, args.seed, episodes=args.episodes, record=record)
     for k, step in enumerate(result.steps, start=1):
         print(f"{k:4d}  {step.name:24s} {step.duration_s:6.2f} s{'  FELL' if step.fallen else ''}")
     print(
         f"{len(result.primitives)} primitives in {result.duration_s:.1f} s of the robot's time, "
         f"{result.falls} falls"
     )
+    if result.successes is not None and result.episodes:
+        print(f"{result.successes} of {result.episodes} episodes succeeded")
     if args.video:
         from mplearn_agents.film import film, with_captions
         from mplearn_agents.video import write_video
@@ -78,3 +96,18 @@ def run(args: argparse.Namespace) -> None:
         n_pictures = write_video(args.video, pictures, result.rate_hz)
         print(f"film of {n_pictures} pictures written to {args.video}")
     env.close()
+
+
+def _policy(args: argparse.Namespace, env: gymnasium.Env[Any, Any]) -> Policy:
+    from mplearn_agents.policies import POLICIES, PathToGoal
+
+    if args.agent is not None:
+        from mplearn_agents.rl import TrainedPolicy
+
+        agent = TrainedPolicy.load(args.agent)
+        agent.require_fit(env)
+        return agent
+    if args.goal is None:
+        return POLICIES[args.policy](env)
+    goal = int(args.goal) if args.goal.isdecimal() else args.goal
+    return PathToGoal.for_env(env, goal)

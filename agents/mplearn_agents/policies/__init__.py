@@ -1,18 +1,39 @@
 """Policies over a primitive graph: one idea a file, one interface (`Policy`)."""
 
 from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import gymnasium
 
 from .base import Policy as Policy
 from .base import legal_actions as legal_actions
 from .base import transition_prior as transition_prior
 from .greedy import Greedy as Greedy
+from .imitation import Imitation as Imitation
+from .mirror import Mirror as Mirror
 from .path_to_goal import PathToGoal as PathToGoal
+from .path_to_goal import PathToTask as PathToTask
 from .random_walk import RandomWalk as RandomWalk
+from .search import Search as Search
 from .uniform import UniformLegal as UniformLegal
 
-#: The policies that need nothing but the environment's info, by name.
-POLICIES: dict[str, Callable[[], Policy]] = {
-    "random": RandomWalk,
-    "uniform": UniformLegal,
-    "greedy": Greedy,
+#: All policies by name, each made for an environment.
+POLICIES: dict[str, Callable[[gymnasium.Env[Any, Any]], Policy]] = {
+    "random": lambda _: RandomWalk(),
+    "uniform": lambda _: UniformLegal(),
+    "greedy": lambda _: Greedy(),
+    "imitation": Imitation.for_env,
+    "likely-path": partial(PathToTask.for_env, prefer="likely"),
+    "short-path": partial(PathToTask.for_env, prefer="short"),
+    "quick-path": partial(PathToTask.for_env, prefer="quick"),
+    "mirror": lambda _: Mirror(),
+    "search": Search.for_env,
+}
+
+_PATHS = ("likely-path", "short-path", "quick-path")
+#: The policies that need a certain task, and which; the others act in any.
+NEEDS_TASK: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(_PATHS, ("goal", "recite")),
+    "mirror": ("follow",),
 }

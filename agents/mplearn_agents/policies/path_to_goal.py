@@ -1,10 +1,10 @@
-"""Walks to a chosen primitive over the graph, by the shortest or by the most likely path."""
+"""Walks to chosen primitives over the graph, by the likeliest, the shortest or the quickest way."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, Literal, TypeAlias
+from collections.abc import Collection, Mapping
+from typing import Any, Literal, TypeAlias, get_args
 
 import gymnasium
 import networkx as nx
@@ -14,42 +14,47 @@ from mplearn.errors import InvalidValueError, NoPathError, RobotError, UnknownPr
 
 from .base import Policy, transition_prior
 
-Prefer: TypeAlias = Literal["likely", "short"]
+Prefer: TypeAlias = Literal["likely", "short", "quick"]
 
 
 class PathToGoal(Policy):
-    """Takes the legal action from which the rest of the way to the goal is best.
+    """Takes the legal action from which the rest of the way to a goal is best.
 
     It needs no memory of where it is: the prior holds the first step, the graph the others. Once
     there, it takes the best way around to the goal again.
 
     Args:
-        graph: Actions as nodes; each edge with its ``"probability"``.
-        goal: The action to reach.
+        graph: Actions as nodes, for "quick" each with its ``"duration_s"`` [s]; each edge with its
+            ``"probability"``.
+        goal: The action to reach, or several of which any will do.
         prefer: ``"likely"`` takes the path of greatest probability, ``"short"`` that of fewest
-            primitives, and of those the more probable.
+            primitives, and of those the more probable, ``"quick"`` that of the least time.
 
     Raises:
         UnknownPrimitiveError: The goal is not in the graph.
-        InvalidValueError: ``prefer`` is neither.
+        InvalidValueError: ``prefer`` is none of these.
     """
 
-    def __init__(self, graph: nx.DiGraph[int], goal: int, prefer: Prefer = "likely") -> None:
-        if goal not in graph:
+    def __init__(
+        self, graph: nx.DiGraph[int], goal: int | Collection[int], prefer: Prefer = "likely"
+    ) -> None:
+        goals = [goal] if isinstance(goal, int) else sorted(goal)
+        unknown = [each for each in goals if each not in graph]
+        if unknown or not goals:
             raise UnknownPrimitiveError(
                 f"the goal {goal} is not in the graph; its nodes are {sorted(graph)}"
             )
-        if prefer not in ("likely", "short"):
-            raise InvalidValueError(f"prefer must be 'likely' or 'short', not {prefer!r}")
+        if prefer not in get_args(Prefer):
+            raise InvalidValueError(f"prefer must be one of {get_args(Prefer)}, not {prefer!r}")
         self.graph, self.goal, self.prefer = graph, goal, prefer
         costs = nx.DiGraph()
         costs.add_nodes_from(graph)
         costs.add_weighted_edges_from(
-            (after, before, self._cost(probability))
+            (after, before, self._cost(after, probability))
             for before, after, probability in graph.edges(data="probability")
             if probability > 0
         )
-        self._rest: dict[int, float] = nx.single_source_dijkstra_path_length(costs, goal)
+        self._rest: dict[int, float] = nx.multi_source_dijkstra_path_length(costs, set(goals))
 
     @classmethod
     def for_env(
@@ -69,10 +74,7 @@ class PathToGoal(Policy):
                 f"the robot cannot perform the goal {target.name!r}: "
                 f"{'; '.join(map(str, verdict.problems))}"
             )
-        possible = [id for id in repertoire.ids if repertoire.feasibility(id).feasible]
-        graph = repertoire.library.graph.to_networkx().subgraph(possible)
-        slots = nx.relabel_nodes(graph, repertoire.slots)
-        return cls(slots, repertoire.slots[target.id], prefer)
+        return cls(graph_of_actions(env), repertoire.slots[target.id], prefer)
 
     def act(self, observation: Any, info: Mapping[str, Any]) -> int:
         """Return the first action of the best path.
@@ -85,7 +87,7 @@ class PathToGoal(Policy):
         if len(possible) == 1:
             return int(possible[0])
         ways = {
-            int(action): self._cost(prior[action]) + self._rest[int(action)]
+            int(action): self._cost(int(action), prior[action]) + self._rest[int(action)]
             for action in possible
             if int(action) in self._rest
         }
@@ -93,7 +95,61 @@ class PathToGoal(Policy):
             raise NoPathError(f"none of the legal actions {possible.tolist()} leads to {self.goal}")
         return min(ways, key=lambda action: (ways[action], action))
 
-    def _cost(self, probability: float) -> float:
-        """Return what a transition costs; where paths are to be short, each has a high toll."""
+    def _cost(self, action: int, probability: float) -> float:
+        """Return what an action costs; where paths are to be short, each has a high toll."""
+        if self.prefer == "quick":
+            return float(self.graph.nodes[action]["duration_s"])
         surprise = -math.log(probability)
         return surprise if self.prefer == "likely" else 1e6 + surprise
+
+
+class PathToTask(Policy):
+    """Walks to what the task wants, by `PathToGoal`: ``info["task"]["slots"]``.
+
+    Args:
+        graph: See `PathToGoal`.
+        in_order: Whether the task wants one slot after the other, or any of them.
+        prefer: See `PathToGoal`.
+    """
+
+    def __init__(self, graph: nx.DiGraph[int], in_order: bool, prefer: Prefer = "quick") -> None:
+        self.graph, self.in_order, self.prefer = graph, in_order, prefer
+        self._ways: dict[tuple[int, ...], PathToGoal] = {}
+
+    @classmethod
+    def for_env(cls, env: gymnasium.Env[Any, Any], prefer: Prefer = "quick") -> PathToTask:
+        """Return the policy for an environment's library, robot and task."""
+        from mplearn_envs.tasks import ReciteTask
+
+        task = env.unwrapped.task  # type: ignore[attr-defined]
+        return cls(graph_of_actions(env), isinstance(task, ReciteTask), prefer)
+
+    def act(self, observation: Any, info: Mapping[str, Any]) -> int:
+        """Return the first action of the best path to what the task wants next.
+
+        Raises:
+            InvalidValueError: The task names no slots.
+        """
+        slots = info.get("task", {}).get("slots")
+        if not slots:
+            raise InvalidValueError(
+                "this policy needs a task that names slots in info['task'], like 'goal' and "
+                f"'recite'; info['task'] is {info.get('task')}"
+            )
+        goals = slots[:1] if self.in_order else slots
+        if goals not in self._ways:
+            self._ways[goals] = PathToGoal(self.graph, goals, self.prefer)
+        return self._ways[goals].act(observation, info)
+
+
+def graph_of_actions(env: gymnasium.Env[Any, Any]) -> nx.DiGraph[int]:
+    """Return what an environment's robot can do after what: actions as nodes, see `PathToGoal`."""
+    repertoire = env.unwrapped.repertoire  # type: ignore[attr-defined]
+    graph: nx.DiGraph[int] = nx.DiGraph()
+    for id in repertoire.feasible_ids:
+        slot = repertoire.slots[id]
+        graph.add_node(slot, duration_s=repertoire.duration_s(id))
+        prior = repertoire.after(id).prior
+        for after in np.flatnonzero(prior[1:]) + 1:
+            graph.add_edge(slot, int(after), probability=float(prior[after]))
+    return graph

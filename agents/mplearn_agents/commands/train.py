@@ -1,0 +1,64 @@
+"""``mplearn train``: reinforcement learning over a primitive graph."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import get_args
+
+HELP = "Train an agent to choose primitives, with masks, the prior and macro steps."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    from mplearn_agents.rl.config import AlgorithmName, PriorUse, TrainingConfig
+
+    default = {f.name: f.default for f in fields(TrainingConfig) if f.default is not MISSING}
+    parser.add_argument("--out", type=Path, required=True, help="folder for the agent and its log")
+    parser.add_argument("--library", type=Path, help="library file (default: the built-in one)")
+    parser.add_argument("--task", default="goal", help="task (default: goal)")
+    parser.add_argument(
+        "--dynamics", choices=["kinematic", "simulated"], default=default["dynamics"]
+    )
+    parser.add_argument(
+        "--algorithm", choices=get_args(AlgorithmName), default=default["algorithm"]
+    )
+    parser.add_argument(
+        "--prior",
+        choices=get_args(PriorUse),
+        default=default["prior"],
+        help="what the transition prior is to the policy (default: its initial logits)",
+    )
+    for name, what in (
+        ("steps", "macro steps to train for"),
+        ("round_steps", "macro steps between checkpoints"),
+        ("episodes", "episodes of each evaluation"),
+        ("seed", "seed of everything"),
+    ):
+        parser.add_argument(
+            f"--{name.replace('_', '-')}",
+            type=int,
+            default=default[name],
+            help=f"{what} (default: {default[name]})",
+        )
+    parser.add_argument(
+        "--resume", action="store_true", help="go on from the last checkpoint in the folder"
+    )
+
+
+def run(args: argparse.Namespace) -> None:
+    """Train, and say how good the agent is."""
+    from rich.console import Console
+
+    from mplearn_agents.rl import TrainingConfig
+    from mplearn_agents.rl.train import train
+
+    given = {f.name: getattr(args, f.name) for f in fields(TrainingConfig) if hasattr(args, f.name)}
+    given["library"] = None if args.library is None else str(args.library)
+    console = Console()
+    train(TrainingConfig(**given), args.out, resume=args.resume, console=console)
+    lines = (args.out / "evaluation.csv").read_text(encoding="utf-8").splitlines()
+    for name, value in zip(lines[0].split(","), lines[-1].split(","), strict=True):
+        console.print(f"{name:>8s} {float(value):.4g}", highlight=False)
+    console.print(f"agent written to {args.out}; see it with: mplearn perform --agent {args.out}")

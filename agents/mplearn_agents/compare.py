@@ -1,0 +1,167 @@
+"""Who does a task how well: all policies and trained agents, over several seeds, in one table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+import numpy as np
+from scipy import stats
+
+import mplearn_envs  # noqa: F401  (registers the environment)
+from mplearn.errors import InvalidValueError
+from mplearn.evaluation import Table
+from mplearn.recording import FloatArray
+
+from .episodes import Episode, play
+from .policies import NEEDS_TASK, POLICIES, Policy
+from .rl import TrainedPolicy, TrainingConfig
+from .rl.config import AlgorithmName
+from .rl.train import train
+from .rl.trained import CONFIG, POLICY
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+COLUMNS = ("task", "dynamics", "policy", "return", "success", "falls", "time")
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What is compared.
+
+    Attributes:
+        tasks: Names of tasks.
+        dynamics: "kinematic", "simulated" or both. Agents are trained kinematically.
+        policies: Names of policies; those that do not suit a task are left out there.
+        algorithms: What agents are trained with.
+        seeds: Of the episodes, and of the trainings: one agent a seed.
+        episodes: Episodes a seed, kinematic.
+        simulated_episodes: Episodes a seed, simulated.
+        steps: Macro steps of a training.
+        library: File of the library; None is the built-in one.
+    """
+
+    tasks: tuple[str, ...] = ("goal", "follow", "recite", "free")
+    dynamics: tuple[str, ...] = ("kinematic",)
+    policies: tuple[str, ...] = tuple(POLICIES)
+    algorithms: tuple[AlgorithmName, ...] = ("maskable-ppo",)
+    seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
+    episodes: int = 100
+    simulated_episodes: int = 10
+    steps: int = 80_000
+    library: str | None = None
+
+    def __post_init__(self) -> None:
+        unknown = [name for name in self.policies if name not in POLICIES]
+        if unknown:
+            raise InvalidValueError(f"policies must be among {tuple(POLICIES)}, not {unknown}")
+        if len(self.seeds) < 2:
+            raise InvalidValueError(f"an interval needs at least 2 seeds, not {self.seeds}")
+
+
+def compare(
+    comparison: Comparison, agents: Path, console: Console | None = None
+) -> Iterator[Table]:
+    """Yield one table a task.
+
+    Args:
+        comparison: What to compare.
+        agents: Folder of the trained agents; those that are there already are taken from there.
+        console: Where the progress of trainings is shown; None is silent.
+    """
+    for task in comparison.tasks:
+        trained = {
+            algorithm: [
+                _trained(comparison, task, algorithm, seed, agents, console)
+                for seed in comparison.seeds
+            ]
+            for algorithm in comparison.algorithms
+        }
+        rows = []
+        for dynamics in comparison.dynamics:
+            env = gymnasium.make(
+                "mplearn/PrimitiveHumanoid-v0",
+                library=comparison.library,
+                task=task,
+                dynamics=dynamics,
+                disable_env_checker=True,
+            )
+            n = comparison.episodes if dynamics == "kinematic" else comparison.simulated_episodes
+            for name, policies in _contestants(comparison, task, env, trained):
+                results = [
+                    play(env, policy, n, seed)
+                    for policy, seed in zip(policies, comparison.seeds, strict=True)
+                ]
+                rows.append((task, dynamics, name, *_cells(results)))
+            env.close()
+        yield Table(
+            f"Task {task!r}: {len(comparison.seeds)} seeds",
+            COLUMNS,
+            tuple(rows),
+            f"Mean over seeds and its {100 * CONFIDENCE:.0f} % interval (Student's t), of "
+            f"{comparison.episodes} kinematic or {comparison.simulated_episodes} simulated "
+            "episodes a seed. The return is discounted by time. Agents are trained kinematically, "
+            f"one a seed, for {comparison.steps} macro steps. 'search' knows the environment's "
+            "hidden state: in 'follow' it foresees the demonstrator, and bounds what the others can.",
+        )
+
+
+def _contestants(
+    comparison: Comparison,
+    task: str,
+    env: gymnasium.Env[Any, Any],
+    trained: dict[AlgorithmName, list[TrainedPolicy]],
+) -> Iterator[tuple[str, Sequence[Policy]]]:
+    for name in comparison.policies:
+        if task in NEEDS_TASK.get(name, (task,)):
+            yield name, [POLICIES[name](env)] * len(comparison.seeds)
+    yield from trained.items()
+
+
+def _trained(
+    comparison: Comparison,
+    task: str,
+    algorithm: AlgorithmName,
+    seed: int,
+    agents: Path,
+    console: Console | None,
+) -> TrainedPolicy:
+    config = TrainingConfig(
+        task=task,
+        algorithm=algorithm,
+        steps=comparison.steps,
+        seed=seed,
+        library=comparison.library,
+        round_steps=comparison.steps,
+    )
+    folder = agents / f"{task}-{algorithm}-{seed}"
+    if (folder / POLICY).exists() and TrainingConfig.load(folder / CONFIG)[0] == config:
+        return TrainedPolicy.load(folder)
+    return train(config, folder, console=console)
+
+
+def _cells(results: Sequence[Sequence[Episode]]) -> tuple[str, ...]:
+    """Return the means over episodes of each seed, summed up over seeds."""
+
+    def means(value: Callable[[Episode], float]) -> FloatArray:
+        return np.array([np.mean([value(episode) for episode in seed]) for seed in results])
+
+    return (
+        with_interval(means(lambda e: e.return_)),
+        with_interval(100 * means(lambda e: e.success), " %", 1),
+        with_interval(100 * means(lambda e: e.fallen), " %", 1),
+        with_interval(means(lambda e: e.duration_s), " s", 1),
+    )
+
+
+def with_interval(values: FloatArray, unit: str = "", digits: int = 2) -> str:
+    """Return the mean of independent values and the half width of its interval; a dash for NaN."""
+    if np.isnan(values).any():
+        return "-"
+    error = float(stats.sem(values)) * float(stats.t.ppf((1 + CONFIDENCE) / 2, len(values) - 1))
+    return f"{values.mean():.{digits}f} ± {error:.{digits}f}{unit}"

@@ -1,0 +1,73 @@
+"""Whole episodes: a policy acts from reset to the end, and what came of it is counted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from mplearn.errors import InvalidValueError
+
+from .policies import Policy
+
+
+@dataclass(frozen=True)
+class Episode:
+    """What came of an episode.
+
+    Attributes:
+        return_: Semi-Markov return from its start: each macro step's reward (which is discounted
+            inside), discounted by the time before it.
+        success: Whether the task was solved; NaN if the task does not say.
+        fallen: Whether the robot fell.
+        duration_s: How long it took [s].
+        steps: Number of macro steps.
+        illegal: How many of them were illegal.
+    """
+
+    return_: float
+    success: float
+    fallen: bool
+    duration_s: float
+    steps: int
+    illegal: int
+
+
+def play(env: gymnasium.Env[Any, Any], policy: Policy, episodes: int, seed: int) -> list[Episode]:
+    """Play episodes; the same seed gives the same ones, whoever acts.
+
+    Args:
+        env: A primitive environment.
+        policy: Who chooses.
+        episodes: How many.
+        seed: From which each episode's seed is drawn.
+
+    Raises:
+        InvalidValueError: ``episodes`` is less than 1.
+    """
+    if episodes < 1:
+        raise InvalidValueError(f"there is at least 1 episode to play, not {episodes}")
+    seeds = np.random.SeedSequence(seed).generate_state(episodes)
+    policy.reset(seed)
+    return [_episode(env, policy, int(each)) for each in seeds]
+
+
+def _episode(env: gymnasium.Env[Any, Any], policy: Policy, seed: int) -> Episode:
+    observation, info = env.reset(seed=seed)
+    policy.reset()
+    total, discount, duration_s, steps, illegal = 0.0, 1.0, 0.0, 0, 0
+    over = fallen = False
+    while not over:
+        action = policy.act(observation, info)
+        observation, reward, terminated, truncated, info = env.step(action)
+        total += discount * float(reward)
+        discount *= info["discount"]
+        duration_s += info["duration_s"]
+        steps += 1
+        illegal += bool(info["illegal"])
+        fallen = bool(info["fallen"])
+        over = terminated or truncated
+    success = float(info.get("is_success", np.nan))
+    return Episode(total, success, fallen, duration_s, steps, illegal)

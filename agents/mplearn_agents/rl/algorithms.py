@@ -1,0 +1,110 @@
+"""The algorithms, each with what it needs for masks, priors and macro steps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from stable_baselines3 import DQN
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.vec_env import VecEnv
+from torch import nn
+
+from .config import AlgorithmName, TrainingConfig
+from .features import PrimitiveFeatures
+from .networks import MaskedPriorPolicy, PriorPolicy
+from .semi_markov import (
+    MacroMaskablePPO,
+    MacroPPO,
+    MacroReplayBuffer,
+    MacroStepBuffer,
+    MaskedMacroStepBuffer,
+)
+
+WIDTHS = [128, 128]
+ON_POLICY = {
+    "n_steps": 128,
+    "batch_size": 256,
+    "n_epochs": 6,
+    "learning_rate": 7e-4,
+    "gae_lambda": 0.95,
+    "ent_coef": 0.01,
+}
+OFF_POLICY = {
+    "learning_rate": 5e-4,
+    "buffer_size": 50_000,
+    "learning_starts": 1_000,
+    "batch_size": 128,
+    "train_freq": 4,
+    "target_update_interval": 500,
+    "exploration_fraction": 1.0,  # of each round
+    "exploration_final_eps": 0.05,
+}
+
+
+class Recipe(NamedTuple):
+    """How an algorithm is used here.
+
+    Attributes:
+        cls: Its class.
+        policy: The class, or name, of its network.
+        buffer: Keyword and class of its memory.
+        n_envs: How many environments it learns from at once.
+        masks: Whether it knows masks.
+        settings: Its hyperparameters.
+    """
+
+    cls: type[BaseAlgorithm]
+    policy: Any
+    buffer: dict[str, Any]
+    n_envs: int
+    masks: bool
+    settings: dict[str, Any]
+
+
+RECIPES: dict[AlgorithmName, Recipe] = {
+    "maskable-ppo": Recipe(
+        MacroMaskablePPO,
+        MaskedPriorPolicy,
+        {"rollout_buffer_class": MaskedMacroStepBuffer},
+        8,
+        True,
+        ON_POLICY,
+    ),
+    "ppo": Recipe(
+        MacroPPO, PriorPolicy, {"rollout_buffer_class": MacroStepBuffer}, 8, False, ON_POLICY
+    ),
+    "dqn": Recipe(
+        DQN, "MultiInputPolicy", {"replay_buffer_class": MacroReplayBuffer}, 1, False, OFF_POLICY
+    ),
+}
+
+
+def rollout_steps(algorithm: AlgorithmName) -> int:
+    """Return how many macro steps an algorithm makes before it may stop."""
+    recipe = RECIPES[algorithm]
+    return int(recipe.settings.get("n_steps", 1)) * recipe.n_envs
+
+
+def new_model(config: TrainingConfig, envs: VecEnv) -> BaseAlgorithm:
+    """Return an untrained model."""
+    recipe = RECIPES[config.algorithm]
+    network: dict[str, Any] = {"net_arch": WIDTHS, "activation_fn": nn.Tanh}
+    if config.algorithm == "dqn":
+        network = {"net_arch": WIDTHS, "features_extractor_class": PrimitiveFeatures}
+    else:
+        network["prior"] = config.prior
+    return recipe.cls(
+        recipe.policy,
+        envs,
+        policy_kwargs=network,
+        seed=config.seed,
+        device="cpu",
+        **recipe.buffer,
+        **recipe.settings,
+    )
+
+
+def load_model(algorithm: AlgorithmName, path: Path, envs: VecEnv | None = None) -> BaseAlgorithm:
+    """Return a model that was saved, to go on in these environments, or only to act."""
+    return RECIPES[algorithm].cls.load(path, env=envs, device="cpu")

@@ -1,0 +1,85 @@
+"""What a training is: everything that its result depends on."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal, TypeAlias, get_args
+
+from mplearn.errors import InvalidValueError, MPLearnError
+
+AlgorithmName: TypeAlias = Literal["maskable-ppo", "ppo", "dqn"]
+#: What the transition prior is to the policy: nothing but a feature; its initial logits; or what
+#: it is drawn to by a penalty on the divergence from it (instead of the entropy bonus).
+PriorUse: TypeAlias = Literal["feature", "logits", "regulariser"]
+
+
+@dataclass(frozen=True)
+class TrainingConfig:
+    """A training of one agent; the same configuration gives the same agent.
+
+    Training goes in rounds. At the start of each, all random sources are seeded anew from ``seed``
+    and the number of steps made, and the environments are reset; at its end there is a checkpoint
+    and an evaluation. So a training that was interrupted goes on at its last checkpoint as if
+    nothing had happened, bit for bit (but for DQN, whose replay memory starts empty again).
+
+    Attributes:
+        task: Name of the environment's task.
+        algorithm: "maskable-ppo"; or "ppo" or "dqn", which know no masks, with illegal actions
+            projected to legal ones (`ProjectIllegal`).
+        steps: Macro steps to train for, rounded up to whole rounds.
+        seed: Of everything.
+        dynamics: "kinematic" is fast; "simulated" is with contact.
+        library: File of the library; None is the built-in one.
+        prior: What the transition prior is to the policy (not to DQN's, where it is a feature).
+        round_steps: Macro steps a round, rounded up to whole rollouts.
+        episodes: Episodes of an evaluation.
+        environment: Further arguments of the environment.
+    """
+
+    task: str = "goal"
+    algorithm: AlgorithmName = "maskable-ppo"
+    steps: int = 100_000
+    seed: int = 0
+    dynamics: str = "kinematic"
+    library: str | None = None
+    prior: PriorUse = "logits"
+    round_steps: int = 10_000
+    episodes: int = 50
+    environment: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, allowed in (("algorithm", AlgorithmName), ("prior", PriorUse)):
+            if getattr(self, name) not in get_args(allowed):
+                raise InvalidValueError(
+                    f"{name} must be one of {get_args(allowed)}, not {getattr(self, name)!r}"
+                )
+        for name in ("steps", "round_steps", "episodes"):
+            if getattr(self, name) < 1:
+                raise InvalidValueError(f"{name} must be at least 1, not {getattr(self, name)}")
+        if self.seed < 0:
+            raise InvalidValueError(f"seed must not be negative, but is {self.seed}")
+
+    def save(self, path: Path, slots: dict[int, int]) -> None:
+        """Write this as JSON, with the slot of each primitive that the agent knows."""
+        kept = {str(id): slot for id, slot in slots.items()}
+        path.write_text(json.dumps({**asdict(self), "slots": kept}, indent=2) + "\n", "utf-8")
+
+    @classmethod
+    def load(cls, path: Path) -> tuple[TrainingConfig, dict[int, int]]:
+        """Return what `save` wrote.
+
+        Raises:
+            InvalidValueError: The file is missing, or damaged.
+        """
+        try:
+            values = json.loads(path.read_text("utf-8"))
+            slots = {int(id): int(slot) for id, slot in values.pop("slots").items()}
+            return cls(**values), slots
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            if isinstance(error, MPLearnError):
+                raise
+            raise InvalidValueError(
+                f"{path.parent} holds no training: {path.name} is missing or damaged ({error})"
+            ) from error

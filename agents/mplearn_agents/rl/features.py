@@ -1,0 +1,76 @@
+"""What a network sees of an observation: numbers of like size, and the logarithm of the prior."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+
+#: Measurements are multiplied by these; other bounded numbers are divided by their bounds.
+SCALES = {"posture": 1.0, "velocity": 0.2, "cog": 10.0, "support_margin": 10.0}
+LEAST_PRIOR = 0.01  # of actions that the demonstrator never chose here, so that they are tried too
+PRIOR = "transition_prior"
+
+
+class PrimitiveFeatures(BaseFeaturesExtractor):
+    """Flattens an observation of a primitive environment, key by key in the order of the space.
+
+    Slots become one-hot vectors, measurements are scaled, and the logarithm of the prior is the
+    last block, shape (N, capacity), see `log_prior`.
+
+    Args:
+        observation_space: A Dict with ``"transition_prior"``; of Discrete, MultiBinary and Box.
+    """
+
+    def __init__(self, observation_space: spaces.Dict) -> None:
+        parts = observation_space.spaces
+        widths = [spaces.flatdim(part) for part in parts.values()]
+        super().__init__(observation_space, sum(widths) + spaces.flatdim(parts[PRIOR]))
+        self._keys = tuple(parts)
+        for key, part in parts.items():
+            self.register_buffer(f"scale_{key}", torch.as_tensor(_scale(key, part)))
+
+    def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
+        """Return the features, shape (N, F)."""
+        blocks = [
+            torch.flatten(observations[key], 1) * self.get_buffer(f"scale_{key}")
+            for key in self._keys
+        ]
+        return torch.cat((*blocks, log_prior(observations)), dim=1)
+
+
+def log_prior(observations: dict[str, torch.Tensor]) -> torch.Tensor:
+    """Return the logarithm of the prior, not below that of ``LEAST_PRIOR``, shape (N, capacity)."""
+    return torch.log(torch.clamp(observations[PRIOR].float(), min=LEAST_PRIOR))
+
+
+def feature_slots(observation_space: spaces.Dict, capacity: int) -> list[int | None]:
+    """Return which slot each of `PrimitiveFeatures` is about, None where it is about none.
+
+    A part of the observation is about slots if it is ``Discrete(capacity)`` or begins with blocks
+    of ``capacity`` numbers within [0, 1].
+    """
+    owners: list[int | None] = []
+    for part in observation_space.spaces.values():
+        width = spaces.flatdim(part)
+        if isinstance(part, spaces.Box):
+            outside = ~((part.low >= 0.0) & (part.high <= 1.0)).ravel()
+            within = int(np.argmax(outside)) if outside.any() else width
+            n_blocks = within // capacity
+        else:
+            n_blocks = int(width == capacity)
+        owners += [*range(capacity)] * n_blocks + [None] * (width - n_blocks * capacity)
+    return owners + list(range(capacity))
+
+
+def _scale(key: str, part: spaces.Space[Any]) -> np.ndarray[Any, np.dtype[np.float32]]:
+    size = spaces.flatdim(part)
+    if key in SCALES:
+        return np.full(size, SCALES[key], np.float32)
+    if isinstance(part, spaces.Box):
+        bound = np.maximum(np.abs(part.low), np.abs(part.high)).ravel().astype(np.float64)
+        return np.where(np.isfinite(bound) & (bound > 0), 1.0 / bound, 1.0).astype(np.float32)
+    return np.ones(size, np.float32)

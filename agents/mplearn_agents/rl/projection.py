@@ -1,0 +1,33 @@
+"""Makes every action legal, for algorithms that know no mask."""
+
+from __future__ import annotations
+
+from typing import Any, SupportsFloat
+
+import gymnasium
+import numpy as np
+from numpy.typing import ArrayLike
+
+
+def project(action: int, mask: ArrayLike) -> int:
+    """Return a legal action for any action: itself if it is legal.
+
+    The n legal actions share the illegal ones evenly: action a stands for number a mod n of them,
+    so that exploring at random among all explores the legal ones evenly, too.
+
+    Args:
+        action: Any action.
+        mask: Nonzero where an action is legal, shape (A,); at least one is.
+    """
+    legal = np.flatnonzero(mask)
+    return action if np.asarray(mask)[action] else int(legal[action % len(legal)])
+
+
+class ProjectIllegal(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """Replaces illegal actions by legal ones, see `project`; the mask is ``action_masks()``."""
+
+    def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Perform a legal action; ``info["action"]`` says which."""
+        legal = project(int(action), self.env.get_wrapper_attr("action_masks")())
+        observation, reward, terminated, truncated, info = self.env.step(legal)
+        return observation, reward, terminated, truncated, info | {"action": legal}

@@ -1,0 +1,138 @@
+"""Macro steps have durations: each is discounted by its own ``info["discount"]`` [Sutton1999].
+
+The reward of a macro step is discounted inside by the environment; what follows it counts by
+discount^duration instead of a constant gamma, in the advantages of PPO and in DQN's targets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from sb3_contrib import MaskablePPO
+from sb3_contrib.common.maskable.buffers import MaskableDictRolloutBuffer
+from stable_baselines3 import PPO
+from stable_baselines3.common.buffers import DictReplayBuffer, DictRolloutBuffer
+from stable_baselines3.common.type_aliases import DictReplayBufferSamples
+
+from mplearn.errors import InvalidValueError
+
+
+def step_discounts(infos: Sequence[dict[str, Any]]) -> NDArray[np.float32]:
+    """Return the discount of each environment's macro step, shape (N,).
+
+    Raises:
+        InvalidValueError: An info has none.
+    """
+    for info in infos:
+        if "discount" not in info:
+            raise InvalidValueError(
+                f"macro steps need info['discount'], discount^duration; info has {sorted(info)}"
+            )
+    return np.array([info["discount"] for info in infos], np.float32)
+
+
+def advantages(
+    rewards: NDArray[np.float32],
+    values: NDArray[np.float32],
+    ends: NDArray[np.bool_],
+    discounts: NDArray[np.float32],
+    gae_lambda: float,
+) -> NDArray[np.float32]:
+    """Return generalised advantage estimates of macro steps, shape (T, N).
+
+    A_t = delta_t + d_t lambda A_(t+1), delta_t = r_t + d_t V_(t+1) - V_t, where what follows the
+    end of an episode is 0 ([Schulman2016], with d_t in place of gamma).
+
+    Args:
+        rewards: Of each step, shape (T, N).
+        values: Of the state before each step, and after the last one, shape (T + 1, N).
+        ends: Whether a step ended its episode, shape (T, N).
+        discounts: Of each step, shape (T, N).
+        gae_lambda: Lambda.
+    """
+    out = np.zeros_like(rewards)
+    after = np.zeros_like(rewards[0])
+    keep = np.where(ends, 0.0, discounts).astype(np.float32)
+    for t in range(len(rewards) - 1, -1, -1):
+        delta = rewards[t] + keep[t] * values[t + 1] - values[t]
+        after = delta + keep[t] * gae_lambda * after
+        out[t] = after
+    return out
+
+
+class _MacroSteps:
+    """A rollout buffer with each step's discount, and the value of what truncation cut off."""
+
+    def reset(self: Any) -> None:
+        shape = (self.buffer_size, self.n_envs)
+        self.discounts = np.ones(shape, np.float32)
+        self.cut_off = np.zeros(shape, np.float32)
+        super().reset()  # type: ignore[misc]
+
+    def note(self: Any, discounts: NDArray[np.float32], cut_off: NDArray[np.float32]) -> None:
+        """Keep what belongs to the step that will be added next, shape (N,) each."""
+        self.discounts[self.pos], self.cut_off[self.pos] = discounts, cut_off
+
+    def compute_returns_and_advantage(self: Any, last_values: torch.Tensor, dones: Any) -> None:
+        """Fill ``advantages`` and ``returns``, see `advantages`."""
+        values = np.vstack((self.values, last_values.cpu().numpy().reshape(1, -1)))
+        ends = np.vstack((self.episode_starts[1:], np.reshape(dones, (1, -1)))) > 0
+        rewards = self.rewards + self.discounts * self.cut_off
+        self.advantages = advantages(rewards, values, ends, self.discounts, self.gae_lambda)
+        self.returns = self.advantages + self.values
+
+
+class MaskedMacroStepBuffer(_MacroSteps, MaskableDictRolloutBuffer):
+    """Rollouts for `MacroMaskablePPO`."""
+
+
+class MacroStepBuffer(_MacroSteps, DictRolloutBuffer):
+    """Rollouts for `MacroPPO`."""
+
+
+class _MacroStepAlgorithm:
+    """An on-policy algorithm that tells its buffer each step's discount."""
+
+    def _update_info_buffer(self: Any, infos: Any, dones: Any = None) -> None:
+        super()._update_info_buffer(infos, dones)  # type: ignore[misc]
+        cut_off = np.zeros(len(infos), np.float32)
+        for k, info in enumerate(infos):
+            if dones[k] and info.get("TimeLimit.truncated", False):
+                info["TimeLimit.truncated"] = False  # else it is added once more, with gamma
+                last = self.policy.obs_to_tensor(info["terminal_observation"])[0]
+                with torch.no_grad():
+                    cut_off[k] = self.policy.predict_values(last).item()
+        self.rollout_buffer.note(step_discounts(infos), cut_off)
+
+
+class MacroMaskablePPO(_MacroStepAlgorithm, MaskablePPO):
+    """MaskablePPO for macro steps; give it ``rollout_buffer_class=MaskedMacroStepBuffer``."""
+
+
+class MacroPPO(_MacroStepAlgorithm, PPO):
+    """PPO for macro steps; give it ``rollout_buffer_class=MacroStepBuffer``."""
+
+
+class MacroReplayBuffer(DictReplayBuffer):
+    """Replays macro steps with their discounts, for DQN on one environment."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        if self.n_envs != 1:
+            raise InvalidValueError(f"macro steps are replayed of 1 environment, not {self.n_envs}")
+        self.discounts = np.ones(self.buffer_size, np.float32)
+
+    def add(self, obs: Any, next_obs: Any, action: Any, reward: Any, done: Any, infos: Any) -> None:
+        """Add a macro step."""
+        self.discounts[self.pos] = step_discounts(infos)[0]
+        super().add(obs, next_obs, action, reward, done, infos)
+
+    def _get_samples(  # type: ignore[override]
+        self, batch_inds: Any, env: Any = None
+    ) -> DictReplayBufferSamples:
+        samples = super()._get_samples(batch_inds, env)
+        return samples._replace(discounts=self.to_torch(self.discounts[batch_inds]).reshape(-1, 1))
