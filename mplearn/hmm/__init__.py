@@ -2,6 +2,11 @@
 
 from .distance import distance as distance
 from .distance import distance_matrix as distance_matrix
+from .factorial import FactorialHMM as FactorialHMM
+from .factorial_fit import add_chain as add_chain
+from .factorial_fit import em_step as em_step
+from .factorial_fit import fit_factorial as fit_factorial
+from .factorial_fit import needs_more_chains as needs_more_chains
 from .fit import fit as fit
 from .interchange import from_hmmlearn as from_hmmlearn
 from .interchange import to_hmmlearn as to_hmmlearn

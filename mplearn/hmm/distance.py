@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from ..recording import FloatArray
 from .model import LeftRightHMM
+from .motion_model import MotionModel
 from .sequences import SequenceBatch
 from .stack import ModelStack, score_pairs
 
 
 def distance(
-    model_a: LeftRightHMM,
+    model_a: MotionModel,
     sequences_a: Sequence[FloatArray],
-    model_b: LeftRightHMM,
+    model_b: MotionModel,
     sequences_b: Sequence[FloatArray],
     weights_a: Sequence[FloatArray] | None = None,
     weights_b: Sequence[FloatArray] | None = None,
@@ -29,15 +31,24 @@ def distance(
     Returns:
         About 0 for equal models; +inf where a sequence is shorter than the other's states.
     """
-    stack = ModelStack.of([model_a, model_b])
     directions = []
-    for own, sequences, weights in ((0, sequences_a, weights_a), (1, sequences_b, weights_b)):
+    for own, other, sequences, weights in (
+        (model_a, model_b, sequences_a, weights_a),
+        (model_b, model_a, sequences_b, weights_b),
+    ):
         batch = SequenceBatch.of(sequences, weights)
-        each = np.arange(batch.n_sequences)
-        pairs = np.stack([np.repeat([own, 1 - own], len(each)), np.tile(each, 2)], axis=1)
-        here, there = score_pairs(stack, batch, pairs).reshape(2, -1)
+        here, there = _scores(own, batch), _scores(other, batch)
         directions.append(np.mean((here - there) / batch.masses))
     return float(np.mean(directions))
+
+
+def _scores(model: MotionModel, batch: SequenceBatch) -> FloatArray:
+    """Return log P(O_s | model) of all sequences, shape (S,)."""
+    if isinstance(model, LeftRightHMM):
+        pairs = np.stack([np.zeros(batch.n_sequences), np.arange(batch.n_sequences)], axis=1)
+        return score_pairs(ModelStack.of([model]), batch, pairs.astype(np.int64))
+    stretches = [slice(a, b) for a, b in pairwise(batch.offsets)]
+    return np.array([model.score(batch.frames[s], batch.weights[s]) for s in stretches])
 
 
 def distance_matrix(
