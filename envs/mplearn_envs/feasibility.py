@@ -10,13 +10,12 @@ import numpy as np
 from mplearn.recording import FloatArray
 
 from .control.controller import tracked_columns
-from .control.footwork import sole_heights
+from .control.footwork import Footwork, Lift, sole_heights
 from .control.inverse_dynamics import InverseDynamics
 from .control.planner import Motion, Plan, Planner
 from .control.reference import Reference, reference_robot, rest_reference
-from .control.support import support_margin
 
-ProblemKind: TypeAlias = Literal["foot_lift", "limit", "velocity", "reach", "torque", "balance"]
+ProblemKind: TypeAlias = Literal["flight", "limit", "velocity", "reach", "torque", "balance"]
 
 
 @dataclass(frozen=True)
@@ -24,7 +23,7 @@ class FeasibilityConfig:
     """What is still allowed.
 
     Attributes:
-        foot_lift_m: How far one sole may rise over the other [m].
+        flight_m: How high both soles may be over the floor at once [m]: nothing carries then.
         overshoot: How far the motion may go beyond the tracked coordinates' limits, where it is
             cut off [m, rad].
         slowest: Smallest share of the wanted speed that still counts as performing the motion.
@@ -33,7 +32,7 @@ class FeasibilityConfig:
         zmp_margin_m: How near the zero-moment point may come to the edge of the soles [m].
     """
 
-    foot_lift_m: float = 0.03
+    flight_m: float = 0.06
     overshoot: float = 0.25
     slowest: float = 0.3
     reach_error: float = 0.01
@@ -72,12 +71,20 @@ class Feasibility:
         zmp_margin_m: Smallest distance of the planned zero-moment point from the edge of the soles,
             negative outside [m]; NaN where no plan was made.
         torque_share: Largest share of a torque limit that is needed; NaN where no plan was made.
+        tempo: Duration of the motion over that of its performance, time to shift the weight
+            included; NaN where no plan was made.
+        starts_up: Side of the foot that is in the air at the start, 0 left, 1 right, -1 none. A
+            robot that stands otherwise lowers and raises its feet first.
+        ends_up: The same at the end.
     """
 
     problems: tuple[Problem, ...]
     speed: float
     zmp_margin_m: float
     torque_share: float
+    tempo: float = np.nan
+    starts_up: int = -1
+    ends_up: int = -1
 
     @property
     def feasible(self) -> bool:
@@ -110,15 +117,18 @@ class FeasibilityCheck:
             rate_hz: Frames per second, at human speed [1/s].
             speed: Wanted speed, as a share of the human's.
         """
-        problems = (*self._foot_lift(frames), *self._overshoot(frames))
-        if problems:  # not a motion for both feet on the floor: nothing to plan
-            return Feasibility(problems, speed, np.nan, np.nan)
-        motion = Motion(frames[:, self._columns], rate_hz)
-        start = self.posture(motion.frames[0])
+        motion = self.planner.motion(frames, rate_hz)
+        footwork = motion.footwork
+        feet = (-1, -1) if footwork is None else (footwork.up_at(False), footwork.up_at(True))
+        problems = (*self._flight(frames), *self._overshoot(frames))
+        if problems:  # nothing to plan
+            return Feasibility(problems, speed, np.nan, np.nan, np.nan, *feet)
+        start = self.posture(motion)
         wanted = speed
         while True:
             plan = self.planner.plan(start, motion, speed)
-            margin, share, joint = self._load(plan)
+            margin = float(plan.zmp_margin_m.min())
+            share, joint = self._load(plan)
             shaky = margin < self.config.zmp_margin_m or share > self.config.torque_share
             speed = plan.speed
             if not shaky or speed * 0.7 < self.config.slowest * wanted:
@@ -129,23 +139,32 @@ class FeasibilityCheck:
             found.append(Problem("torque", joint, share, self.config.torque_share))
         if margin < self.config.zmp_margin_m:
             found.append(Problem("balance", "the soles", margin, self.config.zmp_margin_m))
-        return Feasibility(tuple(found), speed, margin, share)
+        tempo = motion.duration_s / plan.duration_s
+        return Feasibility(tuple(found), speed, margin, share, tempo, *feet)
 
-    def posture(self, target: FloatArray) -> Reference:
-        """Return the reference robot at rest in a posture, tracked coordinates (U,)."""
+    def posture(self, motion: Motion) -> Reference:
+        """Return the reference robot at rest where a motion begins, on one foot or on two."""
         here = rest_reference(self.planner.robot)
-        still = Motion(np.stack((target, target)), 1.0)
-        return self.planner.plan(here, still, 1.0).end
+        first = np.repeat(motion.frames[:1], 2, axis=0)
+        footwork = motion.footwork
+        up = -1 if footwork is None else footwork.up_at(False)
+        if footwork is not None and up >= 0:
+            still = (np.repeat(part[:1], 2, axis=0) for part in footwork[:3])
+            footwork = Footwork(*still, (Lift(up, -1, 2),))
+        else:
+            footwork = None
+        return self.planner.plan(here, Motion(first, 1.0, footwork), 1.0).end
 
-    def _foot_lift(self, frames: FloatArray) -> tuple[Problem, ...]:
-        heights = sole_heights(self.planner.robot, frames)
-        gap = heights[:, 0] - heights[:, 1]
-        side = int(np.max(-gap) > np.max(gap))
-        lift = float(np.abs(gap).max())
-        if lift <= self.config.foot_lift_m:
+    def _flight(self, frames: FloatArray) -> tuple[Problem, ...]:
+        """Look for soles in the air while the base is higher than it can stand."""
+        standing = reference_robot(self.planner.robot).standing_height
+        high = frames[frames[:, 0] > standing + 0.5 * self.config.flight_m]
+        if not len(high):
             return ()
-        foot = self.planner.robot.feet[side]
-        return (Problem("foot_lift", foot, lift, self.config.foot_lift_m),)
+        flight = float(sole_heights(self.planner.robot, high).min(axis=1).max())
+        if flight <= self.config.flight_m:
+            return ()
+        return (Problem("flight", "both feet", flight, self.config.flight_m),)
 
     def _overshoot(self, frames: FloatArray) -> tuple[Problem, ...]:
         limits = reference_robot(self.planner.robot).limits
@@ -172,11 +191,9 @@ class FeasibilityCheck:
             return ()
         return (Problem("reach", "feet, COG or base", worst, self.config.reach_error),)
 
-    def _load(self, plan: Plan) -> tuple[float, float, str]:
-        """Return smallest ZMP margin [m], largest share of a torque limit, and whose that is."""
-        zmp, share = self._dynamics.along(plan.q, plan.knot_s)
+    def _load(self, plan: Plan) -> tuple[float, str]:
+        """Return the largest share of a torque limit, and whose that is."""
+        share = self._dynamics.along(plan.q, plan.knot_s, plan.up)
         worst = np.nan_to_num(share, nan=np.inf).max(axis=0)
         joint = int(np.argmax(worst))
-        margin = support_margin(self._dynamics.support, np.nan_to_num(zmp, nan=np.inf))
-        margin = np.nan_to_num(margin, nan=-np.inf)
-        return float(margin.min()), float(worst[joint]), self.planner.robot.joint_names[joint]
+        return float(worst[joint]), self.planner.robot.joint_names[joint]

@@ -8,10 +8,13 @@ import numpy as np
 
 from mplearn.recording import BoolArray, FloatArray
 
+from .control.guide import left_share, support
+from .control.kinematics import places
 from .control.momentum import ground_reaction, momenta
 from .control.planner import Plan
 from .control.reference import reference_robot
-from .control.support import convex_hull, support_margin
+from .control.stride import sole_outlines
+from .control.support import margins_along
 from .robot import Robot
 
 FALL_TILT_RAD = 0.6
@@ -25,8 +28,10 @@ class Performance(NamedTuple):
         time_s: Time since the start, shape (S,) [s].
         tracking_error_rad: Root mean square over the joints of actual minus wanted angle, (S,)
             [rad].
-        cog_deviation_m: Distance of the COG's projection from the middle of the soles, (S,) [m].
-        zmp_margin_m: Distance of the zero-moment point from the edge of the soles, (S,) [m].
+        cog_deviation_m: Distance of the COG's projection from where it should be over the feet that
+            carry, shape (S,) [m]; with both feet down that is the middle of the soles.
+        zmp_margin_m: Distance of the zero-moment point from the edge of the soles that should be
+            down, (S,) [m].
         fallen: Whether the robot fell; the last sample is when.
         duration_s: How long it took [s].
     """
@@ -39,9 +44,7 @@ class Performance(NamedTuple):
     duration_s: float
 
 
-def assess(
-    robot: Robot, plan: Plan, q: FloatArray, v: FloatArray, soles: FloatArray, fallen: bool
-) -> Performance:
+def assess(robot: Robot, plan: Plan, q: FloatArray, v: FloatArray, fallen: bool) -> Performance:
     """Compare what was recorded with what was planned.
 
     Args:
@@ -49,20 +52,26 @@ def assess(
         plan: What it performed.
         q: Postures at the plan's reference postures, the start included, shape (S + 1, 7 + n).
         v: Velocities there, shape (S + 1, 6 + n).
-        soles: Corners of the soles at the end, shape (2, 4, 3) [m].
         fallen: Whether it fell.
     """
     ref = reference_robot(robot)
+    n = len(q)
     cog, linear, angular = momenta(ref.tree, ref.inertia, q, v)
     zmp = ground_reaction(float(ref.tree.mass.sum()), cog, linear, angular, plan.knot_s)
-    corners = soles[..., :2].reshape(-1, 2)
-    time = np.arange(1.0, len(q)) * plan.knot_s
-    error = q[1:, 7:] - plan.q[1 : len(q), 7:]
+    feet = places(ref.tree, ref.stance.feet, q)
+    share = left_share(ref, plan)[:n]
+    seen = support(share, feet).see(cog[:, :2])
+    wanted = support(share, plan.ground[:n]).see(plan.cog[:n, :2])
+    margin = margins_along(
+        sole_outlines(ref, feet[1:]), plan.up[1:n], np.nan_to_num(zmp, nan=np.inf)
+    )
+    error = q[1:, 7:] - plan.q[1:n, 7:]
+    time = np.arange(1.0, n) * plan.knot_s
     return Performance(
         time,
         np.sqrt(np.mean(error**2, axis=1)),
-        np.linalg.norm(cog[1:, :2] - corners.mean(axis=0), axis=1),
-        np.nan_to_num(support_margin(convex_hull(corners), zmp), nan=-1.0),
+        np.linalg.norm(seen - wanted, axis=1)[1:],
+        np.maximum(margin, -1.0),
         fallen,
         float(time[-1]),
     )

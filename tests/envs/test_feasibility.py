@@ -24,14 +24,23 @@ def test_motions_with_both_feet_down_are_feasible(end, speed):
 
 
 @pytest.mark.parametrize("side", ["l", "r"])
-def test_lifting_a_foot_is_refused_with_that_reason(side):
+@pytest.mark.parametrize("speed", [0.5, 1.0])
+def test_lifting_a_foot_is_feasible_and_says_which(side, speed):
     lift = {name.replace("_l", f"_{side}"): value for name, value in KICK.items()}
-    for frames in (sweep({}, lift, 0.8), sweep(lift, {}, 0.8)):
-        verdict = CHECK.judge(frames, RATE_HZ, 0.5)
-        assert kinds(verdict) == ["foot_lift"]
-        assert verdict.problems[0].where == f"foot_{side}"
-        assert verdict.problems[0].value > 0.15
-        assert "allowed 0.03" in str(verdict.problems[0])
+    which = "lr".index(side)
+    for frames, feet in ((sweep({}, lift, 0.8), (-1, which)), (sweep(lift, {}, 0.8), (which, -1))):
+        verdict = CHECK.judge(frames, RATE_HZ, speed)
+        assert verdict.feasible, verdict.problems
+        assert (verdict.starts_up, verdict.ends_up) == feet
+        assert 0.3 < verdict.tempo <= speed + 0.01
+
+
+def test_a_jump_is_refused_with_that_reason():
+    up = sweep({}, {"base_height": 0.2}, 0.3)
+    verdict = CHECK.judge(np.vstack((up, up[::-1])), RATE_HZ, 0.5)
+    assert kinds(verdict) == ["flight"]
+    assert verdict.problems[0].value == pytest.approx(0.2, abs=0.01)
+    assert "allowed 0.06" in str(verdict.problems[0])
 
 
 def test_small_differences_of_the_feet_are_no_lift():
@@ -78,8 +87,8 @@ def test_a_jerky_motion_is_slowed_for_balance():
 
 
 def test_standing_postures_are_reached():
-    target = posture({})[CHECK._columns]
-    assert target[0] == STANDING_M
-    reference = CHECK.posture(target)
-    np.testing.assert_allclose(reference.target, target, atol=1e-6)
+    motion = CHECK.planner.motion(np.stack([posture({})] * 2), RATE_HZ)
+    assert motion.frames[0, 0] == STANDING_M
+    reference = CHECK.posture(motion)
+    np.testing.assert_allclose(reference.target, motion.frames[0], atol=1e-6)
     assert np.abs(reference.velocity).max() < 1e-6

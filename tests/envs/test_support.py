@@ -68,12 +68,11 @@ def test_a_point_masss_zmp_is_the_pendulums():
     )
 
 
-def test_static_torques_and_zmp_are_those_of_the_simulation():
+def test_static_torques_are_those_of_the_simulation():
     robot = humanoid()
     rest = reference_robot(robot).rest
     dynamics = InverseDynamics(robot)
-    zmp, share = dynamics.along(np.repeat(rest[None], 6, axis=0), 0.02)
-    np.testing.assert_allclose(zmp[0], reference_robot(robot).stance.cog, atol=1e-6)
+    share = dynamics.along(np.repeat(rest[None], 6, axis=0), 0.02)
     model = robot.model()
     data = mujoco.MjData(model)
     data.qpos[:] = rest

@@ -20,6 +20,9 @@ from .reference import reference_robot, sole_corners
 
 LIFT_M = 0.03  # a foot that rises so far over the other leaves the ground
 DOWN_M = 0.012  # and it is down where it is less
+CLEAR_M = 0.015  # a foot on its way clears the ground by this
+MOVING_M_S = 0.15  # a foot that still moves over the ground so fast has not landed
+_LONGEST_S = 0.4  # for which a foot may skim the ground before it lifts or after it lands
 _SOFT_M = 0.02  # lifts begin and end smoothly: below about this they are made lower
 
 
@@ -45,14 +48,12 @@ class Footwork(NamedTuple):
         rise: Height of each sole's lowest corner above the ground, 0 where it stands, (T, 2) [m].
         left_from_right: The left foot in the right one's frame: x, y [m] and yaw [rad], (T, 3).
         lifts: What leaves the ground, in order of time.
-        flight_m: Largest height of both soles at once over where they are lowest [m].
     """
 
     legs: FloatArray
     rise: FloatArray
     left_from_right: FloatArray
     lifts: tuple[Lift, ...]
-    flight_m: float
 
     def up_at(self, end: bool) -> int:
         """Return the side of the foot that is up at the start (or the end); -1 for none."""
@@ -62,30 +63,37 @@ class Footwork(NamedTuple):
         return -1
 
 
-def read_footwork(robot: Robot, frames: FloatArray) -> Footwork:
+def read_footwork(robot: Robot, frames: FloatArray, rate_hz: float) -> Footwork:
     """Read the footwork of a motion.
 
     Args:
         robot: The robot.
         frames: Values of its channels, shape (T, 3 + n) [m, rad].
+        rate_hz: Frames per second [1/s].
     """
     ref = reference_robot(robot)
     heights, relative = _feet(
         ref.tree, ref.stance.feet, sole_corners(robot), np.ascontiguousarray(frames)
     )
     gap = heights - heights.min(axis=1, keepdims=True)
-    lifts = sorted(
-        (lift for side in range(2) for lift in _lifts(gap[:, side], side)),
-        key=lambda lift: (lift.start, lift.end),
-    )
+    moving = np.zeros(len(frames))
+    if len(frames) > 1:
+        moving = np.linalg.norm(np.gradient(relative[:, :2], axis=0), axis=1) * rate_hz
+    skims = moving > MOVING_M_S
+    longest = round(_LONGEST_S * rate_hz)
+    lifts = _lifts(gap, skims, longest)
     rise = np.zeros_like(gap)
     for side, start, end in lifts:
         inside = slice(max(start, 0), end)
         over = np.maximum(gap[inside, side] - DOWN_M, 0.0)
-        rise[inside, side] = over**2 / (over + _SOFT_M)
-    lower = heights.min(axis=1)
+        x = np.arange(len(over)) + 0.5
+        from_ground = x if start >= 0 else np.full(len(over), np.inf)
+        to_ground = len(over) - x if end < len(gap) else np.full(len(over), np.inf)
+        near = np.minimum(np.minimum(from_ground, to_ground) / (0.2 * rate_hz), 1.0)
+        clear = CLEAR_M * near**2 * (3.0 - 2.0 * near)
+        rise[inside, side] = over**2 / (over + _SOFT_M) + clear
     legs = np.ascontiguousarray(frames[:, 3 + robot.leg_joints])
-    return Footwork(legs, rise, relative, tuple(lifts), float(np.ptp(lower)))
+    return Footwork(legs, rise, relative, tuple(lifts))
 
 
 def sole_heights(robot: Robot, frames: FloatArray) -> FloatArray:
@@ -100,15 +108,35 @@ def sole_heights(robot: Robot, frames: FloatArray) -> FloatArray:
     return _feet(ref.tree, ref.stance.feet, corners, np.ascontiguousarray(frames))[0]
 
 
-def _lifts(gap: FloatArray, side: int) -> list[Lift]:
-    """Return the intervals in which a foot is off the ground, with hysteresis."""
-    off: BoolArray = gap > DOWN_M
-    edges = np.flatnonzero(np.diff(off.astype(np.int8), prepend=0, append=0))
+def _lifts(gap: FloatArray, skims: BoolArray, longest: int) -> list[Lift]:
+    """Return when each foot is off the ground, with hysteresis, in order of time.
+
+    Args:
+        gap: Heights of the soles over the lower one, shape (T, 2) [m].
+        skims: Whether a foot moves over the ground, shape (T,).
+        longest: Frames for which it may do so before it lifts or after it lands.
+    """
     found = []
-    for start, end in edges.reshape(-1, 2).tolist():
-        if gap[start:end].max() > LIFT_M:
-            found.append(Lift(side, -1 if start == 0 else start, end))
-    return found
+    n_frames = len(gap)
+    for side in range(2):
+        off = (gap[:, side] > DOWN_M).astype(np.int8)
+        for start, end in np.flatnonzero(np.diff(off, prepend=0, append=0)).reshape(-1, 2).tolist():
+            if gap[start:end, side].max() > LIFT_M:
+                found.append((start, end, side))
+    found.sort()
+    out = []
+    for i, (start, end, side) in enumerate(found):
+        earliest = max(out[-1].end if out else 0, start - longest)
+        latest = min(found[i + 1][0] if i + 1 < len(found) else n_frames, end + longest)
+        up_before, up_after = start == 0, end == n_frames
+        while start > earliest and skims[start - 1]:
+            start -= 1
+        while end < latest and skims[end]:
+            end += 1
+        out.append(
+            Lift(side, -1 if up_before else start, n_frames if up_after else min(end, n_frames - 1))
+        )
+    return out
 
 
 @njit(cache=True)

@@ -129,6 +129,24 @@ def forward(tree: MassTree, q: FloatArray) -> Pose:
     return Pose(position, rotation, anchor, axis, moment, carried)
 
 
+@njit(cache=True, nogil=True)
+def places(tree: MassTree, bodies: IntArray, q: FloatArray) -> FloatArray:
+    """Return where bodies are on the floor along a motion of shape (T, 7 + J).
+
+    Returns:
+        x, y [m] and yaw [rad] of each, shape (T, len(bodies), 3).
+    """
+    out = np.empty((q.shape[0], bodies.shape[0], 3))
+    for t in range(q.shape[0]):
+        pose = forward(tree, q[t])
+        for i in range(bodies.shape[0]):
+            turn = pose.rotation[bodies[i]]
+            out[t, i, 0] = pose.position[bodies[i], 0]
+            out[t, i, 1] = pose.position[bodies[i], 1]
+            out[t, i, 2] = np.arctan2(turn[1, 0], turn[0, 0])
+    return out
+
+
 @njit(cache=True)
 def _relative(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return a b^T of (3, 3) matrices (at this size BLAS costs more than the product)."""

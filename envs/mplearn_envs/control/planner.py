@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Hashable
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +34,7 @@ from .stride import (
     sole_middles,
     sole_outlines,
 )
-from .support import convex_hull, support_margin
+from .support import margins_along
 from .upper_body import limit_velocity, servo_commands
 
 GRID_DECIMALS = 6
@@ -154,7 +153,7 @@ class Planner:
             frames: Values of the robot's channels, shape (T, 3 + n) [m, rad].
             rate_hz: Frames per second, at human speed [1/s].
         """
-        footwork = read_footwork(self.robot, frames)
+        footwork = read_footwork(self.robot, frames, rate_hz)
         tracked = np.ascontiguousarray(frames[:, self._tracked])
         return Motion(tracked, rate_hz, footwork if footwork.lifts else None)
 
@@ -204,7 +203,7 @@ class Planner:
             legs, rise = start.swing[:-2], start.swing[-2:]
             lifts = (Lift(start.lifted, -1, 2),)
             footwork = Footwork(
-                np.stack((legs, legs)), np.stack((rise, rise)), np.zeros((2, 3)), lifts, 0.0
+                np.stack((legs, legs)), np.stack((rise, rise)), np.zeros((2, 3)), lifts
             )
         motion = Motion(np.stack((here, here)), 1.0 / duration_s, footwork)
         return self.plan(start, motion, 1.0, ("hold", duration_s))
@@ -302,14 +301,8 @@ class Planner:
         cog, linear, angular = momenta(ref.tree, ref.inertia, q, velocities(q, knot_s))
         between = ground_reaction(self._mass, cog, linear, angular, knot_s)
         zmp = np.vstack((between[:1], 0.5 * (between[1:] + between[:-1]), between[-1:]))
-        corners = sole_outlines(ref, ground)
-        margin = np.empty(len(q))
-        moved = (np.diff(up) != 0) | (np.diff(ground, axis=0) != 0).any(axis=(1, 2))
-        edges = np.concatenate(([0], np.flatnonzero(moved) + 1, [len(q)]))
-        for first, last in pairwise(edges.tolist()):
-            standing = [side for side in range(2) if side != up[first]]
-            hull = convex_hull(corners[first, standing].reshape(-1, 2))
-            margin[first:last] = support_margin(hull, np.nan_to_num(zmp[first:last], nan=np.inf))
+        points = np.nan_to_num(zmp, nan=np.inf)
+        margin = margins_along(sole_outlines(ref, ground), up, points)
         return cog, zmp, margin
 
     def _end(

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from mplearn.errors import InvalidValueError
-from mplearn.recording import FloatArray
+from mplearn.recording import FloatArray, IntArray
 
 GRAVITY = 9.81
 
@@ -79,6 +79,28 @@ def _margins(hull: FloatArray, points: FloatArray) -> FloatArray:
             # NaN must not pass for a point inside
             if not inside >= out[k]:
                 out[k] = inside
+    return out
+
+
+@njit(cache=True)
+def margins_along(corners: FloatArray, up: IntArray, points: FloatArray) -> FloatArray:
+    """Return how far points are inside the soles that stand, one moment after the other.
+
+    Args:
+        corners: Corners of both soles, shape (S, 2, 4, 2) [m].
+        up: Side of the foot in the air, -1 for none, shape (S,).
+        points: Points, shape (S, 2) [m].
+
+    Returns:
+        Distances to the nearest edge, negative outside (see `support_margin`), shape (S,) [m].
+    """
+    out = np.empty(points.shape[0])
+    for t in range(points.shape[0]):
+        if up[t] < 0:
+            standing = np.concatenate((corners[t, 0], corners[t, 1]))
+        else:
+            standing = corners[t, 1 - up[t]].copy()
+        out[t] = _margins(_chain(standing), points[t : t + 1])[0]
     return out
 
 

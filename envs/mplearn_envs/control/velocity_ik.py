@@ -158,10 +158,9 @@ def errors(stance: Stance, pose: Pose, height: float, orientation: FloatArray) -
         out[6 * side + 3 : 6 * side + 6] = rotation_error(
             stance.foot_rotation[side], pose.rotation[foot]
         )
-        if stance.carried[side] > 0.0:
-            continue
         span = pose.position[stance.thighs[side]] - stance.foot_position[side]
-        flat = stance.reach[side] ** 2 - span[0] ** 2 - span[1] ** 2
+        reach = stance.reach[side] + stance.carried[side]  # no bound on a foot in the air
+        flat = reach**2 - span[0] ** 2 - span[1] ** 2
         rise = min(rise, np.sqrt(max(flat, 1e-4)) - span[2])
     out[12:14] = stance.cog - pose.moment[0, :2] / pose.carried[0]
     wanted = height - pose.position[0, 2]
