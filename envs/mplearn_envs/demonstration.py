@@ -43,6 +43,8 @@ class SyntheticStream(Stream):
         rate_hz: Frames per second [1/s].
     """
 
+    _ahead: FloatArray  # frames that are performed and not taken yet
+
     def __init__(self, rate_hz: float = 100.0) -> None:
         from mplearn.demonstrator import Demonstrator
 
@@ -69,7 +71,7 @@ class SyntheticStream(Stream):
 
         self._seed, self._n_taken = seed, 0
         self._blocks = Demonstrator(seed=seed, rate_hz=self.rate_hz).blocks()
-        self._ahead: FloatArray = np.zeros((0, len(self.channels)))
+        self._ahead = np.zeros((0, len(self.channels)))
         self.take(n_frames)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import Any, Literal, NamedTuple, SupportsFloat
 
 import gymnasium
@@ -19,7 +20,7 @@ from .choices import HOLD, Choices
 from .measurement import Measured
 from .observation import Eyes, Observation
 from .performance import Performance
-from .performer import Dynamics, Performer, PerformerState
+from .performer import Dynamics, Performer, PerformerState, make_performer
 from .repertoire import Repertoire
 from .screen import RENDER_MODES, Screen
 from .simulation import Simulation
@@ -56,9 +57,9 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
     }
 
     repertoire: Repertoire
-    performer: Performer
     task: Task
     dynamics: Dynamics
+    hold_s: float
     max_steps: int
     discount: float
     illegal: Literal["hold", "raise"]
@@ -71,15 +72,23 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
         repertoire = self.repertoire
         self.capacity = repertoire.capacity
         self.action_space = spaces.Discrete(self.capacity)
-        n_joints = len(repertoire.planner.robot.joint_names)
+        n_joints = len(repertoire.robot.joint_names)
         self._eyes = Eyes(n_joints, self.capacity, self.task.space(repertoire), flat)
         self.observation_space = self._eyes.space
         self._screen = screen
         self.render_mode = screen.mode
-        period_s = repertoire.planner.config.period_s
-        self._frame_steps = max(1, round(1.0 / (self.frame_rate_hz * period_s)))
         self.frame_callback: Callable[[], object] | None = None
         self._running = False
+
+    @cached_property
+    def performer(self) -> Performer:
+        """Who performs; made when it is first needed."""
+        return make_performer(self.dynamics, self.repertoire, self.hold_s)
+
+    @cached_property
+    def _frame_steps(self) -> int:
+        period_s = self.repertoire.planner.config.period_s
+        return max(1, round(1.0 / (self.frame_rate_hz * period_s)))
 
     # ---- what derived environments do besides
 

@@ -76,7 +76,7 @@ class Performer(ABC):
     def __init__(self, repertoire: Repertoire, hold_s: float) -> None:
         self.repertoire = repertoire
         self.hold_s = hold_s
-        self.simulation = Simulation(repertoire.planner.robot)
+        self.simulation = Simulation(repertoire.robot)
         self.reference: Reference = rest_reference(self.simulation.robot)
 
     @abstractmethod
@@ -225,8 +225,7 @@ class KinematicPerformer(Performer):
             )
             velocity[k] = span
         place = self._arrive(plan.end, velocity[-1])
-        soles = self.simulation.soles()
-        performance = assess(self.simulation.robot, plan, plan.q, velocity, soles, False)
+        performance = assess(self.simulation.robot, plan, plan.q, velocity, False)
         return _Known(Outcome.of(performance, place.measured, plan.speed), place)
 
     def _arrive(self, reference: Reference, velocity: FloatArray | None = None) -> _Place:

@@ -38,7 +38,7 @@ def soonest_arrivals(repertoire: Repertoire, choices: Choices) -> dict[int, Arri
     Returns:
         The soonest end of each primitive that can be reached without holding.
     """
-    robot = repertoire.planner.robot
+    robot = repertoire.robot
     sensors = Sensors(Simulation(robot))
     found: dict[int, Arrival] = {}
     queue: list[tuple[float, int, float, Reference]] = []

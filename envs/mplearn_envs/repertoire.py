@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections import OrderedDict
 from collections.abc import Hashable
+from functools import cached_property
 from threading import RLock
 from typing import Any
 from weakref import WeakValueDictionary
@@ -18,7 +19,7 @@ from mplearn.recording import FloatArray
 
 from .choices import Choices, choose_among
 from .control.controller import tracked_columns
-from .control.planner import Motion, Plan, Planner
+from .control.planner import Plan, Planner
 from .control.reference import Reference
 from .feasibility import Feasibility, FeasibilityCheck, FeasibilityConfig
 from .robot import Robot
@@ -37,7 +38,7 @@ class Repertoire:
 
     Args:
         library: The primitives and their transitions.
-        planner: Plans for the robot.
+        robot: The robot.
         capacity: Number of slots; None is the next power of two, at least 32.
         speed: Speed of performance, as a share of the human's.
         style: How motions are generated from primitives.
@@ -60,7 +61,7 @@ class Repertoire:
     def __init__(
         self,
         library: PrimitiveLibrary,
-        planner: Planner,
+        robot: Robot,
         capacity: int | None = None,
         speed: float = 0.5,
         style: StyleName = "deterministic",
@@ -73,13 +74,13 @@ class Repertoire:
             raise InvalidValueError(f"speed must be positive and finite, not {speed}")
         if not len(library) and not growing:
             raise LibraryError("the library is empty: there is nothing to perform")
-        self.planner = planner
+        self.robot = robot
         self.speed = float(speed)
         self.style = style
         self.limits = limits
         self.novel = novel
         self.growing = growing
-        self._tracked = tracked_columns(planner.robot)
+        self._tracked = tracked_columns(robot)
         self._slots = Slots(capacity, len(library))
         self.capacity = self._slots.capacity
         self._slots.require_room(len(library))
@@ -91,6 +92,11 @@ class Repertoire:
         self.lock = RLock()
         self.update(library)
 
+    @cached_property
+    def planner(self) -> Planner:
+        """Plans for the robot."""
+        return Planner(self.robot)
+
     def update(self, library: PrimitiveLibrary) -> tuple[int, ...]:
         """Take a newer snapshot; primitives that live on keep their slots.
 
@@ -100,14 +106,14 @@ class Repertoire:
         Raises:
             LibraryError: The library is for another body.
         """
-        _require_fit(library, self.planner)
+        _require_fit(library, self.robot)
         with self.lock:
             left_out = self._slots.update(library.ids)
             self.library = library
             self.slots = self._slots.of
             self.ids = tuple(sorted(self.slots))
             columns = {name: i for i, name in enumerate(library.channels)}
-            self._columns = [columns[name] for name in self.planner.robot.channels]
+            self._columns = [columns[name] for name in self.robot.channels]
             self._frames = {id: self._frames[id] for id in self.ids if id in self._frames}
             self._verdicts = {id: self._verdicts[id] for id in self.ids if id in self._verdicts}
             self._fresh: set[int] = set()  # ids whose frames are known to be this library's
@@ -177,7 +183,7 @@ class Repertoire:
         """Return the commands that perform a primitive from the present reference."""
         with self.lock:
             frames, rate_hz = self.frames(id)
-            motion = Motion(frames[:, self._tracked], rate_hz)
+            motion = self.planner.motion(frames, rate_hz)
             return self.planner.plan(start, motion, self.feasibility(id).speed, self.key(id))
 
     def hold(self, start: Reference, duration_s: float) -> Plan:
@@ -249,7 +255,7 @@ class Repertoire:
             f"{self.library[id].name}: {self.feasibility(id).problems[0]}" for id in ids[:6]
         )
         return (
-            f"robot {self.planner.robot.name!r} can perform none of the library's "
+            f"robot {self.robot.name!r} can perform none of the library's "
             f"{len(self.ids)} primitives ({reasons})"
         )
 
@@ -279,20 +285,16 @@ class Repertoire:
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what can be worked out again, and is large."""
         left_out = ("lock", "memory", "planner", "_check")
-        kept = {name: value for name, value in self.__dict__.items() if name not in left_out}
-        return kept | {"robot": self.planner.robot, "planner_config": self.planner.config}
+        return {name: value for name, value in self.__dict__.items() if name not in left_out}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        kept = dict(state)
-        self.planner = Planner(kept.pop("robot"), kept.pop("planner_config"))
-        self.__dict__.update(kept)
+        self.__dict__.update(state)
         self._check = None
         self.memory = OrderedDict()
         self.lock = RLock()
 
 
-def _require_fit(library: PrimitiveLibrary, planner: Planner) -> None:
-    robot = planner.robot
+def _require_fit(library: PrimitiveLibrary, robot: Robot) -> None:
     missing = [name for name in robot.channels if name not in library.channels]
     if missing or library.body not in ("", robot.name):
         raise LibraryError(
@@ -321,6 +323,6 @@ def shared_repertoire(
     key = (library.version, robot, capacity, speed, style, limits, novel)
     found = _SHARED.get(key)
     if found is None:
-        found = Repertoire(library, Planner(robot), capacity, speed, style, limits, novel=novel)
+        found = Repertoire(library, robot, capacity, speed, style, limits, novel=novel)
         _SHARED[key] = found
     return found

@@ -122,7 +122,7 @@ class GoalTask(Task):
             low = -high
             low[[0, 1, 8]] = 0.0
         elif self.kind == "posture":
-            width = len(repertoire.planner.robot.channels)
+            width = len(repertoire.robot.channels)
             high = np.concatenate((np.full(width, 10.0), np.full(width, 20.0), [1.0]))
             low = -high
             low[-1] = 0.0
@@ -309,7 +309,7 @@ class GoalTask(Task):
 
 def _hands(repertoire: Repertoire) -> tuple[int, ...]:
     """Return the bodies of the left and of the right hand."""
-    robot = repertoire.planner.robot
+    robot = repertoire.robot
     roles = dict(robot.segments)
     if not {"hand_l", "hand_r"} <= set(roles):
         raise InvalidValueError(
@@ -334,7 +334,7 @@ def _hand_target(target: Any) -> tuple[int, FloatArray]:
 
 
 def _posture_target(target: Any, repertoire: Repertoire) -> FloatArray:
-    channels = repertoire.planner.robot.channels
+    channels = repertoire.robot.channels
     if not isinstance(target, Mapping) or not target or not set(target) <= set(channels):
         raise InvalidValueError(
             f"a posture's target maps some of the channels {channels[:4]}... to values, "
