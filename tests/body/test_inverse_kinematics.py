@@ -272,3 +272,48 @@ def test_bad_frames():
         InverseKinematics(body, NAMES, rate_hz=0.0)
     with pytest.raises(InvalidValueError, match="outlier_m"):
         IKConfig(outlier_m=-1.0)
+
+
+def test_minks_solution_is_ours():
+    """mink, by quadratic programming on MuJoCo's Jacobians, ends in the same posture."""
+    import mink
+    import mujoco
+
+    body, rng = human_body(), np.random.default_rng(8)
+    truth = body.rest
+    low, high = body.joint_limits.T
+    truth[7:] = 0.5 * (low + high) + 0.25 * (high - low) * rng.uniform(-1, 1, len(low))
+    toes = [7 + body.joint_names.index(name) for name in ("toe_l", "toe_r")]
+    truth[toes] = 0.0  # no marker tells
+    start = truth.copy()
+    start[7:] = np.clip(truth[7:] + rng.normal(0, 0.08, len(low)), low, high)
+    start[toes] = 0.0
+    frame = markers_of(body, truth[None])[0] + rng.normal(0, 0.003, (39, 3))
+
+    spec = mujoco.MjSpec.from_string(body.xml)
+    chosen = marker_set("plug_in_gait39")
+    for name, carrier, offset in zip(chosen.names, chosen.bodies, chosen.offsets, strict=True):
+        spec.body(carrier).add_site(name=f"marker_{name}", pos=offset)
+    configuration = mink.Configuration(spec.compile(), q=start)
+    tasks = [
+        mink.FrameTask(f"marker_{name}", "site", position_cost=1.0, orientation_cost=0.0)
+        for name in NAMES
+    ]
+    for task, place in zip(tasks, frame, strict=True):
+        task.set_target(mink.SE3.from_translation(place))
+    limits = [mink.ConfigurationLimit(configuration.model)]
+    for _ in range(60):
+        velocity = mink.solve_ik(configuration, tasks, 1.0, "daqp", damping=1e-8, limits=limits)
+        configuration.integrate_inplace(velocity, 1.0)
+
+    ours = known(body, start, outlier_m=np.inf, joint_drift=1e4, base_drift=1e4,
+                 joint_speed=1e4, base_speed=1e4, most_uncertain=1e4, tolerance=1e-9,
+                 max_iterations=100)  # fmt: skip
+    ours._follower.rest_weight[:] = 1e-9
+    found = ours.update(frame)
+    misfits = [((markers_of(body, q[None]) - frame) ** 2).sum() for q in (found, configuration.q)]
+    assert misfits[0] == pytest.approx(misfits[1], rel=0.01)
+    np.testing.assert_allclose(found[:3], configuration.q[:3], atol=1e-4)
+    assert np.linalg.norm(turned_by(found, configuration.q)) < 1e-3
+    np.testing.assert_allclose(found[7:], configuration.q[7:], atol=0.015)  # flat about shoulders
+    assert np.degrees(np.abs(found - truth)[7:]).mean() < 2.5
