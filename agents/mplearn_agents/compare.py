@@ -107,7 +107,7 @@ def compare(
             f"{comparison.episodes} kinematic or {comparison.simulated_episodes} simulated "
             "episodes a seed. The return is discounted by time. Agents are trained kinematically, "
             f"one a seed, for {comparison.steps} macro steps. 'search' knows the environment's "
-            "hidden state: in 'follow' it foresees the demonstrator, and bounds what the others can.",
+            "hidden state: in 'follow' it foresees the demonstrator: a bound for the rest.",
         )
 
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 import argparse
 from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
+
+if TYPE_CHECKING:
+    from mplearn_agents.rl import TrainedPolicy, TrainingConfig
 
 HELP = "Train an agent to choose primitives, with masks, the prior and macro steps."
 
@@ -45,6 +48,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--resume", action="store_true", help="go on from the last checkpoint in the folder"
     )
+    parser.add_argument(
+        "--start",
+        type=Path,
+        metavar="FOLDER",
+        help="an agent whose knowledge to start from; its library may have grown since",
+    )
 
 
 def run(args: argparse.Namespace) -> None:
@@ -57,8 +66,24 @@ def run(args: argparse.Namespace) -> None:
     given = {f.name: getattr(args, f.name) for f in fields(TrainingConfig) if hasattr(args, f.name)}
     given["library"] = None if args.library is None else str(args.library)
     console = Console()
-    train(TrainingConfig(**given), args.out, resume=args.resume, console=console)
+    config = TrainingConfig(**given)
+    start = None if args.start is None else _taken_along(args.start, config)
+    train(config, args.out, resume=args.resume, start=start, console=console)
     lines = (args.out / "evaluation.csv").read_text(encoding="utf-8").splitlines()
     for name, value in zip(lines[0].split(","), lines[-1].split(","), strict=True):
         console.print(f"{name:>8s} {float(value):.4g}", highlight=False)
     console.print(f"agent written to {args.out}; see it with: mplearn perform --agent {args.out}")
+
+
+def _taken_along(folder: Path, config: TrainingConfig) -> TrainedPolicy:
+    """Return the agent of a folder, for the environment of a training."""
+    from mplearn_agents.rl import TrainedPolicy
+    from mplearn_agents.rl.train import make_environment
+
+    agent = TrainedPolicy.load(folder)
+    from mplearn_agents.rl.growing import grow
+
+    env = make_environment(config)
+    grown = grow(agent, env)
+    env.close()
+    return grown

@@ -50,7 +50,6 @@ class Recipe(NamedTuple):
         policy: The class, or name, of its network.
         buffer: Keyword and class of its memory.
         n_envs: How many environments it learns from at once.
-        masks: Whether it knows masks.
         settings: Its hyperparameters.
     """
 
@@ -58,7 +57,6 @@ class Recipe(NamedTuple):
     policy: Any
     buffer: dict[str, Any]
     n_envs: int
-    masks: bool
     settings: dict[str, Any]
 
 
@@ -68,14 +66,11 @@ RECIPES: dict[AlgorithmName, Recipe] = {
         MaskedPriorPolicy,
         {"rollout_buffer_class": MaskedMacroStepBuffer},
         8,
-        True,
         ON_POLICY,
     ),
-    "ppo": Recipe(
-        MacroPPO, PriorPolicy, {"rollout_buffer_class": MacroStepBuffer}, 8, False, ON_POLICY
-    ),
+    "ppo": Recipe(MacroPPO, PriorPolicy, {"rollout_buffer_class": MacroStepBuffer}, 8, ON_POLICY),
     "dqn": Recipe(
-        DQN, "MultiInputPolicy", {"replay_buffer_class": MacroReplayBuffer}, 1, False, OFF_POLICY
+        DQN, "MultiInputPolicy", {"replay_buffer_class": MacroReplayBuffer}, 1, OFF_POLICY
     ),
 }
 

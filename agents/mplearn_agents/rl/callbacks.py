@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -37,7 +38,7 @@ class ShowProgress(BaseCallback):
             TextColumn("{task.description}"),
             BarColumn(bar_width=32),
             TextColumn("{task.completed:.0f} of {task.total:.0f} steps"),
-            TextColumn("[cyan]{task.speed:.0f} steps/s"),
+            TextColumn("[cyan]{task.fields[speed]:.0f} steps/s"),
             TextColumn("[green]{task.fields[success]}"),
             TimeElapsedColumn(),
         )
@@ -48,8 +49,11 @@ class ShowProgress(BaseCallback):
         """Show the bar meanwhile."""
         name = f"{self.config.algorithm} on {self.config.task}"
         with self._bar:
-            self._task = self._bar.add_task(name, total=self.config.steps, success="")
+            self._task = self._bar.add_task(name, total=self.config.steps, speed=0, success="")
             yield
+
+    def _on_training_start(self) -> None:
+        self._began, self._first = time.perf_counter(), self.num_timesteps
 
     def _on_step(self) -> bool:
         return True
@@ -57,7 +61,8 @@ class ShowProgress(BaseCallback):
     def _on_rollout_end(self) -> None:
         recent = self.model.ep_success_buffer
         success = f"success {100 * np.mean(recent):.0f} %" if recent else ""
-        self._bar.update(self._task, completed=self.num_timesteps, success=success)
+        speed = (self.num_timesteps - self._first) / (time.perf_counter() - self._began)
+        self._bar.update(self._task, completed=self.num_timesteps, speed=speed, success=success)
 
 
 class Evaluation(BaseCallback):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -18,8 +18,8 @@ PRIOR = "transition_prior"
 class PrimitiveFeatures(BaseFeaturesExtractor):
     """Flattens an observation of a primitive environment, key by key in the order of the space.
 
-    Slots become one-hot vectors, measurements are scaled, and the logarithm of the prior is the
-    last block, shape (N, capacity), see `log_prior`.
+    Slots become one-hot vectors, measurements are scaled, and the logarithm of the prior comes
+    last, shape (N, capacity), see `log_prior`.
 
     Args:
         observation_space: A Dict with ``"transition_prior"``; of Discrete, MultiBinary and Box.
@@ -43,27 +43,44 @@ class PrimitiveFeatures(BaseFeaturesExtractor):
 
 
 def log_prior(observations: dict[str, torch.Tensor]) -> torch.Tensor:
-    """Return the logarithm of the prior, not below that of ``LEAST_PRIOR``, shape (N, capacity)."""
-    return torch.log(torch.clamp(observations[PRIOR].float(), min=LEAST_PRIOR))
+    """Return log max(prior / ``LEAST_PRIOR``, 1), shape (N, capacity): 0 for all that is unlikely.
+
+    As logits this is the prior itself; and a slot that is free is as if it were not there.
+    """
+    return torch.log(torch.clamp(observations[PRIOR].float() / LEAST_PRIOR, min=1.0))
 
 
-def feature_slots(observation_space: spaces.Dict, capacity: int) -> list[int | None]:
-    """Return which slot each of `PrimitiveFeatures` is about, None where it is about none.
+class Feature(NamedTuple):
+    """What one of `PrimitiveFeatures` is.
+
+    Attributes:
+        part: Key of the observation, and which of its blocks of slots.
+        place: Place in the part; None where there is a slot.
+        slot: Slot that it is about, or None.
+    """
+
+    part: str
+    place: int | None
+    slot: int | None
+
+
+def features_of(observation_space: spaces.Dict, capacity: int) -> list[Feature]:
+    """Return what each of `PrimitiveFeatures` is, in their order.
 
     A part of the observation is about slots if it is ``Discrete(capacity)`` or begins with blocks
     of ``capacity`` numbers within [0, 1].
     """
-    owners: list[int | None] = []
-    for part in observation_space.spaces.values():
+    out: list[Feature] = []
+    for key, part in observation_space.spaces.items():
         width = spaces.flatdim(part)
+        within = width
         if isinstance(part, spaces.Box):
             outside = ~((part.low >= 0.0) & (part.high <= 1.0)).ravel()
             within = int(np.argmax(outside)) if outside.any() else width
-            n_blocks = within // capacity
-        else:
-            n_blocks = int(width == capacity)
-        owners += [*range(capacity)] * n_blocks + [None] * (width - n_blocks * capacity)
-    return owners + list(range(capacity))
+        n_slots = within // capacity * capacity
+        out += [Feature(f"{key} {k // capacity}", None, k % capacity) for k in range(n_slots)]
+        out += [Feature(key, k, None) for k in range(width - n_slots)]
+    return out + [Feature("log prior", None, slot) for slot in range(capacity)]
 
 
 def _scale(key: str, part: spaces.Space[Any]) -> np.ndarray[Any, np.dtype[np.float32]]:

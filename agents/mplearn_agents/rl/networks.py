@@ -48,7 +48,7 @@ class _WithPrior:
 
     ``"logits"``: the untrained policy is the demonstrator's (nearly: the rest of the network starts
     small); training goes on from there. ``"regulariser"``: the entropy bonus becomes the bonus
-    -KL(policy || prior) = entropy + E[log prior].
+    -KL(policy || prior) = entropy + E[log prior], but for a constant.
     """
 
     def __init__(self, *args: Any, prior: PriorUse = "logits", **kwargs: Any) -> None:

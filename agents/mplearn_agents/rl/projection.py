@@ -12,15 +12,18 @@ from numpy.typing import ArrayLike
 def project(action: int, mask: ArrayLike) -> int:
     """Return a legal action for any action: itself if it is legal.
 
-    The n legal actions share the illegal ones evenly: action a stands for number a mod n of them,
-    so that exploring at random among all explores the legal ones evenly, too.
+    The n legal actions share the illegal ones evenly: the k-th illegal action stands for number
+    k mod n of them, so that exploring at random among all explores the legal ones evenly, too.
 
     Args:
         action: Any action.
         mask: Nonzero where an action is legal, shape (A,); at least one is.
     """
-    legal = np.flatnonzero(mask)
-    return action if np.asarray(mask)[action] else int(legal[action % len(legal)])
+    allowed = np.asarray(mask, dtype=bool)
+    if allowed[action]:
+        return action
+    legal = np.flatnonzero(allowed)
+    return int(legal[np.count_nonzero(~allowed[:action]) % len(legal)])
 
 
 class ProjectIllegal(gymnasium.Wrapper[Any, Any, Any, Any]):

@@ -49,6 +49,7 @@ def train(
     out: str | Path,
     *,
     resume: bool = False,
+    start: TrainedPolicy | None = None,
     console: Console | None = None,
 ) -> TrainedPolicy:
     """Train an agent.
@@ -61,6 +62,8 @@ def train(
         out: The folder; it is made.
         resume: Whether to go on from the folder's last checkpoint; ``config`` may ask for more
             steps than before, nothing else may differ.
+        start: An agent for this very environment, to go on from its weights, see
+            `mplearn_agents.rl.growing.grow`; None starts untrained.
         console: Where to show progress; None is silent.
 
     Returns:
@@ -68,7 +71,7 @@ def train(
 
     Raises:
         InvalidValueError: The folder holds a training and ``resume`` is not set, or the other way
-            round, or another training.
+            round, or another training; or ``start`` is for another environment.
         MissingDependencyError: The extra ``rl`` is not installed.
     """
     for module in ("torch", "sb3_contrib", "tensorboard"):
@@ -88,7 +91,7 @@ def train(
 
     def make() -> gymnasium.Env[Any, Any]:
         env = make_environment(config)
-        return Monitor(env if recipe.masks else ProjectIllegal(env))
+        return Monitor(env if config.algorithm == "maskable-ppo" else ProjectIllegal(env))
 
     torch.set_num_threads(1)  # these networks are small: threads cost more than they bring
     envs = DummyVecEnv([make] * recipe.n_envs)
@@ -100,8 +103,11 @@ def train(
         model = load_model(config.algorithm, out / _CHECKPOINT.format(done), envs)
     else:
         model = new_model(config, envs)
+        if start is not None:
+            start.require_fit(tested)
+            model.policy.load_state_dict(start.model.policy.state_dict())
     model.set_logger(configure(str(out / "log" / f"from-{done:09d}"), ["csv", "tensorboard"]))
-    policy = TrainedPolicy(model, recipe.masks, slots=slots)
+    policy = TrainedPolicy(model, config, slots)
     progress = ShowProgress(config, console)
     evaluation = Evaluation(policy, tested, config, out / "evaluation.csv")
     rollout = rollout_steps(config.algorithm)
@@ -116,6 +122,7 @@ def train(
             done = model.num_timesteps
             model.save(out / _CHECKPOINT.format(done))
     model.save(out / POLICY)
+    model.logger.close()
     envs.close()
     tested.close()
     return policy

@@ -1,0 +1,82 @@
+"""Takes a trained agent along when its library has grown: what it knew, it goes on knowing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium
+import torch
+from stable_baselines3.common.vec_env import DummyVecEnv
+from torch import Tensor
+
+from mplearn.errors import InvalidValueError
+
+from .algorithms import new_model
+from .features import features_of
+from .trained import TrainedPolicy
+
+
+def grow(agent: TrainedPolicy, env: gymnasium.Env[Any, Any]) -> TrainedPolicy:
+    """Return an agent for an environment whose library has more primitives, or others.
+
+    Primitives that the agent knew keep their weights, wherever their slots are now: where only they
+    are legal it acts as before. A new primitive starts as in an untrained agent: by the prior. To
+    train it further, give it to `train` as ``start``.
+
+    Args:
+        agent: An agent trained by "maskable-ppo" or "ppo".
+        env: The environment to act in from now on; of the same task.
+
+    Raises:
+        InvalidValueError: The agent is of another kind, or the environment's observation has other
+            parts.
+    """
+    if agent.config.algorithm == "dqn":
+        raise InvalidValueError("agents of maskable-ppo and ppo can grow, not of dqn")
+    slots: dict[int, int] = dict(env.unwrapped.repertoire.slots)  # type: ignore[attr-defined]
+    moved = {0: 0} | {agent.slots[id]: slots[id] for id in agent.slots if id in slots}
+    model = new_model(agent.config, DummyVecEnv([lambda: env]))
+    known: dict[str, Tensor] = agent.model.policy.state_dict()
+    grown: dict[str, Tensor] = model.policy.state_dict()
+    columns = _columns(agent.model, model, moved)
+    with torch.no_grad():
+        for name, old in known.items():
+            new = grown[name]
+            if name.endswith(("policy_net.0.weight", "value_net.0.weight")):
+                inputs = {here: there for here, there in columns.items() if here < new.shape[1]}
+                new[:, list(inputs)] = old[:, list(inputs.values())]
+            elif name.startswith("action_net."):
+                _copy_actions(old, new, moved)
+            elif not name.startswith(("features_extractor.", "pi_features", "vf_features")):
+                new.copy_(old)
+    return TrainedPolicy(model, agent.config, slots, agent.deterministic)
+
+
+def _columns(old: Any, new: Any, moved: Mapping[int, int]) -> dict[int, int]:
+    """Return for the features of the new model where they were in the old one, as far as known."""
+    before = features_of(old.observation_space, int(old.action_space.n))
+    after = features_of(new.observation_space, int(new.action_space.n))
+    if {each.part for each in before} != {each.part for each in after}:
+        raise InvalidValueError(
+            f"the agent sees {sorted({each.part for each in before})}, the environment shows "
+            f"{sorted({each.part for each in after})}"
+        )
+    now = {
+        each._replace(slot=None if each.slot is None else moved[each.slot]): place
+        for place, each in enumerate(before)
+        if each.slot is None or each.slot in moved
+    }
+    return {place: now[each] for place, each in enumerate(after) if each in now}
+
+
+def _copy_actions(old: Tensor, new: Tensor, moved: Mapping[int, int]) -> None:
+    """Copy the rows of known actions; the last columns of a matrix are about slots, too."""
+    there, here = torch.tensor(list(moved)), torch.tensor(list(moved.values()))
+    if old.ndim == 1:
+        new[here] = old[there]
+        return
+    hidden = old.shape[1] - old.shape[0]
+    new[here, :hidden] = old[there, :hidden]
+    new[here, hidden:] = 0.0  # what a known action makes of the prior of new ones
+    new[here[:, None], hidden + here] = old[there[:, None], hidden + there]
