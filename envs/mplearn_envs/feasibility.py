@@ -149,11 +149,14 @@ class FeasibilityCheck:
         footwork = motion.footwork
         up = -1 if footwork is None else footwork.up_at(False)
         if footwork is not None and up >= 0:
-            still = (np.repeat(part[:1], 2, axis=0) for part in footwork[:3])
-            footwork = Footwork(*still, (Lift(up, -1, 2),))
-        else:
-            footwork = None
-        return self.planner.plan(here, Motion(first, 1.0, footwork), 1.0).end
+            legs, rise, apart = (
+                np.repeat(part[:1], 2, axis=0)
+                for part in (footwork.legs, footwork.rise, footwork.left_from_right)
+            )
+            return self.planner.plan(
+                here, Motion(first, 1.0, Footwork(legs, rise, apart, (Lift(up, -1, 2),))), 1.0
+            ).end
+        return self.planner.plan(here, Motion(first, 1.0), 1.0).end
 
     def _flight(self, frames: FloatArray) -> tuple[Problem, ...]:
         """Look for soles in the air while the base is higher than it can stand."""

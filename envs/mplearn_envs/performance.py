@@ -8,7 +8,7 @@ import numpy as np
 
 from mplearn.recording import BoolArray, FloatArray
 
-from .control.guide import left_share, support
+from .control.guide import support
 from .control.kinematics import places
 from .control.momentum import ground_reaction, momenta
 from .control.planner import Plan
@@ -59,7 +59,7 @@ def assess(robot: Robot, plan: Plan, q: FloatArray, v: FloatArray, fallen: bool)
     cog, linear, angular = momenta(ref.tree, ref.inertia, q, v)
     zmp = ground_reaction(float(ref.tree.mass.sum()), cog, linear, angular, plan.knot_s)
     feet = places(ref.tree, ref.stance.feet, q)
-    share = left_share(ref, plan)[:n]
+    share = plan.share[:n]
     seen = support(share, feet).see(cog[:, :2])
     wanted = support(share, plan.ground[:n]).see(plan.cog[:n, :2])
     margin = margins_along(

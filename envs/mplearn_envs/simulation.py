@@ -12,6 +12,7 @@ import numpy as np
 from mplearn.errors import InvalidValueError
 from mplearn.recording import BoolArray, FloatArray
 
+from .control.gravity import standing_commands
 from .control.guide import Guide
 from .control.planner import Plan
 from .control.reference import rest_reference, sole_corners
@@ -62,7 +63,7 @@ class Simulation:
         data = mujoco.MjData(self.model)
         rest = rest_reference(self.robot).q
         data.qpos[:] = rest
-        data.ctrl[:] = rest[7:]
+        data.ctrl[:] = standing_commands(self.robot, rest)
         for _ in range(round(SETTLE_S / self.model.opt.timestep)):
             mujoco.mj_step(self.model, data)
         data.time = 0.0

@@ -11,6 +11,7 @@ from mplearn.recording import FloatArray
 from mplearn_envs.robot import BASE_CHANNELS, Robot
 
 from .balance import BalanceController
+from .gravity import standing_commands
 from .reference import Reference, reference_robot, rest_reference
 from .upper_body import UpperBodyTracker, servo_commands
 
@@ -73,7 +74,8 @@ class StandingController(Controller):
         after = self._balance.update(before, target, self.period_s)
         self._reference = after
         rate = (after.q - before.q)[7:] / self.period_s
-        return np.asarray(servo_commands(self.robot, after.q[None, 7:], rate[None])[0])
+        held = standing_commands(self.robot, after.q)
+        return np.asarray(servo_commands(self.robot, held[None], rate[None])[0])
 
 
 def tracked_columns(robot: Robot) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

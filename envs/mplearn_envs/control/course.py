@@ -15,7 +15,8 @@ from mplearn.recording import FloatArray, IntArray
 from .footwork import Footwork
 
 RAMP_S = 0.3  # in which a motion that had to wait gathers speed
-SWING_S = 0.5  # to raise or lower a foot where the motion itself does not [s]
+SWING_S = 0.4  # to raise or lower a foot where the motion itself does not [s], and the more
+SWING_S_PER_M = 2.0  # the higher [s/m]
 LEAST_SWING_S = 0.4  # in which one foot carries, at least [s]
 SHIFT_S = 0.5  # to bring the weight anywhere [s], and the more the farther:
 SHIFT_S_PER_M = 2.5  # [s/m]
@@ -61,8 +62,18 @@ def shift_time_s(distance_m: float) -> float:
     return SHIFT_S + SHIFT_S_PER_M * distance_m
 
 
+def swing_time_s(height_m: float) -> float:
+    """Return how long a foot takes to such a height, or from there to the ground [s]."""
+    return SWING_S + SWING_S_PER_M * height_m
+
+
 def stretches(
-    n_frames: int, footwork: Footwork | None, up: int, to_foot_m: float, apart_m: float
+    n_frames: int,
+    footwork: Footwork | None,
+    up: int,
+    rise_m: float,
+    to_foot_m: float,
+    apart_m: float,
 ) -> list[Stretch]:
     """Divide a motion where feet leave the ground and land.
 
@@ -70,6 +81,7 @@ def stretches(
         n_frames: Length of the motion.
         footwork: Its feet; None where both stay down.
         up: Side of the foot that is in the air before it; -1 for none.
+        rise_m: How high it is [m].
         to_foot_m: How far the COG is from the foot that shall carry first [m].
         apart_m: How far the feet are apart [m].
     """
@@ -78,7 +90,7 @@ def stretches(
     begins_up = lifts[0].side if lifts and lifts[0].start < 0 else -1
     out = []
     if up >= 0 and up != begins_up:
-        out.append(Stretch(0, 0, up, -1, SWING_S))
+        out.append(Stretch(0, 0, up, -1, swing_time_s(rise_m)))
     here, loaded = 0, 1 - up if up >= 0 else -1
     for lift in lifts:
         start, end = max(lift.start, 0), min(lift.end, last)
@@ -89,7 +101,8 @@ def stretches(
         elif start > here:
             out.append(Stretch(here, start, -1, -1, 0.0))
         if lift.start < 0 and not carried_on:
-            out.append(Stretch(0, 0, lift.side, -1, SWING_S))
+            height = 0.0 if footwork is None else float(footwork.rise[0, lift.side])
+            out.append(Stretch(0, 0, lift.side, -1, swing_time_s(height)))
         lands = lift.end if lift.end < n_frames else -1
         out.append(Stretch(start, end, lift.side, lands, LEAST_SWING_S if lands >= 0 else 0.0))
         here, loaded = end, 1 - lift.side

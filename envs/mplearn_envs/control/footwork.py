@@ -124,7 +124,7 @@ def _lifts(gap: FloatArray, skims: BoolArray, longest: int) -> list[Lift]:
             if gap[start:end, side].max() > LIFT_M:
                 found.append((start, end, side))
     found.sort()
-    out = []
+    out: list[Lift] = []
     for i, (start, end, side) in enumerate(found):
         earliest = max(out[-1].end if out else 0, start - longest)
         latest = min(found[i + 1][0] if i + 1 < len(found) else n_frames, end + longest)

@@ -17,8 +17,7 @@ from mplearn_envs.robot import Robot
 
 from .pendulum import pendulum_rate
 from .planner import Plan
-from .reference import ReferenceRobot, reference_robot
-from .stride import sole_middles
+from .reference import reference_robot
 from .support import GRAVITY
 
 GAIN = 3.0  # zero-moment point per DCM error; 1 would just stop it from growing
@@ -43,16 +42,6 @@ class Support(NamedTuple):
         x, y = (points - self.origin).T
         c, s = np.cos(self.heading), np.sin(self.heading)
         return np.stack((c * x + s * y, c * y - s * x), axis=-1)
-
-
-def left_share(robot: ReferenceRobot, plan: Plan) -> FloatArray:
-    """Return which share of the weight the left foot carries in a plan, shape (K + 1,)."""
-    left, right = np.moveaxis(sole_middles(robot, plan.ground), -2, 0)
-    across = left - right
-    along = np.sum((plan.zmp - right) * across, axis=1) / np.sum(across * across, axis=1)
-    share = np.clip(along, 0.0, 1.0)
-    share[plan.up == 0], share[plan.up == 1] = 0.0, 1.0
-    return np.asarray(share)
 
 
 def support(share: FloatArray, feet: FloatArray) -> Support:
@@ -82,7 +71,7 @@ class Guide:
         self, robot: Robot, plan: Plan, gain: float = GAIN, largest_m: float = LARGEST_M
     ) -> None:
         ref = reference_robot(robot)
-        share = left_share(ref, plan)
+        share = plan.share
         seen = support(share, plan.ground)
         self.rate = pendulum_rate(float(plan.cog[:, 2].mean()))
         cog = plan.cog[:, :2]

@@ -21,12 +21,14 @@ from mplearn_envs.robot import Robot
 
 from .course import Course, lay_out, stretches
 from .footwork import Footwork, Lift, read_footwork
+from .gravity import holding_torques
 from .kinematics import forward
 from .legs import balanced_path
 from .momentum import ground_reaction, momenta, velocities
 from .reference import N_BASE, Reference, reference_robot
 from .stride import (
     CARRY_M,
+    left_share,
     plan_ground,
     plan_rise,
     plan_weight,
@@ -96,6 +98,7 @@ class Plan(NamedTuple):
             (K + 1,) [m].
         ground: Where each foot stands or would: x, y [m] and yaw [rad], shape (K + 1, 2, 3).
         up: Side of the foot in the air at each posture, 0 left, 1 right, -1 none, shape (K + 1,).
+        share: Which share of the weight the left foot carries, shape (K + 1,).
     """
 
     commands: FloatArray
@@ -109,6 +112,7 @@ class Plan(NamedTuple):
     zmp_margin_m: FloatArray
     ground: FloatArray
     up: IntArray
+    share: FloatArray
 
     @property
     def duration_s(self) -> float:
@@ -137,6 +141,7 @@ class Planner:
         self._velocity = np.concatenate(
             (self._reference.velocity[:N_BASE], robot.per_joint("velocity"))
         )
+        self._stiffness = robot.per_joint("stiffness")
         joints = robot.position_limits[robot.leg_joints].copy()
         knees = np.isin(robot.leg_joints, [robot.joint_names.index(name) for name in robot.knees])
         joints[knees, 0] = np.maximum(joints[knees, 0], 0.5 * robot.guard_knee_rad)
@@ -236,13 +241,18 @@ class Planner:
             if excess <= 1.0 or error.max() > OUT_OF_REACH:
                 break
             speed /= 1.02 * excess
-        position, rate = refine(q[:, 7:], knot_s, self.config.knot_steps)
-        commands = servo_commands(self.robot, position, rate)
         ground = np.concatenate((start.ground[None], ground))
         up = np.concatenate(([start.lifted], course.up))
         balance, zmp, margin = self._balance(q, ground, up, knot_s)
+        middles = sole_middles(self._reference, ground)
+        carried = np.where(np.isfinite(zmp), zmp, balance[:, :2])  # a wild motion may fly
+        share = left_share(middles, up, carried)
+        torque = holding_torques(self._reference, q, share, carried, middles)
+        led = q[:, 7:] + torque / self._stiffness  # a servo gives way to what it holds
+        position, rate = refine(led, knot_s, self.config.knot_steps)
+        commands = servo_commands(self.robot, position, rate)
         end = self._end(targets, q[-1], ground[-1], int(up[-1]), knot_s)
-        return Plan(commands, q, knot_s, error, end, speed, balance, zmp, margin, ground, up)
+        return Plan(commands, q, knot_s, error, end, speed, balance, zmp, margin, ground, up, share)
 
     def _targets(
         self, start: Reference, motion: Motion, speed: float, knot_s: float, here: FloatArray
@@ -274,7 +284,8 @@ class Planner:
         middles = sole_middles(self._reference, start.ground)
         to_foot = float(np.linalg.norm(middles - here[:2], axis=1).max())
         apart = float(np.linalg.norm(middles[0] - middles[1]))
-        parts = stretches(n_frames, footwork, start.lifted, to_foot, apart)
+        rise = float(start.swing[-2:].max())
+        parts = stretches(n_frames, footwork, start.lifted, rise, to_foot, apart)
         course = lay_out(parts, 1.0 / (motion.rate_hz * speed), knot_s, wait_s, 1.0)
         at = course.progress
         time = np.arange(1.0, len(at) + 1.0) * knot_s
@@ -283,9 +294,9 @@ class Planner:
         path = frames[low] * (1 - share) + frames[low + 1] * share
         moves = wait_s == 0 and parts[0].first < parts[0].last
         first = (frames[1] - frames[0]) * motion.rate_hz * speed if moves else 0.0
-        rise = path[:, -2:].copy()
+        heights = path[:, -2:].copy()
         path += _fading(time, blend_s, gap, before_rate - first)
-        path[:, -2:] = plan_rise(course, rise, start, path[:, -2:])
+        path[:, -2:] = plan_rise(course, heights, start, path[:, -2:])
         path = np.clip(path, limits[:, 0], limits[:, 1])
         width = len(self._rates) - 2
         path[:, :width] = limit_velocity(

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mplearn.recording import FloatArray
+from mplearn.recording import FloatArray, IntArray
 
 from .course import Course, shift_time_s
 from .footwork import Footwork
@@ -81,13 +81,14 @@ def sole_middles(robot: ReferenceRobot, ground: FloatArray) -> FloatArray:
     """Return the middles of both soles, shape (..., 2, 2) [m], for feet at (..., 2, 3)."""
     middle = robot.corners.mean(axis=1)[:, :2]
     c, s = np.cos(ground[..., 2]), np.sin(ground[..., 2])
-    return np.stack(
+    out: FloatArray = np.stack(
         (
             ground[..., 0] + c * middle[:, 0] - s * middle[:, 1],
             ground[..., 1] + s * middle[:, 0] + c * middle[:, 1],
         ),
         axis=-1,
     )
+    return out
 
 
 def sole_outlines(robot: ReferenceRobot, ground: FloatArray) -> FloatArray:
@@ -97,6 +98,21 @@ def sole_outlines(robot: ReferenceRobot, ground: FloatArray) -> FloatArray:
     x, y = corners[..., 0], corners[..., 1]
     place = ground[..., None, :2]
     return np.asarray(place + np.stack((c * x - s * y, s * x + c * y), axis=-1))
+
+
+def left_share(middles: FloatArray, up: IntArray, zmp: FloatArray) -> FloatArray:
+    """Return which share of the weight the left foot carries, shape (T,).
+
+    Args:
+        middles: Middles of the soles, shape (T, 2, 2) [m].
+        up: Side of the foot in the air, -1 for none, shape (T,).
+        zmp: Zero-moment points, shape (T, 2) [m].
+    """
+    left, right = middles[:, 0], middles[:, 1]
+    across = left - right
+    share = np.clip(np.sum((zmp - right) * across, axis=1) / np.sum(across**2, axis=1), 0.0, 1.0)
+    share[up == 0], share[up == 1] = 0.0, 1.0
+    return np.asarray(share)
 
 
 def recentred(q: FloatArray, ground: FloatArray) -> tuple[FloatArray, FloatArray]:
