@@ -121,7 +121,7 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
         self._history: tuple[int, ...] = ()
         self._time_s = 0.0
         self._n_steps = 0
-        self._choices: Choices = self.repertoire.entries(self.performer.reference.target)
+        self._choices: Choices = self.repertoire.entries(self.performer.reference)
         self.task.reset(self._scene(options or {}))
         self._running = True
         self._show()
@@ -276,7 +276,7 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
         if gone or (chosen is None and self._choices.dead_end):
             self._current = None
         if self._current is None:
-            self._choices = self.repertoire.entries(self.performer.reference.target)
+            self._choices = self.repertoire.entries(self.performer.reference)
         else:
             self._choices = self.repertoire.after(self._current)
 
@@ -295,7 +295,7 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
         return Scene(
             self.repertoire,
             self._measured,
-            self.performer.reference.target,
+            self.performer.reference,
             self._current,
             self._history,
             self._time_s,

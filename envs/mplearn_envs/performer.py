@@ -6,16 +6,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable
 from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
-import mujoco
 import numpy as np
 
 from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray
 
+from .control.momentum import velocities
 from .control.planner import Plan
 from .control.reference import Reference, rest_reference
 from .measurement import Measured, Sensors
-from .performance import Performance, assess
+from .performance import Performance
 from .repertoire import Repertoire
 from .simulation import Simulation
 
@@ -214,18 +214,16 @@ class KinematicPerformer(Performer):
         self._sensors.at(self.reference.q)
 
     def _performed(self, plan: Plan) -> _Known:
-        model = self.simulation.model
-        velocity = np.empty((len(plan.q), model.nv))
-        span = np.zeros(model.nv)
-        last = len(plan.q) - 1
-        for k in range(last + 1):
-            before, after = max(k - 1, 0), min(k + 1, last)
-            mujoco.mj_differentiatePos(
-                model, span, (after - before) * plan.knot_s, plan.q[before], plan.q[after]
-            )
-            velocity[k] = span
-        place = self._arrive(plan.end, velocity[-1])
-        performance = assess(self.simulation.robot, plan, plan.q, velocity, False)
+        n_knots = len(plan.q) - 1
+        performance = Performance(
+            np.arange(1.0, n_knots + 1.0) * plan.knot_s,
+            np.zeros(n_knots),
+            np.zeros(n_knots),
+            plan.zmp_margin_m[1:],
+            False,
+            plan.duration_s,
+        )
+        place = self._arrive(plan.end, velocities(plan.q[-2:], plan.knot_s)[-1])
         return _Known(Outcome.of(performance, place.measured, plan.speed), place)
 
     def _arrive(self, reference: Reference, velocity: FloatArray | None = None) -> _Place:

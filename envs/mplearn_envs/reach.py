@@ -41,22 +41,22 @@ def soonest_arrivals(repertoire: Repertoire, choices: Choices) -> dict[int, Arri
     robot = repertoire.robot
     sensors = Sensors(Simulation(robot))
     found: dict[int, Arrival] = {}
-    queue: list[tuple[float, int, float, Reference]] = []
+    queue: list[tuple[float, int, Reference]] = []  # time, which offer, where it leads
+    offered: list[int] = []
 
     def offer(time_s: float, here: Reference, following: Choices) -> None:
         for slot in np.flatnonzero(following.mask).tolist():
             id = repertoire.primitive(slot)
             if slot != HOLD and id is not None and id not in found:
-                expected_s = time_s + repertoire.duration_s(id)
-                heapq.heappush(queue, (expected_s, id, time_s, here))
+                plan = repertoire.plan(here, id)
+                heapq.heappush(queue, (time_s + plan.duration_s, len(offered), plan.end))
+                offered.append(id)
 
     offer(0.0, rest_reference(robot), choices)
     while queue:
-        _, id, time_s, here = heapq.heappop(queue)
-        if id in found:
-            continue
-        plan = repertoire.plan(here, id)
-        time_s += plan.duration_s
-        found[id] = Arrival(time_s, plan.end, sensors.at(plan.end.q))
-        offer(time_s, plan.end, repertoire.after(id))
+        time_s, order, end = heapq.heappop(queue)
+        id = offered[order]
+        if id not in found:
+            found[id] = Arrival(time_s, end, sensors.at(end.q))
+            offer(time_s, end, repertoire.after(id))
     return found

@@ -207,9 +207,9 @@ class Repertoire:
                 self.memory.popitem(last=False)
 
     def duration_s(self, id: int) -> float:
-        """Return how long the robot takes for a primitive that it can perform [s]."""
+        """Return how long a primitive that it can perform takes the robot from where it starts."""
         frames, rate_hz = self.frames(id)
-        return (len(frames) - 1) / rate_hz / self.feasibility(id).speed
+        return (len(frames) - 1) / rate_hz / self.feasibility(id).tempo
 
     def after(self, id: int) -> Choices:
         """Return what may follow a primitive: observed transitions that are feasible, and hold."""
@@ -222,14 +222,15 @@ class Repertoire:
                 )
             return self._after[id]
 
-    def entries(self, posture: FloatArray) -> Choices:
-        """Return with which primitives a walk may begin in a posture: those that start near it.
+    def entries(self, reference: Reference) -> Choices:
+        """Return with which primitives a walk may begin somewhere: those that start near it.
 
-        They are the feasible ones that start at most ``ENTRY_GAP`` farther than the nearest one, so
-        that there always are some; weighted by how often each was seen.
+        They are the feasible ones that start on the same feet, at most ``ENTRY_GAP`` farther than
+        the nearest one, so that there always are some (on other feet where there is none on
+        these); weighted by how often each was seen.
 
         Args:
-            posture: Tracked coordinates, shape (U,) [m, rad].
+            reference: Where the reference robot is.
 
         Raises:
             RobotError: There are primitives, and the robot can perform none of them.
@@ -239,15 +240,17 @@ class Repertoire:
         with self.lock:
             if self._starts is None:
                 self._starts = np.array([self.frames(id)[0][0, self._tracked] for id in self.ids])
-            apart = np.abs(self._starts - posture)
+            apart = np.abs(self._starts - reference.target)
             apart[:, 0] *= HEIGHT_SCALE
-            gaps = apart.max(axis=1)
-            near = [self.ids[k] for k in np.argsort(gaps, kind="stable")]
-            gap = dict(zip(self.ids, gaps.tolist(), strict=True))
-            first = next((id for id in near if self.feasibility(id).feasible), None)
-            if first is None:
+            gaps = dict(zip(self.ids, apart.max(axis=1).tolist(), strict=True))
+            near = sorted(self.ids, key=lambda id: (gaps[id], id))
+            able = [id for id in near if self.feasibility(id).feasible]
+            if not able:
                 raise RobotError(self._nothing_feasible(near))
-            within = [id for id in near if gap[id] <= gap[first] + ENTRY_GAP]
+            here = [id for id in able if self.feasibility(id).starts_up == reference.lifted]
+            reach = gaps[(here or able)[0]] + ENTRY_GAP
+            other_feet = set(able) - set(here) if here else set()
+            within = [id for id in near if gaps[id] <= reach and id not in other_feet]
             return self._choices({id: float(self.library[id].n_exemplars) for id in within})
 
     def _nothing_feasible(self, ids: list[int]) -> str:

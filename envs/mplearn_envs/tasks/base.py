@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium import spaces
 
 from mplearn.recording import FloatArray
+from mplearn_envs.control.reference import Reference
 from mplearn_envs.measurement import Measured
 from mplearn_envs.performance import Performance
 from mplearn_envs.repertoire import Repertoire
@@ -37,7 +38,7 @@ class Scene(NamedTuple):
     Attributes:
         repertoire: What the robot can perform, in which slots, and what may follow what.
         measured: How the robot stands.
-        target: Tracked coordinates of the reference robot, shape (U,) [m, rad].
+        reference: Where the reference robot is.
         current: Id of the primitive performed last; None at the start and after a dead end.
         history: Ids of the primitives performed in this episode, the latest last, at most 100.
         time_s: Time since the start of the episode [s].
@@ -47,7 +48,7 @@ class Scene(NamedTuple):
 
     repertoire: Repertoire
     measured: Measured
-    target: FloatArray
+    reference: Reference
     current: int | None
     history: tuple[int, ...]
     time_s: float

@@ -98,7 +98,7 @@ class FollowTask(Task):
         self._repertoire, self._rng = repertoire, scene.rng
         if self._library is not repertoire.library:
             self._library = repertoire.library
-            self._first = repertoire.entries(scene.target)
+            self._first = repertoire.entries(scene.reference)
             if self._first.dead_end:
                 raise NoPathError("the demonstrator can begin with nothing that the robot can do")
             self._predicted: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}

@@ -141,7 +141,7 @@ class GoalTask(Task):
         """
         repertoire = scene.repertoire
         if self._library is not repertoire.library:
-            self._arrivals = soonest_arrivals(repertoire, repertoire.entries(scene.target))
+            self._arrivals = soonest_arrivals(repertoire, repertoire.entries(scene.reference))
             self._library = repertoire.library
             self._hands = _hands(repertoire) if self.kind == "hand" else ()
         target = scene.options.get("target", self.target)

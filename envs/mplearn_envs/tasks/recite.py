@@ -182,7 +182,7 @@ def _require_possible(ids: tuple[int, ...], scene: Scene) -> None:
 
 def _direct(repertoire: Repertoire, id: int | None, scene: Scene) -> set[int]:
     """Return what may follow directly; None is the start of the episode."""
-    choices = repertoire.entries(scene.target) if id is None else repertoire.after(id)
+    choices = repertoire.entries(scene.reference) if id is None else repertoire.after(id)
     following = (repertoire.primitive(slot) for slot in np.flatnonzero(choices.mask).tolist())
     return {other for other in following if other is not None}
 
