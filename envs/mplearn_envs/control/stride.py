@@ -73,7 +73,7 @@ def landing(ground: FloatArray, side: int, left_from_right: FloatArray) -> Float
     moved = place - ground[side]
     moved[2] = np.arctan2(np.sin(moved[2]), np.cos(moved[2]))
     if np.hypot(moved[0], moved[1]) < SAME_PLACE_M and abs(moved[2]) < SAME_YAW_RAD:
-        return ground[side].copy()
+        return np.array(ground[side])
     return np.asarray(ground[side] + moved)
 
 

@@ -1,0 +1,301 @@
+"""Random walks on the learned graph, performed in simulation with a wrong model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mplearn.evaluation.table import Table, percent
+from mplearn.library import PrimitiveLibrary
+from mplearn.recording import FloatArray
+from mplearn_envs.control import Motion, Plan, Planner, reference_robot, rest_reference
+from mplearn_envs.control.kinematics import places
+from mplearn_envs.feasibility import Feasibility, FeasibilityCheck
+from mplearn_envs.performance import Performance
+from mplearn_envs.robot import Robot, humanoid
+from mplearn_envs.simulation import Simulation
+
+from .model_error import disturb
+
+FASTEST = 2.0  # as a share of the human's speed; limits slow down most motions
+
+
+@dataclass(frozen=True)
+class Skill:
+    """One primitive as the robot performs it.
+
+    Attributes:
+        name: Its name.
+        motion: What shall be performed.
+        verdict: Whether it can be, and how fast.
+    """
+
+    name: str
+    motion: Motion
+    verdict: Feasibility
+
+    @property
+    def lifts(self) -> bool:
+        """Whether a foot leaves the ground."""
+        return self.motion.footwork is not None
+
+
+@dataclass
+class Walk:
+    """What came of one random walk.
+
+    Attributes:
+        speed: Speed that was asked for, as a share of the human's.
+        lifting: Whether primitives that lift a foot were among them.
+        fell: Name of the primitive in which the robot fell; empty if it never did.
+        duration_s: Simulated time [s].
+        steps: Of each primitive performed: name, largest COG deviation [m], smallest margin of the
+            zero-moment point [m], mean square of the tracking error [rad^2], drift [m] and turn
+            [rad] of the standing foot against the plan, share of the human's speed.
+    """
+
+    speed: float
+    lifting: bool
+    fell: str = ""
+    duration_s: float = 0.0
+    steps: list[tuple[str, float, float, float, float, float, float]] = field(default_factory=list)
+
+
+def skills(library: PrimitiveLibrary, planner: Planner, speed: float) -> dict[int, Skill]:
+    """Judge all primitives of a library at a speed, as a share of the human's."""
+    check = FeasibilityCheck(planner)
+    columns = [library.channels.index(name) for name in planner.robot.channels]
+    out = {}
+    for id in library.ids:
+        generated = library.generate([id])
+        frames = np.ascontiguousarray(generated.frames[:, columns])
+        if len(frames) == 1:
+            frames = np.repeat(frames, 2, axis=0)
+        motion = planner.motion(frames, generated.rate_hz)
+        verdict = check.judge(frames, generated.rate_hz, speed)
+        out[id] = Skill(library[id].name, motion, verdict)
+    return out
+
+
+def random_walks(
+    library: PrimitiveLibrary,
+    seeds: Sequence[int],
+    n_primitives: int = 200,
+    speeds: Sequence[float] = (0.5, 1.0, FASTEST),
+    error: float = 0.1,
+    robot: Robot | None = None,
+) -> list[Walk]:
+    """Walk at random on the graph, with and without primitives that lift a foot.
+
+    The next primitive is drawn by how often the demonstrator chose it; where he chose none that the
+    robot can perform, any. The robot is never reset.
+
+    Args:
+        library: The primitives; needs the robot's channels.
+        seeds: One walk each; masses, gains and friction are drawn anew for each.
+        n_primitives: Primitives in a row.
+        speeds: Speeds, as shares of the human's.
+        error: Largest model error, as a share.
+        robot: Who walks; None is the humanoid.
+    """
+    planner = Planner(robot or humanoid())
+    out = []
+    for speed in speeds:
+        known = skills(library, planner, speed)
+        for lifting in (False, True):
+            allowed = [
+                id for id, s in known.items() if s.verdict.feasible and (lifting or not s.lifts)
+            ]
+            for seed in seeds:
+                rng = np.random.default_rng(seed)
+                walk = Walk(speed, lifting)
+                _walk(walk, library, known, allowed, planner, n_primitives, error, rng)
+                out.append(walk)
+    return out
+
+
+def _walk(
+    walk: Walk,
+    library: PrimitiveLibrary,
+    known: dict[int, Skill],
+    allowed: list[int],
+    planner: Planner,
+    n_primitives: int,
+    error: float,
+    rng: np.random.Generator,
+) -> None:
+    simulation = Simulation(planner.robot)
+    disturb(simulation.model, error, rng)
+    simulation.reset()
+    here = rest_reference(planner.robot)
+    last: int | None = None
+    for _ in range(n_primitives):
+        last = _next(library, last, allowed, rng)
+        skill = known[last]
+        plan = planner.plan(here, skill.motion, skill.verdict.speed, (last, walk.speed))
+        before = simulation.data.qpos.copy()
+        performance = simulation.perform(plan)
+        walk.duration_s += performance.duration_s
+        after = simulation.data.qpos.copy()
+        walk.steps.append(_figures(skill, plan, performance, before, after, planner.robot))
+        here = plan.end
+        if performance.fallen:
+            walk.fell = skill.name
+            return
+
+
+def _next(
+    library: PrimitiveLibrary, last: int | None, allowed: list[int], rng: np.random.Generator
+) -> int:
+    weight = np.ones(len(allowed))
+    if last is not None:
+        prior = dict(zip(library.graph.ids, library.graph.prior(last), strict=True))
+        chosen = np.array([prior.get(id, 0.0) for id in allowed])
+        weight = chosen if chosen.sum() > 0 else weight
+    return int(rng.choice(allowed, p=weight / weight.sum()))
+
+
+def _figures(
+    skill: Skill,
+    plan: Plan,
+    performance: Performance,
+    before: FloatArray,
+    after: FloatArray,
+    robot: Robot,
+) -> tuple[str, float, float, float, float, float, float]:
+    ref = reference_robot(robot)
+    drift, turn = np.nan, np.nan
+    stood = [side for side in range(2) if side not in (plan.up[0], plan.up[-1])]
+    if stood and not performance.fallen:
+        feet = places(ref.tree, ref.stance.feet, np.stack((before, after)))[:, stood[0]]
+        wanted = plan.ground[[0, -1], stood[0]]
+        moved = _moved(feet) - _moved(wanted)
+        drift, turn = float(np.hypot(moved[0], moved[1])), float(abs(moved[2]))
+    return (
+        skill.name,
+        float(performance.cog_deviation_m.max()),
+        float(performance.zmp_margin_m.min()),
+        float(np.mean(performance.tracking_error_rad**2)),
+        drift,
+        turn,
+        skill.motion.duration_s / plan.duration_s,
+    )
+
+
+def _moved(place: FloatArray) -> FloatArray:
+    """Return how a foot moved, (2, 3) to (3,): x, y [m] as it stood first, yaw [rad]."""
+    c, s = np.cos(place[0, 2]), np.sin(place[0, 2])
+    x, y, turn = place[1] - place[0]
+    return np.array([c * x + s * y, c * y - s * x, np.arctan2(np.sin(turn), np.cos(turn))])
+
+
+def walk_table(walks: Iterable[Walk]) -> Table:
+    """Return one row for each speed and choice of primitives."""
+    rows = []
+    for speed, lifting, group in _grouped(walks):
+        steps = [step for walk in group for step in walk.steps]
+        fell = [walk.fell for walk in group if walk.fell]
+        kinds = len({step[0] for step in steps})
+        rows.append(
+            (
+                _speed_name(speed),
+                "lifted too" if lifting else "both down",
+                f"{len(group)} x {max(len(walk.steps) for walk in group)}",
+                str(kinds),
+                f"{len(fell)}" + (f" ({', '.join(sorted(set(fell)))})" if fell else ""),
+                *_columns(steps),
+                f"{sum(walk.duration_s for walk in group) / 60:.0f}",
+            )
+        )
+    return Table(
+        "Random walks in simulation, masses, gains and friction wrong by up to 10 %",
+        ("speed", "feet", "walks x primitives", "kinds", "falls", *_COLUMNS, "minutes"),
+        tuple(rows),
+        _NOTE,
+    )
+
+
+def primitive_table(walks: Iterable[Walk]) -> Table:
+    """Return one row for each primitive and speed, from walks that lift feet too."""
+    rows = []
+    for speed, lifting, group in _grouped(walks):
+        if not lifting:
+            continue
+        steps = [step for walk in group for step in walk.steps]
+        for name in sorted({step[0] for step in steps}):
+            of_it = [step for step in steps if step[0] == name]
+            pace = float(np.median([step[6] for step in of_it]))
+            rows.append(
+                (name, _speed_name(speed), f"{pace:.2f}", str(len(of_it)), *_columns(of_it))
+            )
+    return Table(
+        "Each primitive in these walks",
+        ("primitive", "speed", "pace", "times", *_COLUMNS),
+        tuple(rows),
+        _NOTE + " Pace: the human's duration over the robot's, time to shift the weight and to "
+        "come from where the robot was included; median.",
+    )
+
+
+def speed_table(
+    library: PrimitiveLibrary, robot: Robot | None = None, speeds: Sequence[float] = (0.5, 1.0)
+) -> Table:
+    """Return which share of the primitives the robot performs at a speed, and why not the rest."""
+    planner = Planner(robot or humanoid())
+    rows = []
+    for speed in speeds:
+        known = skills(library, planner, speed)
+        verdicts = [skill.verdict for skill in known.values()]
+        full = [v for v in verdicts if v.feasible and v.speed >= 0.999 * speed]
+        slowed = [v for v in verdicts if v.feasible and v.speed < 0.999 * speed]
+        refused = [s for s in known.values() if not s.verdict.feasible]
+        rows.append(
+            (
+                _speed_name(speed),
+                percent(len(full) / len(verdicts)),
+                percent(len(slowed) / len(verdicts)),
+                percent(len(refused) / len(verdicts)),
+                f"{np.median([v.tempo for v in full + slowed]) / speed:.2f}" if full else "-",
+                "; ".join(f"{s.name}: {s.verdict.problems[0]}" for s in refused) or "-",
+            )
+        )
+    return Table(
+        f"What robot {planner.robot.name!r} performs of {len(library)} learned primitives",
+        ("speed", "performed", "performed slower", "refused", "pace", "why"),
+        tuple(rows),
+        "Pace: duration wanted over duration, time to shift the weight included; median.",
+    )
+
+
+_COLUMNS = ("COG off [cm]", "ZMP margin [cm]", "RMSE [deg]", "drift [mm]", "turn [deg]")
+_NOTE = (
+    "COG off: largest distance of the centre of gravity from its plan over the standing feet. ZMP "
+    "margin: least distance of the zero-moment point from the edge of the soles that should stand. "
+    "RMSE: of all joints. Drift, turn: of the standing foot against the plan, mean of a primitive."
+)
+
+
+def _columns(steps: list[tuple[str, float, float, float, float, float, float]]) -> tuple[str, ...]:
+    values = np.array([step[1:6] for step in steps])
+    drift = values[np.isfinite(values[:, 3])]
+    return (
+        f"{100 * values[:, 0].max():.2f}",
+        f"{100 * values[:, 1].min():.1f}",
+        f"{np.rad2deg(np.sqrt(values[:, 2].mean())):.3f}",
+        f"{1000 * drift[:, 3].mean():.1f}" if len(drift) else "-",
+        f"{np.rad2deg(drift[:, 4].mean()):.2f}" if len(drift) else "-",
+    )
+
+
+def _grouped(walks: Iterable[Walk]) -> list[tuple[float, bool, list[Walk]]]:
+    groups: dict[tuple[float, bool], list[Walk]] = {}
+    for walk in walks:
+        groups.setdefault((walk.speed, walk.lifting), []).append(walk)
+    return [(speed, lifting, group) for (speed, lifting), group in groups.items()]
+
+
+def _speed_name(speed: float) -> str:
+    known = {0.5: "half", 1.0: "human", FASTEST: "fastest"}
+    return known.get(speed, f"{speed:g}")
