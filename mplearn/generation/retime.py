@@ -13,6 +13,7 @@ from .trajectory import Trajectory
 
 _BLEND_S = 0.1  # half the time over which one primitive's slow-down passes into the next one's
 _MARGIN = 1.002  # overshoots what is still too fast a little, so that few rounds suffice
+_PRECISION = 1.01  # of a slow-down
 _MAX_ROUNDS = 100
 _MAX_FRAMES = 5_000_000
 
@@ -26,8 +27,8 @@ def retime(
     """Return the trajectory at a speed, with each primitive slowed down as far as limits demand.
 
     The postures passed through stay the same; only when they are passed changes. Each primitive
-    has one slow-down, the smallest (to about 1 %) with which its own frames keep within the limits;
-    around a join it changes gradually. Limits hold for `Trajectory.velocities` and
+    has one slow-down, and none of them could be smaller (by more than about 1 %) while the others
+    stay; around a join it changes gradually. Limits hold for `Trajectory.velocities` and
     `Trajectory.accelerations` of what is returned.
 
     Args:
@@ -50,13 +51,42 @@ def retime(
     if (slow_down == 1.0).all():
         return trajectory
     warp = _Warp(trajectory)
+
+    def excess_at(factors: FloatArray) -> FloatArray:
+        return _excess(warp.at(factors), v_limits, a_limits)
+
+    return warp.at(_smallest(_sufficient(slow_down, excess_at), 1.0 / speed, excess_at))
+
+
+def _sufficient(slow_down: FloatArray, excess_at: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Return slow-downs, shape (P,), at least as large, that keep within the limits."""
     for _ in range(_MAX_ROUNDS):
-        slowed = warp.at(slow_down)
-        excess = _excess(slowed, v_limits, a_limits)
+        excess = excess_at(slow_down)
         if (excess <= 1.0).all():
-            return slowed
+            return slow_down
         slow_down = np.where(excess > 1.0, slow_down * excess * _MARGIN, slow_down)
     raise InvalidValueError("no slow-down was found that keeps this trajectory within the limits")
+
+
+def _smallest(
+    slow_down: FloatArray, least: float, excess_at: Callable[[FloatArray], FloatArray]
+) -> FloatArray:
+    """Take back what neighbours make superfluous: each factor in turn, the largest first.
+
+    A fast frame near a join may be slow enough by its neighbour's factor alone.
+    """
+    for p in np.argsort(-slow_down, kind="stable"):
+        low, high = least, float(slow_down[p])
+        tried = high / _PRECISION
+        while high > _PRECISION * low:
+            trial = slow_down.copy()
+            trial[p] = max(tried, low)
+            if (excess_at(trial) <= 1.0).all():
+                slow_down, high = trial, float(trial[p])
+            else:
+                low = float(trial[p])
+            tried = np.sqrt(low * high)
+    return slow_down
 
 
 class _Warp:

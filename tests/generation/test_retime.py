@@ -1,3 +1,5 @@
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -5,6 +7,7 @@ from hypothesis import strategies as st
 
 from mplearn.errors import InvalidValueError
 from mplearn.generation import Trajectory, retime
+from mplearn.generation.retime import _excess, _Warp
 
 RATE = 100.0
 
@@ -22,7 +25,7 @@ def motion(seed, n_pieces=3, n_channels=4, rate_hz=RATE):
     return Trajectory(frames, rate_hz, tuple("abcdefgh"[:n_channels]), ids)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     seed=st.integers(0, 2**32),
     velocity=st.floats(0.2, 30),
@@ -78,6 +81,24 @@ def test_the_slow_down_is_the_smallest_and_each_primitives_own():
     assert 200 <= lengths[0] <= 225
     assert 395 <= lengths[1] <= 405
     assert np.abs(after.velocities).max() == pytest.approx(2.0, rel=0.01)
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_no_pair_of_slow_downs_is_much_shorter(seed):
+    """Brute force over both factors of a path of two primitives, in steps of 6 %."""
+    rng = np.random.default_rng(seed)
+    before = motion(seed, n_pieces=2, n_channels=2)
+    limits, a_limits = np.full(2, rng.uniform(1, 8)), np.full(2, rng.uniform(5, 120))
+    after = retime(before, limits, a_limits)
+    warp = _Warp(before)
+    grid = 1.06 ** np.arange(0, 1 + np.log(len(after) / 25) / np.log(1.06))
+    lengths = [
+        len(slowed)
+        for pair in product(grid[grid < 6], repeat=2)
+        if len(slowed := warp.at(np.array(pair))) < 0.97 * len(after)
+        and (_excess(slowed, limits, a_limits) <= 1).all()
+    ]
+    assert not lengths or min(lengths) > 0.9 * len(after)
 
 
 def test_accelerations_fall_with_the_square():
