@@ -3,8 +3,8 @@
 The cost E_n of the cheapest path with exactly n segments falls with n. A switching cost C prefers
 the n that minimises E_n + C (n - 1): a vertex of the lower convex envelope of (n, E_n), for all C
 between the slopes of its two sides. The number that is preferred over the longest range of C is
-the one that the data speak for [Kohlmorgen2003]. Ranges are compared as ratios, since the scale of
-the distances is not known; that of a single segment ends at E_1, which no change can save.
+the one that the data speak for [Kohlmorgen2003]. A single segment is preferred for all C above some
+value; it is chosen where the first change would save next to nothing of E_1.
 
 On-line it is found over the windows of the FIFO, thinned out to a fixed number, so that the work is
 bounded at any frame rate.
@@ -20,6 +20,7 @@ from numba import njit
 from ..recording import FloatArray
 
 MOST_SEGMENTS = 12
+LEAST_SAVING = 0.05  # of the cost of a single segment
 ROWS = 64
 
 
@@ -60,9 +61,9 @@ def longest_range(costs: FloatArray) -> tuple[int, float, float]:
         n, and the least and greatest C for which it is preferred; n = 0 where nothing is to choose.
     """
     most = costs.shape[0]
-    best_n, best_low, best_high, best_ratio = 0, 0.0, 0.0, 0.0
+    best_n, best_low, best_high = 0, 0.0, 0.0
     n, high = 0, costs[0]
-    while n < most - 1 and high > 0.0:
+    while n < most - 1:
         step, low = n, 0.0  # the steepest way down from here is the next side of the envelope
         for m in range(n + 1, most):
             slope = (costs[n] - costs[m]) / (m - n)
@@ -70,8 +71,10 @@ def longest_range(costs: FloatArray) -> tuple[int, float, float]:
                 step, low = m, slope
         if step == n:
             break
-        if high / low > best_ratio:
-            best_n, best_low, best_high, best_ratio = n + 1, low, high, high / low
+        if n == 0 and low < LEAST_SAVING * costs[0]:
+            return 1, low, costs[0]
+        if n > 0 and high - low > best_high - best_low:
+            best_n, best_low, best_high = n + 1, low, high
         n, high = step, low
     return best_n, best_low, best_high
 

@@ -43,7 +43,7 @@ class ZeroVelocityConfig:
     min_length_s: float = 0.3
     max_length_s: float = 10.0
     memory_s: float = 30.0
-    trust: float = 1.5
+    trust: float = 1.3
 
     def __post_init__(self) -> None:
         check_positive(self, "cutoff_hz", "still_s", "min_length_s", "memory_s", "trust")

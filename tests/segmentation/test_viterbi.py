@@ -18,7 +18,6 @@ from mplearn.segmentation.viterbi import (
 )
 from mplearn.segmentation.windows import density_distance, push_point, window_arrays
 
-
 ONE = np.ones(1)  # all channels alike
 
 

@@ -6,7 +6,6 @@ from scipy.integrate import dblquad, quad
 
 from mplearn.segmentation.windows import density_distance, push_point, window_arrays
 
-
 ONE = np.ones(1)  # all channels alike
 
 
