@@ -3,6 +3,7 @@
 from .config import LearnerConfig as LearnerConfig
 from .events import Anomaly as Anomaly
 from .events import Event as Event
+from .events import PersonChanged as PersonChanged
 from .events import PrimitiveBorn as PrimitiveBorn
 from .events import PrimitiveMerged as PrimitiveMerged
 from .events import PrimitiveSplit as PrimitiveSplit

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from ..errors import InvalidValueError
+from ..people import PeopleConfig
 from ..tree import TreeConfig
 
 
@@ -22,6 +23,7 @@ class LearnerConfig:
             they are learned as positions.
         segmenter: Name of the segmenter, one of `mplearn.segmentation.SEGMENTERS`.
         tree: How primitives are formed.
+        people: What makes motions of different people one primitive.
         longest_pause_s: Two primitives with a longer pause between them do not count as
             consecutive [s].
         order_surprise: A transition less likely than ``exp(-order_surprise)`` is an anomaly [nats].
@@ -34,6 +36,7 @@ class LearnerConfig:
     observe: Literal["robot", "markers"] = "robot"
     segmenter: str = "kohlmorgen-lemm"
     tree: TreeConfig = field(default_factory=TreeConfig)
+    people: PeopleConfig = field(default_factory=PeopleConfig)
     longest_pause_s: float = 2.0
     order_surprise: float = 4.0
     motion_radius: float = 2.0

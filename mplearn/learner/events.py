@@ -104,6 +104,21 @@ class TransitionSeen:
 
 
 @dataclass(frozen=True)
+class PersonChanged:
+    """Somebody else stands there than before; what comes next does not follow what came.
+
+    Attributes:
+        frame: First frame of that person.
+        person: Number of the person, 0, 1, ... in the order of their coming.
+        new: Whether he or she was never seen before.
+    """
+
+    frame: int
+    person: int
+    new: bool
+
+
+@dataclass(frozen=True)
 class Anomaly:
     """Something out of the ordinary.
 
@@ -128,4 +143,5 @@ Event: TypeAlias = (
     | PrimitiveSplit
     | TransitionSeen
     | Anomaly
+    | PersonChanged
 )

@@ -16,15 +16,17 @@ from ..body import BodyView, MotionObserver, view_of
 from ..errors import BodyError, FrameError
 from ..graph import TransitionGraph
 from ..library import PrimitiveLibrary
+from ..people import PeopleConfig, PeopleTree
 from ..recording import FloatArray, Recording, Segment, are_markers
 from ..segmentation import make_segmenter
-from ..tree import FormConfig, PrimitiveTree, TreeConfig
+from ..tree import FormConfig, TreeConfig
 from .buffer import FrameBuffer
 from .chain import Chain
 from .config import LearnerConfig
 from .events import (
     Anomaly,
     Event,
+    PersonChanged,
     PrimitiveBorn,
     PrimitiveMerged,
     PrimitiveSplit,
@@ -48,7 +50,7 @@ class MotionLearner:
     Attributes:
         channels: Names of the channels that primitives are made of: the robot's features where
             markers are observed, the stream's own channels otherwise.
-        tree: The tree of primitives.
+        tree: The tree of primitives, of all people.
         graph: The transitions between them.
         n_frames: Frames seen, of all streams.
     """
@@ -62,12 +64,23 @@ class MotionLearner:
         width = len(self._view.channels)
         self._segmenter = make_segmenter(config.segmenter, width, config.rate_hz)
         self._buffer = FrameBuffer(width)
-        self.tree = PrimitiveTree(config.tree, width, config.rate_hz)
+        self.tree = PeopleTree(config.tree, width, config.rate_hz, people=config.people)
         self.graph = TransitionGraph()
         self._chain = Chain(self.graph, config.rate_hz, config.longest_pause_s)
         self.n_frames = 0
         self._stream_start = 0
         self._clock_s: float | None = None
+        self._person = -1
+        self._n_people = 0
+        self._arrivals = 0
+
+    @property
+    def person(self) -> int:
+        """Number of the person who moves, 0, 1, ... in the order of their coming.
+
+        People are told apart by their markers; without markers all is one person's.
+        """
+        return max(self._person, 0)
 
     # ---- learning
 
@@ -87,7 +100,7 @@ class MotionLearner:
             self._check_clock(time_s)
         features = frame[None] if self._observer is None else self._observer.update(frame)
         self._clock_s = time_s
-        return self._learn(features)
+        return self._take(features)
 
     def learn_many(self, frames: FloatArray) -> list[Event]:
         """Take many frames, shape (T, D): bit-identical to `learn_one` in a loop."""
@@ -127,13 +140,9 @@ class MotionLearner:
         events: list[Event] = []
         if self._observer is not None:
             with suppress(BodyError):  # too short a stream to know whose it was
-                events = self._learn(self._observer.flush())
-            self._observer = self._new_observer()
-        for segment in self._segmenter.flush():
-            events.extend(self._close(segment))
-        self._stream_start = self.n_frames
-        self._buffer = FrameBuffer(self._buffer.n_channels)
-        self._chain.broken()
+                events = self._take(self._observer.flush())
+            self._observer.restart()
+        events += self._cut()
         self._clock_s = None
         return events
 
@@ -158,6 +167,9 @@ class MotionLearner:
             "n_frames": self.n_frames,
             "stream_start": self._stream_start,
             "clock_s": self._clock_s,
+            "person": self._person,
+            "n_people": self._n_people,
+            "arrivals": self._arrivals,
         }
 
     @classmethod
@@ -166,7 +178,9 @@ class MotionLearner:
         settings = dict(state["config"])
         tree = dict(settings.pop("tree"))
         form = FormConfig(**tree.pop("form"))
-        learner = cls(LearnerConfig(**settings, tree=TreeConfig(**tree, form=form)))
+        people = PeopleConfig(**settings.pop("people"))
+        rules = TreeConfig(**tree, form=form)
+        learner = cls(LearnerConfig(**settings, tree=rules, people=people))
         if learner._observer is not None:
             learner._observer.load_state(state["observer"])
         learner._segmenter.load_state(state["segmenter"])
@@ -177,6 +191,9 @@ class MotionLearner:
         learner.n_frames = int(state["n_frames"])
         learner._stream_start = int(state["stream_start"])
         learner._clock_s = state["clock_s"]
+        learner._person = int(state["person"])
+        learner._n_people = int(state["n_people"])
+        learner._arrivals = int(state["arrivals"])
         return learner
 
     # ---- inside
@@ -222,11 +239,33 @@ class MotionLearner:
                 f"{passed_s:.4g} s; after a gap, end the stream or fill it with NaN"
             )
 
+    def _take(self, features: FloatArray) -> list[Event]:
+        """Take features that are ready, shape (k, D), all of one person."""
+        if not len(features):
+            return []
+        events: list[Event] = []
+        observer = self._observer
+        if observer is not None and observer.arrivals != self._arrivals:
+            events = self._cut() if self.n_frames > self._stream_start else []
+            before, self._person = self._person, observer.person
+            self._arrivals = observer.arrivals
+            if before not in (-1, self._person):
+                new = self._person >= self._n_people
+                events.append(PersonChanged(self.n_frames, self._person, new))
+            self._n_people = max(self._n_people, self._person + 1)
+        return events + self._learn(features)
+
+    def _cut(self) -> list[Event]:
+        """Close what is open; what comes next does not follow it."""
+        events = [e for segment in self._segmenter.flush() for e in self._close(segment)]
+        self._stream_start = self.n_frames
+        self._buffer = FrameBuffer(self._buffer.n_channels)
+        self._chain.broken()
+        return events
+
     def _learn(self, features: FloatArray) -> list[Event]:
         """Take features that are ready, shape (k, D)."""
         events: list[Event] = []
-        if not len(features):
-            return events
         for seen in self._view.see(features):
             segments = self._segmenter.update(seen)
             self._buffer.append(seen)
@@ -249,7 +288,7 @@ class MotionLearner:
             self._chain.paused(segment)
             return [SegmentClosed(segment)]
         known = len(self.tree.leaves)
-        placement = self.tree.insert(frames)
+        placement = self.tree.insert(frames, self.person)
         events: list[Event] = [SegmentClosed(segment, placement)]
         if placement.recognised:
             events.append(Recognised(segment, placement.node_id, placement.distance))

@@ -6,11 +6,11 @@ from ..body import View
 from ..graph import TransitionGraph
 from ..hmm import LeftRightHMM
 from ..library import Primitive, PrimitiveLibrary, TreeNode
-from ..tree import PrimitiveTree
+from ..people import PeopleTree
 
 
 def library_of(
-    tree: PrimitiveTree,
+    tree: PeopleTree,
     graph: TransitionGraph,
     view: View,
     channels: tuple[str, ...],
@@ -18,6 +18,8 @@ def library_of(
     body: str,
 ) -> PrimitiveLibrary:
     """Return the primitives and transitions that are known now.
+
+    What several people do is one primitive, with a node of the tree for each person below it.
 
     Args:
         tree: Its leaves become primitives.

@@ -62,7 +62,8 @@ def common_recogniser(
             "numbers": np.concatenate([begins[p] + bank["numbers"] for p, bank in banks.items()]),
             "columns": np.concatenate([bank["columns"] for bank in banks.values()]),
         },
-        "index": {
+        "index": next(iter(states.values()))["index"]
+        | {
             "limit": max(scales[p] * float(state["index"]["limit"]) for p, state in states.items()),
             "ids": np.array(list(leaves), dtype=np.int64)[order],
             "parents": np.full(len(leaves), ROOT, dtype=np.int64),
