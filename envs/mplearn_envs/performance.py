@@ -9,16 +9,16 @@ import numpy as np
 from mplearn.recording import BoolArray, FloatArray
 
 from .control.guide import support
-from .control.kinematics import places
+from .control.kinematics import places, points_along
 from .control.momentum import ground_reaction, momenta
 from .control.planner import Plan
 from .control.reference import reference_robot
-from .control.stride import sole_outlines
 from .control.support import margins_along
 from .robot import Robot
 
 FALL_TILT_RAD = 0.6
 FALL_DROP_M = 0.2
+_TOUCHES_M = 0.004  # a sole so near the floor carries
 
 
 class Performance(NamedTuple):
@@ -30,8 +30,8 @@ class Performance(NamedTuple):
             [rad].
         cog_deviation_m: Distance of the COG's projection from where it should be over the feet that
             carry, shape (S,) [m]; with both feet down that is the middle of the soles.
-        zmp_margin_m: Distance of the zero-moment point from the edge of the soles that should be
-            down, (S,) [m].
+        zmp_margin_m: Distance of the zero-moment point from the edge of the soles that stand, (S,)
+            [m].
         fallen: Whether the robot fell; the last sample is when.
         duration_s: How long it took [s].
     """
@@ -62,9 +62,10 @@ def assess(robot: Robot, plan: Plan, q: FloatArray, v: FloatArray, fallen: bool)
     share = plan.share[:n]
     seen = support(share, feet).see(cog[:, :2])
     wanted = support(share, plan.ground[:n]).see(plan.cog[:n, :2])
-    margin = margins_along(
-        sole_outlines(ref, feet[1:]), plan.up[1:n], np.nan_to_num(zmp, nan=np.inf)
-    )
+    soles = points_along(ref.tree, ref.stance.feet, ref.corners, q[1:])
+    landed = soles[..., 2].min(axis=2).max(axis=1) < _TOUCHES_M
+    up = np.where(landed, -1, plan.up[1:n])
+    margin = margins_along(soles[..., :2], up, np.nan_to_num(zmp, nan=np.inf))
     error = q[1:, 7:] - plan.q[1:n, 7:]
     time = np.arange(1.0, n) * plan.knot_s
     return Performance(

@@ -16,7 +16,7 @@ from .footwork import Footwork
 
 RAMP_S = 0.3  # in which a motion that had to wait gathers speed
 SWING_S = 0.4  # to raise or lower a foot where the motion itself does not [s], and the more
-SWING_S_PER_M = 2.0  # the higher [s/m]
+SWING_S_PER_M = 3.0  # the higher [s/m]
 LEAST_SWING_S = 0.4  # in which one foot carries, at least [s]
 SHIFT_S = 0.5  # to bring the weight anywhere [s], and the more the farther:
 SHIFT_S_PER_M = 2.5  # [s/m]

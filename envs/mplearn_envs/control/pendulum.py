@@ -91,6 +91,18 @@ def _solve_banded(bands: FloatArray, right: FloatArray) -> None:
         right[i] /= bands[0, i]
 
 
+def zmp_along(cog: FloatArray, height: float, dt: float) -> FloatArray:
+    """Return a pendulum's zero-moment points on a path at rest at both ends, (K + 1, 2) [m].
+
+    Args:
+        cog: The path, shape (K + 1, 2) [m].
+        height: Height of the COG over the ground [m].
+        dt: Time between its points [s].
+    """
+    longer = np.vstack((cog[:1], cog, cog[-1:]))
+    return np.asarray(cog - height / GRAVITY * np.diff(longer, n=2, axis=0) / dt**2)
+
+
 def pendulum_rate(height: float) -> float:
     """Return the rate at which a pendulum of that height [m] diverges [1/s]."""
     return float(np.sqrt(GRAVITY / height))

@@ -25,6 +25,7 @@ from .gravity import holding_torques
 from .kinematics import forward
 from .legs import balanced_path
 from .momentum import ground_reaction, momenta, velocities
+from .pendulum import zmp_along
 from .reference import N_BASE, Reference, reference_robot
 from .stride import (
     CARRY_M,
@@ -40,6 +41,8 @@ from .support import margins_along
 from .upper_body import limit_velocity, servo_commands
 
 GRID_DECIMALS = 6
+CLOSE_M = 0.035  # a zero-moment point so near the edge is planned again, for all masses
+_SOLE_M = 0.1  # by no more than this
 OUT_OF_REACH = 1e-3  # [m, rad]: an error that slowing down does not mend
 
 
@@ -219,40 +222,51 @@ class Planner:
         here = pose.moment[0] / pose.carried[0]
         for _ in range(4):
             course, targets = self._targets(start, motion, speed, knot_s, here)
-            width = len(self._reference.limits)
             ground = plan_ground(course, motion.footwork, start.ground)
-            carried = np.clip(targets[:, -2:] / CARRY_M, 0.0, 1.0)
-            carried = carried * carried * (3.0 - 2.0 * carried)
-            middles = sole_middles(self._reference, ground)
-            cog, _ = plan_weight(course, middles, here[:2], here[2], knot_s)
-            q, error = balanced_path(
-                self._reference,
-                targets[:, :width],
-                targets[:, width:],
-                ground,
-                carried,
-                cog,
-                start.q,
-            )
-            tracked = np.vstack((start.target, targets[:, :width]))
-            path = np.hstack((tracked[:, :N_BASE], q[:, 7:]))  # (K + 1, 3 + n)
-            velocity = np.diff(path, axis=0) / knot_s
-            excess = float(np.max(np.abs(velocity) / self._velocity))
+            weight = plan_weight(course, sole_middles(self._reference, ground), here[:2], knot_s)
+            cog = weight.path(here[2], knot_s)
+            q, error = self._follow(start, targets, ground, cog)
+            excess = self._excess(start, targets, q, knot_s)
             if excess <= 1.0 or error.max() > OUT_OF_REACH:
                 break
             speed /= 1.02 * excess
-        ground = np.concatenate((start.ground[None], ground))
         up = np.concatenate(([start.lifted], course.up))
-        balance, zmp, margin = self._balance(q, ground, up, knot_s)
-        middles = sole_middles(self._reference, ground)
-        carried = np.where(np.isfinite(zmp), zmp, balance[:, :2])  # a wild motion may fly
-        share = left_share(middles, up, carried)
-        torque = holding_torques(self._reference, q, share, carried, middles)
+        standing = np.concatenate((start.ground[None], ground))
+        balance, zmp, margin = self._balance(q, standing, up, knot_s)
+        if not weight.still and margin.min() < CLOSE_M and np.isfinite(zmp).all():
+            off = zmp - zmp_along(np.vstack((here[:2], cog)), here[2], knot_s)
+            off = np.clip(off, -_SOLE_M, _SOLE_M)
+            q, error = self._follow(start, targets, ground, weight.path(here[2], knot_s, off))
+            balance, zmp, margin = self._balance(q, standing, up, knot_s)
+        middles = sole_middles(self._reference, standing)
+        borne = np.where(np.isfinite(zmp), zmp, balance[:, :2])  # a wild motion may fly
+        share = left_share(middles, up, borne)
+        torque = holding_torques(self._reference, q, share, borne, middles)
         led = q[:, 7:] + torque / self._stiffness  # a servo gives way to what it holds
         position, rate = refine(led, knot_s, self.config.knot_steps)
         commands = servo_commands(self.robot, position, rate)
         end = self._end(targets, q[-1], ground[-1], int(up[-1]), knot_s)
-        return Plan(commands, q, knot_s, error, end, speed, balance, zmp, margin, ground, up, share)
+        return Plan(
+            commands, q, knot_s, error, end, speed, balance, zmp, margin, standing, up, share
+        )
+
+    def _follow(
+        self, start: Reference, targets: FloatArray, ground: FloatArray, cog: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the reference postures and their errors; see `balanced_path`."""
+        width = len(self._reference.limits)
+        carried = np.clip(targets[:, -2:] / CARRY_M, 0.0, 1.0)
+        carried = carried * carried * (3.0 - 2.0 * carried)
+        path: tuple[FloatArray, FloatArray] = balanced_path(
+            self._reference, targets[:, :width], targets[:, width:], ground, carried, cog, start.q
+        )
+        return path
+
+    def _excess(self, start: Reference, targets: FloatArray, q: FloatArray, knot_s: float) -> float:
+        """Return the largest velocity as a share of its limit."""
+        base = np.vstack((start.target[:N_BASE], targets[:, :N_BASE]))
+        velocity = np.diff(np.hstack((base, q[:, 7:])), axis=0) / knot_s
+        return float(np.max(np.abs(velocity) / self._velocity))
 
     def _targets(
         self, start: Reference, motion: Motion, speed: float, knot_s: float, here: FloatArray

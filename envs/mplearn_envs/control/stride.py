@@ -16,30 +16,13 @@ from .reference import Reference, ReferenceRobot
 
 SAME_PLACE_M = 0.07  # a foot that lands so near to where it stood lands there
 SAME_YAW_RAD = 0.2
-CARRY_M = 0.1  # from this height on a foot follows the motion of the leg alone
+CARRY_M = 0.12  # from this height on a foot follows the motion of the leg alone
+_STILL_M = 1e-5
 RESTS_S = 0.4  # where the weight has so long to come to rest, it rests where it shall
 
 
-class Stride(NamedTuple):
-    """Targets at the K knots after the start.
-
-    Attributes:
-        ground: Where each foot stands or would: x, y [m] and yaw [rad], shape (K, 2, 3).
-        rise: Heights of the soles, shape (K, 2) [m].
-        carried: How far each foot follows its leg's motion instead, shape (K, 2), 0 to 1.
-        cog: Horizontal COG, shape (K, 2) [m].
-        zmp: Zero-moment points that it was planned for, shape (K, 2) [m].
-    """
-
-    ground: FloatArray
-    rise: FloatArray
-    carried: FloatArray
-    cog: FloatArray
-    zmp: FloatArray
-
-
 def plan_ground(course: Course, footwork: Footwork | None, start: FloatArray) -> FloatArray:
-    """Return where each foot stands or would, shape (K, 2, 3); see `Stride`.
+    """Return where each foot stands or would: x, y [m] and yaw [rad], shape (K, 2, 3).
 
     Args:
         course: The plan's times.
@@ -130,47 +113,67 @@ def recentred(q: FloatArray, ground: FloatArray) -> tuple[FloatArray, FloatArray
     return q, ground
 
 
-def plan_weight(
-    course: Course, middles: FloatArray, start: FloatArray, height: float, knot_s: float
-) -> tuple[FloatArray, FloatArray]:
-    """Plan the COG so that the weight is over the foot that carries.
+class Weight(NamedTuple):
+    """Where the weight shall be.
+
+    Attributes:
+        zmp: Zero-moment points at the start and the K knots after it, shape (K + 1, 2) [m].
+        end: Where the COG shall rest at last, shape (2,) [m].
+        settled: Whether there is time for that.
+        still: Whether it is there from the beginning.
+    """
+
+    zmp: FloatArray
+    end: FloatArray
+    settled: bool
+    still: bool
+
+    def path(self, height: float, knot_s: float, off: FloatArray | float = 0.0) -> FloatArray:
+        """Return the COG at the K knots, shape (K, 2) [m].
+
+        Args:
+            height: Height of the COG [m].
+            knot_s: Time between knots [s].
+            off: By how much the zero-moment point of all masses differs from the pendulum's, shape
+                (K + 1, 2) [m].
+        """
+        start = self.zmp[0]
+        path = plan_cog(self.zmp - off, start, self.end, self.settled, height, knot_s)
+        return np.asarray(path[1:])
+
+
+def plan_weight(course: Course, middles: FloatArray, start: FloatArray, knot_s: float) -> Weight:
+    """Plan the zero-moment point so that the weight is over the foot that carries.
 
     Args:
         course: The plan's times.
         middles: Middles of the soles, shape (K, 2, 2) [m].
         start: Where the COG rests, shape (2,) [m].
-        height: Its height [m].
         knot_s: Time between knots [s].
-
-    Returns:
-        COG and zero-moment points wanted, each of shape (K, 2) [m].
     """
-    wanted = np.empty((len(middles), 2))
-    here, first, rests_s = start, 0, 0.0
+    zmp = np.empty((len(middles) + 1, 2))
+    zmp[0] = here = start
+    first, rests_s, still = 0, 0.0, True
     for i, (part, last) in enumerate(zip(course.stretches, course.ends, strict=True)):
         n = last - first
         standing = middles[last - 1]
+        following = course.stretches[i + 1].up if i + 1 < len(course.stretches) else -1
         if part.up >= 0:
             there = standing[1 - part.up]
-            begin, over = 0, 1
-        elif i + 1 < len(course.stretches):  # in the last moment, but not in less than it takes
-            there = standing[1 - course.stretches[i + 1].up]
-            over = min(n, round(shift_time_s(float(np.linalg.norm(there - here))) / knot_s))
-            begin = n - over
         else:
-            there = standing.mean(axis=0)
-            over = min(n, round(shift_time_s(float(np.linalg.norm(there - here))) / knot_s))
-            begin = 0
+            there = standing[1 - following] if following >= 0 else standing.mean(axis=0)
+        far = float(np.linalg.norm(there - here))
+        over = 1 if part.up >= 0 else min(n, round(shift_time_s(far) / knot_s))
+        begin = n - over if part.up < 0 and following >= 0 else 0  # not before it must
         x = np.clip((np.arange(n) + 1.0 - begin) / max(over, 1), 0.0, 1.0)[:, None]
-        wanted[first:last] = here * (1.0 - x) + there * x
-        still = np.linalg.norm(there - here) < 1e-9
-        rests_s = (rests_s + n * knot_s) if still else (n - begin - over) * knot_s
-        rests_s = np.inf if still and i == 0 else rests_s
+        zmp[first + 1 : last + 1] = here * (1.0 - x) + there * x
+        stays = far < _STILL_M
+        rests_s = rests_s + n * knot_s if stays else (n - begin - over) * knot_s
+        still &= stays
         here, first = there, last
-    if np.isinf(rests_s):
-        return np.broadcast_to(start, wanted.shape).copy(), wanted
-    path = plan_cog(np.vstack((start, wanted)), start, here, rests_s >= RESTS_S, height, knot_s)
-    return path[1:], wanted
+    if still:
+        return Weight(np.broadcast_to(start, zmp.shape).copy(), start, True, True)
+    return Weight(zmp, here, rests_s >= RESTS_S, False)
 
 
 def plan_rise(
