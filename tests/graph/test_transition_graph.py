@@ -302,3 +302,24 @@ def test_an_empty_graph_answers():
     assert graph.predict([], 3) == ()
     assert graph.chains() == ()
     assert len(graph.stationary()) == len(graph.to_networkx()) == 0
+
+
+@settings(max_examples=40)
+@given(sequences, sequences, sequences)
+def test_absorbing_is_associative_and_a_seam_is_all_that_one_stream_has_more(a, b, c):
+    def parts(graph):
+        state = graph.state()
+        return sorted(state["edges"].tolist()), sorted(state["histories"].tolist()), set(graph.ids)
+
+    left, right, inner = learned(a), learned(a), learned(b)
+    left.absorb(learned(b))
+    left.absorb(learned(c))
+    inner.absorb(learned(c))
+    right.absorb(inner)
+    assert parts(left) == parts(right)
+    whole, apart = learned([*a, *b]), learned(a)
+    apart.absorb(learned(b))
+    for i in whole.ids:
+        for j in whole.ids:
+            seam = (i, j) == (a[-1], b[0])
+            assert whole.count(i, j) == apart.count(i, j) + seam
