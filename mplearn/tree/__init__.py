@@ -4,9 +4,11 @@ from .config import FormConfig as FormConfig
 from .config import TreeConfig as TreeConfig
 from .node import Node as Node
 from .placement import ROOT as ROOT
+from .placement import Change as Change
 from .placement import Match as Match
 from .placement import Merge as Merge
 from .placement import Placement as Placement
+from .placement import Reparent as Reparent
 from .placement import Split as Split
 from .recogniser import Recogniser as Recogniser
 from .recogniser import Recognition as Recognition

@@ -80,6 +80,18 @@ def separation(matrix: FloatArray, first: IntArray, second: IntArray) -> float:
     return between / max(float(inside.mean()), 1e-300) if len(inside) else float("inf")
 
 
+def gap(matrix: FloatArray, first: IntArray, second: IntArray) -> float:
+    """Return the smallest distance between two groups over the usual one to a neighbour inside.
+
+    Unlike the mean, it stays low where one motion varies widely but without a break. The second
+    neighbour counts: the first may be a copy, where a recording is seen twice.
+    """
+    apart = matrix + np.diag(np.full(len(matrix), np.inf))
+    inside = [np.sort(apart[np.ix_(group, group)], axis=1)[:, :2] for group in (first, second)]
+    usual = float(np.median(np.concatenate(inside)[:, -1]))
+    return float(matrix[np.ix_(first, second)].min()) / max(usual, 1e-300)
+
+
 def most_redundant(matrix: FloatArray) -> int:
     """Return which exemplar tells least: of the closest pair, the one nearer to all others."""
     apart = matrix + np.diag(np.full(len(matrix), np.inf))

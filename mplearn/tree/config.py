@@ -24,7 +24,7 @@ class FormConfig:
 
     n_points: int = 16
     head: float = 0.22
-    ramp: float = 0.2
+    ramp: float = 0.3
     centring: float = 0.5
 
     def __post_init__(self) -> None:
@@ -62,12 +62,18 @@ class TreeConfig:
         reach_cap: Largest radius over the median of that distance over all leaves.
         reach_limit: Largest radius over the scale below which clusters are formed.
         n_nearest: A segment's distance to a node is the mean of that to so many exemplars.
-        split_ratio: A leaf is split when the distance between its two branches exceeds that inside
-            them by this; inf for never.
+        split_ratio: A leaf is split when the mean distance between its two branches exceeds that
+            inside them by this; inf for never.
+        split_gap: And when the smallest distance between them exceeds that to a second neighbour
+            inside them, the median of it, by this.
+        split_scale: And when the mean between them exceeds the median diameter of the other leaves
+            by this.
         min_branch: Members of each branch from which on it is one.
-        split_scale: And when it exceeds the median diameter of the other leaves by this.
+        mature: Exemplars from which on a leaf is known well enough for that.
         merge_ratio: Two leaves that a segment lies in are merged when the distance between them is
             below that inside them times this; 0 for never.
+        false_acceptance: Share of the motions of unknown kinds that may be taken for known ones:
+            all radii are scaled to it (`mplearn.tree.rejection`); None leaves them as they are.
         n_candidates: Leaves, by mean trajectory, that are looked at closely; 0 to search down from
             the root, as printed.
         max_exemplars: Exemplars kept by a node.
@@ -89,10 +95,13 @@ class TreeConfig:
     reach_cap: float = 1.75
     reach_limit: float = 1.0
     n_nearest: int = 2
-    split_ratio: float = 2.0
-    min_branch: int = 4
+    split_ratio: float = 1.8
+    split_gap: float = 1.45
     split_scale: float = 0.9
+    min_branch: int = 4
+    mature: int = 10
     merge_ratio: float = 1.4
+    false_acceptance: float | None = None
     n_candidates: int = 6
     max_exemplars: int = 12
     max_unplaced: int = 200
@@ -101,7 +110,7 @@ class TreeConfig:
 
     @classmethod
     def printed(cls) -> TreeConfig:
-        """Return the rules as the paper prints them."""
+        """Return the rules as the paper prints them: eq. 5 to 7, nothing else."""
         return replace(
             cls(),
             form=FormConfig(n_points=32, head=0.0, ramp=0.0, centring=0.0),
@@ -136,13 +145,19 @@ class TreeConfig:
             "n_sampled": 3,
             "seed": 0,
             "split_ratio": 1,
-            "min_branch": 2,
+            "split_gap": 0,
             "split_scale": 0,
+            "min_branch": 2,
+            "mature": 4,
             "merge_ratio": 0,
         }
         for name, low in lowest.items():
             if not getattr(self, name) >= low:
                 raise InvalidValueError(f"{name} must be at least {low}, not {getattr(self, name)}")
+        if self.false_acceptance is not None and not 0 < self.false_acceptance < 1:
+            raise InvalidValueError(
+                f"false_acceptance must lie in (0, 1) or be None, not {self.false_acceptance}"
+            )
         if self.form.n_points < self.n_states:
             raise InvalidValueError(
                 f"{self.n_states} states need n_points of at least that, not {self.form.n_points}"

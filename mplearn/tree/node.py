@@ -26,7 +26,10 @@ class Node:
         n_frames: Frames of those.
         children: Ids of the nodes below.
         settled: Those of its exemplars that went to one of them.
-        history: Kind and time of what happened to it: ("born", n), ("split", n), ("merged", n).
+        history: Kind and time of what happened to it: ("born", n), ("split", n), ("merged", n),
+            ("moved", n).
+        whole: Whether a person said that it is one motion: the rules never split it.
+        apart: Ids of leaves that a person said are other motions: the rules never merge them.
     """
 
     id: int
@@ -39,6 +42,8 @@ class Node:
     children: list[int] = field(default_factory=list)
     settled: set[int] = field(default_factory=set)
     history: list[tuple[str, int]] = field(default_factory=list)
+    whole: bool = False
+    apart: set[int] = field(default_factory=set)
 
     @property
     def is_leaf(self) -> bool:
@@ -80,6 +85,7 @@ class Node:
             "members": list(self.members),
             "children": list(self.children),
             "settled": sorted(self.settled),
+            "apart": sorted(self.apart),
             "matrix": self.matrix.copy(),
             "history": [list(event) for event in self.history],
         }
@@ -92,9 +98,10 @@ class Node:
             members=[int(number) for number in state["members"]],
             children=[int(child) for child in state["children"]],
             settled={int(number) for number in state["settled"]},
+            apart={int(id) for id in state["apart"]},
             matrix=np.array(state["matrix"], dtype=np.float64),
             history=[(str(kind), int(when)) for kind, when in state["history"]],
         )
 
 
-_PLAIN = ("id", "parent", "born_at", "n_placed", "n_frames")
+_PLAIN = ("id", "parent", "born_at", "n_placed", "n_frames", "whole")

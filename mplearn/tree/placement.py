@@ -1,4 +1,4 @@
-"""What the tree says about a segment."""
+"""What the tree says about a segment, and what changes in it."""
 
 from __future__ import annotations
 
@@ -45,6 +45,49 @@ class Merge(NamedTuple):
     absorbed: int
 
 
+class Reparent(NamedTuple):
+    """A node that was hung below another.
+
+    Attributes:
+        node: The node.
+        parent: The node that it lies below now.
+    """
+
+    node: int
+    parent: int
+
+
+class Change(NamedTuple):
+    """What changed in the tree, by its rules or by a person.
+
+    Attributes:
+        born: Ids of the primitives that were formed, splits included.
+        splits: Leaves that were split.
+        merges: Leaves that were merged.
+        moved: Earlier segments that were moved: number and new node.
+        reparented: Nodes that were hung below another.
+        removed: Ids of the nodes that are gone, but for absorbed ones.
+    """
+
+    born: tuple[int, ...] = ()
+    splits: tuple[Split, ...] = ()
+    merges: tuple[Merge, ...] = ()
+    moved: tuple[tuple[int, int], ...] = ()
+    reparented: tuple[Reparent, ...] = ()
+    removed: tuple[int, ...] = ()
+
+    def then(self, later: Change) -> Change:
+        """Return this change and a later one as one."""
+        return Change(
+            self.born + later.born,
+            self.splits + later.splits,
+            self.merges + later.merges,
+            self.moved + later.moved,
+            self.reparented + later.reparented,
+            self.removed + later.removed,
+        )
+
+
 class Placement(NamedTuple):
     """Where a segment was put, and what came of it.
 
@@ -59,6 +102,8 @@ class Placement(NamedTuple):
         merges: Leaves that its arrival merged.
         moved: Earlier segments that its arrival moved: number and new node.
         refused: Why it was not taken up at all; empty where it was.
+        reparented: Nodes that its arrival hung below another.
+        removed: Inner nodes that are gone, for they held nothing else.
     """
 
     number: int
@@ -71,3 +116,5 @@ class Placement(NamedTuple):
     merges: tuple[Merge, ...] = ()
     moved: tuple[tuple[int, int], ...] = ()
     refused: str = ""
+    reparented: tuple[Reparent, ...] = ()
+    removed: tuple[int, ...] = ()

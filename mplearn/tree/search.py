@@ -22,16 +22,27 @@ class NodeIndex:
         bank: Holds the exemplars of the nodes.
         nodes: The nodes; the root among them is left out.
         limit: Largest radius.
+        before: An index of the same bank; what it knows of nodes that have not changed is taken
+            over.
+
+    Attributes:
+        factor: Radii that are used over those of the rules.
     """
 
     def __init__(
-        self, config: TreeConfig, bank: ExemplarBank, nodes: Iterable[Node], limit: float
+        self,
+        config: TreeConfig,
+        bank: ExemplarBank,
+        nodes: Iterable[Node],
+        limit: float,
+        before: NodeIndex | None = None,
     ) -> None:
         below = sorted((node for node in nodes if node.parent is not None), key=lambda n: n.id)
         if config.n_candidates:
             below = [node for node in below if node.is_leaf]
         self.config = config
         self.limit = limit
+        self.factor: float = 1.0 if before is None else before.factor
         self.ids = np.array([node.id for node in below], dtype=np.int64)
         self.parents = np.array([node.parent for node in below], dtype=np.int64)
         self.leaves = np.array([node.is_leaf for node in below], dtype=np.bool_)
@@ -39,8 +50,13 @@ class NodeIndex:
         self.diameters = np.array([node.diameter for node in below])
         n_features = bank.n_channels * config.form.n_points
         self.means = np.zeros((len(below), n_features))
-        for k, members in enumerate(self.members):
-            self.means[k] = bank.mean_profile(members)
+        known = {} if before is None else {int(id): k for k, id in enumerate(before.ids)}
+        for k, (id, members) in enumerate(zip(self.ids, self.members, strict=True)):
+            old = known.get(int(id))
+            if before is not None and old is not None and before.members[old] == members:
+                self.means[k] = before.means[old]
+            else:
+                self.means[k] = bank.mean_profile(members)
 
     def update(self, node: Node, bank: ExemplarBank) -> None:
         """Take note of a node's new exemplars."""
@@ -62,7 +78,11 @@ class NodeIndex:
         radii = self.config.reach * self.diameters
         if np.isfinite(self.config.reach_cap):
             radii = np.minimum(radii, min(self.config.reach_cap * self.scale(), self.limit))
-        return np.asarray(radii)
+        return np.asarray(self.factor * radii)
+
+    def radius(self, id: int) -> float:
+        """Return the radius of one node."""
+        return float(self.radii()[int(np.searchsorted(self.ids, id))])
 
     def search(self, exemplar: Exemplar, bank: ExemplarBank) -> list[Match]:
         """Return the nodes that a segment was compared with, best first.
@@ -115,6 +135,7 @@ class NodeIndex:
         """Return everything as plain values and arrays."""
         return {
             "limit": self.limit,
+            "factor": self.factor,
             "ids": self.ids.copy(),
             "parents": self.parents.copy(),
             "leaves": self.leaves.copy(),
@@ -126,6 +147,7 @@ class NodeIndex:
     def from_state(cls, config: TreeConfig, bank: ExemplarBank, state: dict[str, Any]) -> NodeIndex:
         """Return the index that `state` described."""
         index = cls(config, bank, (), float(state["limit"]))
+        index.factor = float(state.get("factor", 1.0))
         index.ids = np.array(state["ids"], dtype=np.int64)
         index.parents = np.array(state["parents"], dtype=np.int64)
         index.leaves = np.array(state["leaves"], dtype=np.bool_)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,25 +11,26 @@ from ..errors import InvalidValueError, UnknownPrimitiveError
 from ..hmm import LeftRightHMM, fit
 from ..hmm.sequences import as_frames
 from ..recording import FloatArray
-from . import form
-from .bank import ExemplarBank
-from .clustering import clusters_below, separation, two_branches
+from .births import form_primitives
 from .config import TreeConfig
+from .editing import chosen_groups, leaf_of, pair_of, place_below
+from .memory import SegmentMemory
 from .node import Node
-from .placement import ROOT, Match, Merge, Placement, Split
+from .placement import ROOT, Change, Placement
 from .recogniser import Recogniser, refusal
-from .search import NodeIndex, mean_nearest
-from .spread import ChannelSpread, DistanceSample, moments
+from .revision import merge_duplicates, split_mixed
+from .search import NodeIndex
+from .structure import Structure
 
 _SHORTEST_S = 0.1
-_RESCALE = 1.2  # models are made again when the variance of all motion has changed by this factor
 _MODEL_FLOOR = 0.1  # smallest standard deviation of a primitive's model, as a share of all motion's
 
 
 class PrimitiveTree:
     """Groups segments by similarity as they come; its leaves are the motion primitives.
 
-    Every decision is deterministic. A leaf keeps its id for life.
+    Every decision is deterministic. A leaf keeps its id for life. `insert` follows the rules; a
+    person can `split`, `merge`, `reparent` and `remove` by hand, which the rules then respect.
 
     Args:
         config: The rules.
@@ -62,14 +62,8 @@ class PrimitiveTree:
         self.rate_hz = rate_hz
         self.groups = tuple(int(group) for group in numbers)
         self.n_seen = 0
-        self._next_id = ROOT + 1
-        self._spread = ChannelSpread(numbers)
-        self._sample = DistanceSample(config.n_sampled, config.seed)
-        self._bank = ExemplarBank(config, n_channels, np.ones(n_channels))
-        self._frames: dict[int, FloatArray] = {}
-        self._holds: Counter[int] = Counter()
-        self._nodes = {ROOT: Node(ROOT, None, 0)}
-        self._index = NodeIndex(config, self._bank, (), 0.0)
+        self._memory = SegmentMemory(config, numbers)
+        self._structure = Structure(config, self._memory)
         self._models: dict[int, tuple[tuple[int, ...], LeftRightHMM]] = {}
 
     # ---- looking
@@ -77,12 +71,12 @@ class PrimitiveTree:
     @property
     def leaves(self) -> tuple[int, ...]:
         """Ids of the primitives, in the order of their birth."""
-        return tuple(id for id, node in self._nodes.items() if id != ROOT and node.is_leaf)
+        return tuple(node.id for node in self.nodes if node.id != ROOT and node.is_leaf)
 
     @property
     def nodes(self) -> tuple[Node, ...]:
         """All nodes, the root first, in the order of their birth."""
-        return tuple(self._nodes.values())
+        return tuple(self._structure.nodes.values())
 
     def node(self, id: int) -> Node:
         """Return a node.
@@ -90,18 +84,33 @@ class PrimitiveTree:
         Raises:
             UnknownPrimitiveError: There is none of this id.
         """
-        if id not in self._nodes:
-            raise UnknownPrimitiveError(f"no node {id} in the tree; it holds {list(self._nodes)}")
-        return self._nodes[id]
+        nodes = self._structure.nodes
+        if id not in nodes:
+            raise UnknownPrimitiveError(f"no node {id} in the tree; it holds {list(nodes)}")
+        return nodes[id]
 
     def radius(self, id: int) -> float:
         """Return the radius of a node below the root, on the scale of the rules."""
         self.node(id)
-        return float(self._index.radii()[self._index.ids == id][0])
+        index = self._structure.index
+        if id not in index.ids:
+            raise UnknownPrimitiveError(
+                f"node {id} is not searched and has no radius; {index.ids.tolist()} have one"
+            )
+        return index.radius(id)
+
+    @property
+    def false_acceptance(self) -> float:
+        """Share of motions of unknown kinds expected to be taken for known ones, as radii are now.
+
+        It is estimated from how near motions came to primitives that are not theirs; NaN before
+        there were any.
+        """
+        return self._structure.strangers.rate(self._structure.index.factor)
 
     def exemplars(self, id: int) -> tuple[FloatArray, ...]:
         """Return the kept segments of a node as they came, shape (L, D) each."""
-        return tuple(self._frames[number] for number in self.node(id).members)
+        return tuple(self._memory.frames[number] for number in self.node(id).members)
 
     def model(self, id: int) -> LeftRightHMM:
         """Return a node's group model: fitted to its exemplars as they came, at their rate.
@@ -111,18 +120,19 @@ class PrimitiveTree:
         members = tuple(self.node(id).members)
         known = self._models.get(id)
         if known is None or known[0] != members:
-            frames = [self._frames[number] for number in members]
+            frames = self.exemplars(id)
             n_states = min(self.config.n_states, *(len(each) for each in frames))
-            floor = _MODEL_FLOOR**2 * self._spread.variances()
+            floor = _MODEL_FLOOR**2 * self._memory.variances()
             self._models[id] = members, fit(frames, n_states, variance_floor=floor)
         return self._models[id][1]
 
     def recogniser(self) -> Recogniser:
         """Return what the tree would recognise now, frozen."""
-        numbers = {number for group in self._index.members for number in group}
-        bank = self._bank.subset(numbers)
-        index = NodeIndex.from_state(self.config, bank, self._index.state())
-        return Recogniser(self.config, bank, index, self._shortest_frames)
+        index = self._structure.index
+        numbers = {number for group in index.members for number in group}
+        bank = self._memory.bank.subset(numbers)
+        known = NodeIndex.from_state(self.config, bank, index.state())
+        return Recogniser(self.config, bank, known, self._shortest_frames)
 
     # ---- learning
 
@@ -139,184 +149,97 @@ class PrimitiveTree:
         reason = refusal(frames, self._shortest_frames)
         if reason:
             return Placement(-1, ROOT, False, np.inf, np.inf, refused=reason)
-        points = form.points_of(frames, self.config.form)
-        self._spread.update(points)
-        if self.n_seen == 0:
-            self._rescale()
-        number = self.n_seen
+        structure, bank, number = self._structure, self._memory.bank, self.n_seen
         self.n_seen += 1
-        self._remember(number, points, frames)
-        matches = self._index.search(self._bank[number], self._bank)
+        self._memory.remember(number, frames)
+        matches = structure.index.search(bank[number], bank)
         distance, ratio = (matches[0].distance, matches[0].ratio) if matches else (np.inf, np.inf)
-        node = self._nodes[matches[0].node if ratio <= 1 else ROOT]
+        node = self.node(matches[0].node if ratio <= 1 else ROOT)
         recognised = node.id != ROOT and node.is_leaf
-        self._add(node, number)
-        born, splits, moved = self._grow(node)
-        merges = () if splits or not recognised else self._merge(matches)
-        self._release(number)
-        self._rescale()
-        self._index.limit = self.config.reach_limit * self._common_scale()
-        home = next((to for which, to in moved if which == number), node.id)
-        home = next((merge.kept for merge in merges if merge.absorbed == home), home)
-        others = tuple(move for move in moved if move[0] != number)
-        return Placement(number, home, recognised, distance, ratio, born, splits, merges, others)
-
-    def _remember(self, number: int, points: FloatArray, frames: FloatArray) -> None:
-        """Model a segment; it is held until released."""
-        self._bank.add(number, self._bank.model(form.centred(points, self.config.form)))
-        self._frames[number] = frames
-        self._hold(number)
-        place = self._sample.place_for(number)
-        if place is not None:
-            self._hold(number)
-            gone = self._sample.put(number, place, self._bank)
-            if gone is not None:
-                self._release(gone)
-
-    def _rescale(self) -> None:
-        """Model all exemplars again where the variance of all motion has changed much."""
-        floor = self.config.variance_floor**2 * self._spread.variances()
-        change = floor / self._bank.floor
-        if change.max() <= _RESCALE and change.min() >= 1 / _RESCALE:
-            return
-        self._bank.refit(floor)
-        self._sample.measure(self._bank)
-        for node in self._nodes.values():
-            node.matrix = self._bank.matrix(node.members)
-        self._reindex()
-
-    def _add(self, node: Node, number: int) -> None:
-        node.add(number, self._bank.distances(self._bank[number], node.members))
-        node.n_placed += 1
-        node.n_frames += len(self._frames[number])
-        self._hold(number)
-        if node.id == ROOT:
-            excess = len(node.members) - self.config.max_unplaced
-            self._release(*node.remove(list(range(excess))))
+        if recognised and len(matches) > 1 and not self.config.local:
+            structure.strangers.add(matches[1].ratio * structure.index.factor)
+        structure.add(node, number)
+        if node.id == ROOT or self.config.local:
+            change = form_primitives(structure, node, self.n_seen)
         else:
-            self._release(*node.thin(self.config.max_exemplars))
-            if not self.config.n_candidates or node.is_leaf:
-                self._index.update(node, self._bank)
+            change = split_mixed(structure, node, self.n_seen)
+            if not change.splits:
+                change = merge_duplicates(structure, matches, self.n_seen)
+        self._memory.release(number)
+        if self._memory.rescale():
+            structure.remeasure()
+        structure.tune()
+        self._forget_models()
+        home = next((to for which, to in change.moved if which == number), node.id)
+        home = next((merge.kept for merge in change.merges if merge.absorbed == home), home)
+        others = tuple(move for move in change.moved if move[0] != number)
+        return Placement(
+            number,
+            home,
+            recognised,
+            distance,
+            ratio,
+            **change._replace(moved=others)._asdict(),
+        )
 
-    def _grow(
-        self, node: Node
-    ) -> tuple[tuple[int, ...], tuple[Split, ...], tuple[tuple[int, int], ...]]:
-        """Form what can be formed in a node that grew."""
-        if node.id != ROOT and not self.config.local:
-            return self._split(node)
-        born: list[int] = []
-        moved: list[tuple[int, int]] = []
-        while True:
-            loose = [i for i, number in enumerate(node.members) if number not in node.settled]
-            groups = clusters_below(
-                node.matrix[np.ix_(loose, loose)], self._cutoff(node), self.config.min_exemplars
-            )
-            if not groups:
-                return tuple(born), (), tuple(moved)
-            members = [node.members[loose[i]] for i in groups[0]]
-            rest = np.delete(np.arange(len(node.members)), [loose[i] for i in groups[0]])
-            apart = node.matrix[np.ix_(rest, [loose[i] for i in groups[0]])]
-            child = self._child(node, members)
-            born.append(child.id)
-            moved += [(number, child.id) for number in members]
-            if node.id == ROOT and not self.config.local:
-                moved += self._reassign(child, mean_nearest(apart, self.config.n_nearest))
+    # ---- learning by hand
 
-    def _cutoff(self, node: Node) -> float:
-        """Return the largest distance inside a cluster that becomes a node, D_cutoff."""
-        if self.config.local:
-            mu, sigma = moments(node.matrix)
-            return mu - self.config.cutoff * sigma
-        return self._common_scale()
+    def split(self, id: int, groups: Sequence[Sequence[int]] | None = None) -> Change:
+        """Split a primitive, which the rules never merge again.
 
-    def _common_scale(self) -> float:
-        return self._sample.scale(self.config.spread, self.config.mean_share)
+        Args:
+            id: The primitive.
+            groups: Positions in `exemplars` that belong together, at least 2 each and every one in
+                one group; the two main branches of complete-link clustering where not given.
 
-    def _child(self, parent: Node, members: Sequence[int]) -> Node:
-        """Form a node below another from some of its exemplars."""
-        child = Node(self._next_id, parent.id, self.n_seen, history=[("born", self.n_seen)])
-        self._next_id += 1
-        places = [parent.members.index(number) for number in members]
-        child.members = list(members)
-        child.matrix = parent.matrix[np.ix_(places, places)]
-        child.n_placed = len(members)
-        child.n_frames = sum(len(self._frames[number]) for number in members)
-        self._hold(*members)
-        if parent.id == ROOT:
-            self._release(*parent.remove(places))
-        else:
-            parent.settled.update(members)
-        self._nodes[child.id] = child
-        parent.children.append(child.id)
-        self._release(*child.thin(self.config.max_exemplars))
-        self._reindex()
-        return child
+        Raises:
+            UnknownPrimitiveError: There is no such primitive.
+            InvalidValueError: The groups are wrong, or there are too few exemplars.
+        """
+        leaf = leaf_of(self._structure, id)
+        numbers = chosen_groups(leaf, groups)
+        change = self._structure.split(leaf, numbers, self.n_seen)
+        for born in change.born:
+            self.node(born).apart = set(change.born) - {born}
+        return self._edited(change)
 
-    def _reassign(self, leaf: Node, row: FloatArray) -> list[tuple[int, int]]:
-        """Move what waits in the root, ``row`` from a leaf that was just formed, into it."""
-        root = self._nodes[ROOT]
-        inside = [root.members[i] for i in np.flatnonzero(row <= self.radius(leaf.id))]
-        for number in inside:
-            self._add(leaf, number)
-            self._release(*root.remove([root.members.index(number)]))
-        return [(number, leaf.id) for number in inside]
+    def merge(self, first: int, second: int) -> Change:
+        """Merge two primitives into the older one, which the rules never split again.
 
-    def _split(
-        self, leaf: Node
-    ) -> tuple[tuple[int, ...], tuple[Split, ...], tuple[tuple[int, int], ...]]:
-        """Split a leaf whose two branches lie too far apart."""
-        branches = two_branches(leaf.matrix, self.config.min_branch)
-        if branches is None:
-            return (), (), ()
-        ratio = separation(leaf.matrix, *branches)
-        between = float(leaf.matrix[np.ix_(*branches)].mean())
-        usual = self._index.scale(but=leaf.id)
-        if ratio <= self.config.split_ratio or between <= self.config.split_scale * usual:
-            return (), (), ()
-        leaf.history.append(("split", self.n_seen))
-        groups = [[leaf.members[i] for i in branch] for branch in branches]
-        shares = [len(group) / len(leaf.members) for group in groups]
-        into = []
-        moved = []
-        for group, share in zip(groups, shares, strict=True):
-            child = self._child(leaf, group)
-            child.n_placed = max(len(group), round(share * leaf.n_placed))
-            child.n_frames = round(leaf.n_frames / leaf.n_placed * child.n_placed)
-            into.append(child.id)
-            moved += [(number, child.id) for number in group]
-        return tuple(into), (Split(leaf.id, tuple(into)),), tuple(moved)
+        Raises:
+            UnknownPrimitiveError: There is no such primitive.
+            InvalidValueError: They are the same.
+        """
+        older, younger = pair_of(self._structure, first, second)
+        joint = self._structure.joint(older, younger)
+        change = self._structure.merge(older, younger, joint, self.n_seen)
+        older.whole = True
+        older.apart.discard(older.id)
+        return self._edited(change)
 
-    def _merge(self, matches: Sequence[Match]) -> tuple[Merge, ...]:
-        """Merge the two leaves that a segment lies in, if they are no farther apart than inside."""
-        inside = [match.node for match in matches if match.ratio <= 1]
-        if len(inside) < 2 or self.config.local:
-            return ()
-        older, younger = sorted((self._nodes[id] for id in inside[:2]), key=lambda node: node.id)
-        rows = [self._bank.distances(self._bank[n], younger.members) for n in older.members]
-        across = np.stack(rows)
-        joint = np.block([[older.matrix, across], [across.T, younger.matrix]])
-        first, second = np.split(np.arange(len(joint)), [len(older.members)])
-        if separation(joint, first, second) >= self.config.merge_ratio:
-            return ()
-        older.matrix = joint
-        older.members += younger.members
-        older.n_placed += younger.n_placed
-        older.n_frames += younger.n_frames
-        older.history.append(("merged", self.n_seen))
-        self._remove(younger)
-        self._release(*older.thin(self.config.max_exemplars))
-        self._reindex()
-        return (Merge(older.id, younger.id),)
+    def reparent(self, id: int, parent: int) -> Change:
+        """Hang a node below the root or another inner node.
 
-    def _remove(self, node: Node) -> None:
-        """Take a leaf out of the tree, and what is above it and holds nothing else."""
-        del self._nodes[node.id]
-        self._models.pop(node.id, None)
-        parent = self._nodes[node.parent if node.parent is not None else ROOT]
-        parent.children.remove(node.id)
-        if parent.id != ROOT and not parent.children:
-            self._release(*parent.members)
-            self._remove(parent)
+        Raises:
+            UnknownPrimitiveError: There is no such node.
+            InvalidValueError: The parent is a primitive, or lies below the node.
+        """
+        node, above = place_below(self._structure, id, parent)
+        return self._edited(self._structure.reparent(node, above, self.n_seen))
+
+    def remove(self, id: int, *, forget: bool = False) -> Change:
+        """Take a primitive out; its exemplars wait to be placed again, unless they are forgotten.
+
+        Raises:
+            UnknownPrimitiveError: There is no such primitive.
+        """
+        leaf = leaf_of(self._structure, id)
+        return self._edited(self._structure.remove(leaf, self.n_seen, forget=forget))
+
+    def _edited(self, change: Change) -> Change:
+        self._structure.tune()
+        self._forget_models()
+        return change
 
     # ---- keeping
 
@@ -324,46 +247,27 @@ class PrimitiveTree:
         """Return all of the state, plain values and arrays: `load_state` resumes bit for bit."""
         return {
             "n_seen": self.n_seen,
-            "next_id": self._next_id,
-            "spread": self._spread.state(),
-            "sample": self._sample.state(),
-            "bank": self._bank.state(),
-            "frames": [self._frames[number].copy() for number in self._bank.numbers()],
-            "nodes": [node.state() for node in self._nodes.values()],
+            "next_id": self._structure.next_id,
+            **self._memory.state(),
+            "strangers": self._structure.strangers.state(),
+            "nodes": [node.state() for node in self.nodes],
         }
 
     def load_state(self, state: dict[str, Any]) -> None:
         """Resume from what `state` returned, under the same configuration."""
-        self.n_seen = int(state["n_seen"])
-        self._next_id = int(state["next_id"])
-        self._spread.load_state(state["spread"])
-        self._sample.load_state(state["sample"])
-        self._bank = ExemplarBank.from_state(self.config, state["bank"])
-        self._frames = {
-            number: np.array(frames, dtype=np.float64)
-            for number, frames in zip(self._bank.numbers(), state["frames"], strict=True)
-        }
         nodes = [Node.from_state(node) for node in state["nodes"]]
-        self._nodes = {node.id: node for node in nodes}
-        self._holds = Counter(self._sample.numbers)
-        for node in nodes:
-            self._holds.update(node.members)
+        self.n_seen = int(state["n_seen"])
+        self._memory.load_state(state, [number for node in nodes for number in node.members])
+        self._structure = Structure(self.config, self._memory)
+        self._structure.next_id = int(state["next_id"])
+        self._structure.strangers.load_state(state["strangers"])
+        self._structure.nodes = {node.id: node for node in nodes}
+        self._structure.reindex()
         self._models = {}
-        self._reindex()
 
-    def _hold(self, *numbers: int) -> None:
-        self._holds.update(numbers)
-
-    def _release(self, *numbers: int) -> None:
-        self._holds.subtract(numbers)
-        for number in numbers:
-            if self._holds[number] == 0:
-                del self._holds[number], self._frames[number]
-                self._bank.drop(number)
-
-    def _reindex(self) -> None:
-        limit = self.config.reach_limit * self._common_scale()
-        self._index = NodeIndex(self.config, self._bank, self._nodes.values(), limit)
+    def _forget_models(self) -> None:
+        for id in [id for id in self._models if id not in self._structure.nodes]:
+            del self._models[id]
 
     @property
     def _shortest_frames(self) -> int:

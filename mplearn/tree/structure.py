@@ -1,0 +1,204 @@
+"""The nodes of the tree, and the operations that keep them whole: nothing here decides anything."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..recording import FloatArray
+from .config import TreeConfig
+from .memory import SegmentMemory
+from .node import Node
+from .placement import ROOT, Change, Merge, Reparent, Split
+from .rejection import Strangers
+from .search import NodeIndex
+
+
+class Structure:
+    """Nodes by id. Every operation keeps counts, distances, held segments and the index true.
+
+    Args:
+        config: Rules of the tree.
+        memory: Holds the segments.
+
+    Attributes:
+        nodes: The nodes by id, in the order of their birth.
+        next_id: Id of the node that is formed next.
+        index: What the search knows of them.
+        strangers: How near motions come to leaves that are not theirs.
+    """
+
+    def __init__(self, config: TreeConfig, memory: SegmentMemory) -> None:
+        self.config = config
+        self.memory = memory
+        self.nodes = {ROOT: Node(ROOT, None, 0)}
+        self.next_id = ROOT + 1
+        self.strangers = Strangers()
+        self.index = NodeIndex(config, memory.bank, (), 0.0)
+
+    @property
+    def root(self) -> Node:
+        """The root: what was not placed anywhere else."""
+        return self.nodes[ROOT]
+
+    def reindex(self) -> None:
+        """Let the search know all nodes anew; what has not changed is taken over."""
+        limit = self.config.reach_limit * self.memory.scale()
+        known = self.nodes.values()
+        self.index = NodeIndex(self.config, self.memory.bank, known, limit, self.index)
+        self.tune()
+
+    def tune(self) -> None:
+        """Let radii follow the scale of all motion, and the stated rate of false acceptance."""
+        self.index.limit = self.config.reach_limit * self.memory.scale()
+        rate = self.config.false_acceptance
+        self.index.factor = 1.0 if rate is None else self.strangers.threshold(rate)
+
+    def remeasure(self) -> None:
+        """Measure all distances again."""
+        for node in self.nodes.values():
+            node.matrix = self.memory.bank.matrix(node.members)
+        self.reindex()
+
+    def add(self, node: Node, number: int) -> None:
+        """Put a segment into a node; the least informative exemplars of a full one go."""
+        bank = self.memory.bank
+        node.add(number, bank.distances(bank[number], node.members))
+        node.n_placed += 1
+        node.n_frames += len(self.memory.frames[number])
+        self.memory.hold(number)
+        if node.id == ROOT:
+            excess = len(node.members) - self.config.max_unplaced
+            self.memory.release(*node.remove(list(range(excess))))
+        else:
+            self._thin(node)
+            if not self.config.n_candidates or node.is_leaf:
+                self.index.update(node, bank)
+
+    def child(self, parent: Node, members: Sequence[int], when: int) -> Node:
+        """Form a node below another from some of its exemplars."""
+        child = Node(self.next_id, parent.id, when, history=[("born", when)])
+        self.next_id += 1
+        places = [parent.members.index(number) for number in members]
+        child.members = list(members)
+        child.matrix = parent.matrix[np.ix_(places, places)]
+        child.n_placed = len(members)
+        child.n_frames = sum(len(self.memory.frames[number]) for number in members)
+        self.memory.hold(*members)
+        if parent.id == ROOT:
+            self.memory.release(*parent.remove(places))
+        else:
+            parent.settled.update(members)
+        self.nodes[child.id] = child
+        parent.children.append(child.id)
+        self._thin(child)
+        self.reindex()
+        return child
+
+    def take_in(self, leaf: Node, numbers: Sequence[int]) -> Change:
+        """Move segments that wait in the root into a leaf."""
+        for number in numbers:
+            self.add(leaf, number)
+            self.memory.release(*self.root.remove([self.root.members.index(number)]))
+        return Change(moved=tuple((number, leaf.id) for number in numbers))
+
+    def split(self, leaf: Node, groups: Sequence[Sequence[int]], when: int) -> Change:
+        """Form a leaf of each group of a leaf's exemplars; it becomes the node above them."""
+        leaf.history.append(("split", when))
+        n_kept = len(leaf.members)
+        born: list[int] = []
+        moved: list[tuple[int, int]] = []
+        for group in groups:
+            child = self.child(leaf, group, when)
+            child.n_placed = max(len(group), round(len(group) / n_kept * leaf.n_placed))
+            child.n_frames = round(leaf.n_frames / leaf.n_placed * child.n_placed)
+            born.append(child.id)
+            moved += [(number, child.id) for number in group]
+        return Change(tuple(born), (Split(leaf.id, tuple(born)),), moved=tuple(moved))
+
+    def merge(self, older: Node, younger: Node, joint: FloatArray, when: int) -> Change:
+        """Let one leaf absorb another, ``joint`` being the distances among their exemplars."""
+        older.matrix = joint
+        older.members += younger.members
+        older.n_placed += younger.n_placed
+        older.n_frames += younger.n_frames
+        older.history.append(("merged", when))
+        older.apart |= younger.apart
+        for node in self.nodes.values():
+            if younger.id in node.apart:
+                node.apart = (node.apart - {younger.id}) | {older.id}
+        change = self._unhang(younger, when)
+        self._thin(older)
+        self.reindex()
+        merged = Change(merges=(Merge(older.id, younger.id),))
+        return merged.then(change._replace(removed=change.removed[1:]))
+
+    def joint(self, first: Node, second: Node) -> FloatArray:
+        """Return the distances among the exemplars of two nodes, those of the first before."""
+        bank = self.memory.bank
+        across = np.stack([bank.distances(bank[n], second.members) for n in first.members])
+        return np.block([[first.matrix, across], [across.T, second.matrix]])
+
+    def remove(self, leaf: Node, when: int, *, forget: bool) -> Change:
+        """Take a leaf out; its exemplars are forgotten, or wait in the root again."""
+        change = self._unhang(leaf, when)
+        if not forget:
+            for number in leaf.members:
+                self.add(self.root, number)
+            change = change._replace(moved=tuple((number, ROOT) for number in leaf.members))
+        self.memory.release(*leaf.members)
+        self.reindex()
+        return change
+
+    def reparent(self, node: Node, parent: Node, when: int) -> Change:
+        """Hang a node below another inner node, which learns its exemplars."""
+        above = self.nodes[node.parent if node.parent is not None else ROOT]
+        above.children.remove(node.id)
+        places = [i for i, number in enumerate(above.members) if number in node.members]
+        if above.id != ROOT:
+            gone = above.remove(places)
+            above.settled.difference_update(gone)
+            self.memory.release(*gone)
+        node.parent = parent.id
+        node.history.append(("moved", when))
+        parent.children.append(node.id)
+        if parent.id != ROOT:
+            bank = self.memory.bank
+            for number in node.members:
+                parent.add(number, bank.distances(bank[number], parent.members))
+                self.memory.hold(number)
+            parent.settled.update(node.members)
+            self._thin(parent)
+        change = Change(reparented=(Reparent(node.id, parent.id),)).then(self._tidy(above, when))
+        self.reindex()
+        return change
+
+    def _unhang(self, leaf: Node, when: int) -> Change:
+        """Take a leaf from its place; its exemplars stay held."""
+        del self.nodes[leaf.id]
+        parent = self.nodes[leaf.parent if leaf.parent is not None else ROOT]
+        parent.children.remove(leaf.id)
+        return Change(removed=(leaf.id,)).then(self._tidy(parent, when))
+
+    def _tidy(self, node: Node, when: int) -> Change:
+        """Take an inner node out that is above one node only, or none, and hang that one higher."""
+        if node.id == ROOT or len(node.children) > 1 or set(node.members) - node.settled:
+            return Change()
+        above = self.nodes[node.parent if node.parent is not None else ROOT]
+        del self.nodes[node.id]
+        above.children.remove(node.id)
+        self.memory.release(*node.members)
+        change = Change(removed=(node.id,))
+        for id in node.children:
+            child = self.nodes[id]
+            child.parent = above.id
+            child.history.append(("moved", when))
+            above.children.append(id)
+            change = change.then(Change(reparented=(Reparent(id, above.id),)))
+        return change.then(self._tidy(above, when))
+
+    def _thin(self, node: Node) -> None:
+        gone = node.thin(self.config.max_exemplars)
+        node.settled.difference_update(gone)
+        self.memory.release(*gone)
