@@ -43,7 +43,7 @@ def segmenters() -> dict[str, Segmenter]:
 
 
 def worst_frame(segmenter: Segmenter, frames: np.ndarray) -> float:
-    """Return the longest time a frame took [s], of the thread's own: the machine may be busy."""
+    """Return the longest processor time of a frame [s]: the machine may be busy with others."""
     times = []
     for frame in frames:
         begin = time.thread_time()

@@ -40,7 +40,7 @@ class ZeroVelocityConfig:
     hysteresis: float = 0.3
     still_share: float = 0.1
     still_s: float = 0.3
-    min_length_s: float = 0.3
+    min_length_s: float = 0.4
     max_length_s: float = 10.0
     memory_s: float = 30.0
     trust: float = 1.3
