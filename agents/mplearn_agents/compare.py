@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 COLUMNS = ("task", "dynamics", "policy", "return", "success", "falls", "time")
 CONFIDENCE = 0.95
+SLOW = ("search",)  # plays as few episodes as the simulated robot does
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Comparison:
         algorithms: What agents are trained with.
         seeds: Of the episodes, and of the trainings: one agent a seed.
         episodes: Episodes a seed, kinematic.
-        simulated_episodes: Episodes a seed, simulated.
+        simulated_episodes: Episodes a seed, simulated; and of policies that think long.
         steps: Macro steps of a training.
         library: File of the library; None is the built-in one.
     """
@@ -91,8 +92,9 @@ def compare(
                 dynamics=dynamics,
                 disable_env_checker=True,
             )
-            n = comparison.episodes if dynamics == "kinematic" else comparison.simulated_episodes
             for name, policies in _contestants(comparison, task, env, trained):
+                slow = dynamics == "simulated" or name in SLOW
+                n = comparison.simulated_episodes if slow else comparison.episodes
                 results = [
                     play(env, policy, n, seed)
                     for policy, seed in zip(policies, comparison.seeds, strict=True)
@@ -104,8 +106,8 @@ def compare(
             COLUMNS,
             tuple(rows),
             f"Mean over seeds and its {100 * CONFIDENCE:.0f} % interval (Student's t), of "
-            f"{comparison.episodes} kinematic or {comparison.simulated_episodes} simulated "
-            "episodes a seed. The return is discounted by time. Agents are trained kinematically, "
+            f"{comparison.episodes} kinematic or {comparison.simulated_episodes} simulated episodes "
+            f"a seed (so many of {', '.join(SLOW)}, too). The return is discounted by time. Agents are trained kinematically, "
             f"one a seed, for {comparison.steps} macro steps. 'search' knows the environment's "
             "hidden state: in 'follow' it foresees the demonstrator: a bound for the rest.",
         )

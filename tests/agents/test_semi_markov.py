@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from mplearn.errors import InvalidValueError
 from mplearn_agents.rl.config import TrainingConfig
+from mplearn_agents.rl.returns import advantages
 
 pytest.importorskip("sb3_contrib")
 torch = pytest.importorskip("torch")
@@ -33,8 +34,6 @@ def brute_force(rewards, values, ends, discounts, gae_lambda):
 @settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 10_000), gae_lambda=st.sampled_from([0.0, 0.5, 0.95, 1.0]))
 def test_advantages_are_those_of_brute_force(seed, gae_lambda):
-    from mplearn_agents.rl.semi_markov import advantages
-
     rng = np.random.default_rng(seed)
     shape = (12, 3)
     rewards, values = rng.normal(size=shape), rng.normal(size=(13, 3))

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import torch
 from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
-#: Measurements are multiplied by these; other bounded numbers are divided by their bounds.
-SCALES = {"posture": 1.0, "velocity": 0.2, "cog": 10.0, "support_margin": 10.0}
-LEAST_PRIOR = 0.01  # of actions that the demonstrator never chose here, so that they are tried too
-PRIOR = "transition_prior"
+from .encoding import LEAST_PRIOR, PRIOR, scale_of
 
 
 class PrimitiveFeatures(BaseFeaturesExtractor):
@@ -31,7 +28,7 @@ class PrimitiveFeatures(BaseFeaturesExtractor):
         super().__init__(observation_space, sum(widths) + spaces.flatdim(parts[PRIOR]))
         self._keys = tuple(parts)
         for key, part in parts.items():
-            self.register_buffer(f"scale_{key}", torch.as_tensor(_scale(key, part)))
+            self.register_buffer(f"scale_{key}", torch.as_tensor(scale_of(key, part)))
 
     def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
         """Return the features, shape (N, F)."""
@@ -81,13 +78,3 @@ def features_of(observation_space: spaces.Dict, capacity: int) -> list[Feature]:
         out += [Feature(f"{key} {k // capacity}", None, k % capacity) for k in range(n_slots)]
         out += [Feature(key, k, None) for k in range(width - n_slots)]
     return out + [Feature("log prior", None, slot) for slot in range(capacity)]
-
-
-def _scale(key: str, part: spaces.Space[Any]) -> np.ndarray[Any, np.dtype[np.float32]]:
-    size = spaces.flatdim(part)
-    if key in SCALES:
-        return np.full(size, SCALES[key], np.float32)
-    if isinstance(part, spaces.Box):
-        bound = np.maximum(np.abs(part.low), np.abs(part.high)).ravel().astype(np.float64)
-        return np.where(np.isfinite(bound) & (bound > 0), 1.0 / bound, 1.0).astype(np.float32)
-    return np.ones(size, np.float32)
