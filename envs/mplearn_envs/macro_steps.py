@@ -248,7 +248,8 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
 
     @property
     def data(self) -> mujoco.MjData:
-        """The simulation's state."""
+        """The simulation's state, up to date."""
+        self.performer.show()
         return self.simulation.data
 
     # ---- inside
@@ -316,7 +317,7 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
             "infeasible": dict(choices.refused),
             "dead_end": choices.dead_end,
             "library_version": self.library.version,
-            "primitive": current,
+            "primitive": -1 if current is None else current,
             "primitive_name": "" if current is None else self.library[current].name,
             "task": report,
         }

@@ -107,8 +107,8 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
     ## Info
 
     ``action_mask`` (int8), ``transition_prior`` (float64), ``infeasible`` (slot: reasons, of what
-    the demonstrator might have chosen here), ``dead_end``, ``library_version``, ``primitive`` (id
-    or None), ``primitive_name``, ``task`` (`Task.report`), ``is_success`` (where the task has
+    the demonstrator might have chosen here), ``dead_end``, ``library_version``, ``primitive`` (id,
+    -1 for none), ``primitive_name``, ``task`` (`Task.report`), ``is_success`` (where the task has
     success); after a step also ``duration_s``, ``discount``, ``reward_terms``, ``illegal``,
     ``novel``, ``fallen``, ``speed``, ``tracking_rmse_rad``, ``cog_deviation_m`` (largest),
     ``zmp_margin_m`` (least).

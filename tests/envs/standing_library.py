@@ -19,6 +19,7 @@ ARMS = {"shoulder_pitch_l": -2.2, "shoulder_pitch_r": -2.2}
 BOW = {"base_pitch": 0.8, "neck_pitch": 0.2}
 SQUAT = {"base_height": -0.18, "base_pitch": 0.2, "shoulder_pitch_l": -1.2}
 KICK = {"hip_pitch_l": -1.0, "knee_l": 0.4}
+JUMP = {"base_height": 0.3}  # no foot is left on the floor
 WAVE = {"shoulder_roll_r": -1.2, "elbow_r": -1.0}
 
 # (name, posture at the start, posture at the end, seconds)
@@ -32,8 +33,9 @@ MOTIONS = (
     ("kick", {}, KICK, 0.8),
     ("retract", KICK, {}, 0.8),
     ("wave", {}, WAVE, 0.9),
+    ("jump", {}, JUMP, 0.7),
 )
-NEXT = {0: (1,), 1: (0, 2, 4, 6, 8), 2: (3,), 3: (0, 4, 6), 4: (5,), 5: (0, 2), 6: (7,), 7: (0,)}
+NEXT = {0: (1,), 1: (0, 2, 4, 6, 8, 9), 2: (3,), 3: (0, 4, 6), 4: (5,), 5: (0, 2), 6: (7,), 7: (0,)}
 
 
 def posture(changes: dict[str, float]) -> np.ndarray:
@@ -54,7 +56,10 @@ def sweep(start: dict[str, float], end: dict[str, float], seconds: float) -> np.
 
 @cache
 def standing_library(names: tuple[str, ...] | None = None, seed: int = 0) -> PrimitiveLibrary:
-    """Return a library of some of the motions (all by default); "wave" is a dead end."""
+    """Return a library of some of the motions (all by default).
+
+    "wave" is a dead end, "jump" is more than the robot can.
+    """
     rng = np.random.default_rng(seed)
     primitives = []
     kept = [i for i, motion in enumerate(MOTIONS) if names is None or motion[0] in names]
