@@ -15,6 +15,7 @@ from .control.inverse_dynamics import InverseDynamics
 from .control.planner import Motion, Plan, Planner
 from .control.reference import Reference, reference_robot, rest_reference
 
+SLOWER = 0.8  # share of the speed that is tried next
 ProblemKind: TypeAlias = Literal["flight", "limit", "velocity", "reach", "torque", "balance"]
 
 
@@ -127,13 +128,14 @@ class FeasibilityCheck:
         wanted = speed
         while True:
             plan = self.planner.plan(start, motion, speed)
-            margin = float(plan.zmp_margin_m.min())
+            margin = float(np.nan_to_num(plan.zmp_margin_m, nan=-np.inf).min())
             share, joint = self._load(plan)
             shaky = margin < self.config.zmp_margin_m or share > self.config.torque_share
             speed = plan.speed
-            if not shaky or speed * 0.7 < self.config.slowest * wanted:
+            hopeless = plan.error.max() > self.config.reach_error
+            if not shaky or hopeless or speed * SLOWER < self.config.slowest * wanted:
                 break
-            speed *= 0.7
+            speed *= SLOWER
         found = [*self._too_slow(speed, wanted), *self._out_of_reach(plan)]
         if share > self.config.torque_share:
             found.append(Problem("torque", joint, share, self.config.torque_share))

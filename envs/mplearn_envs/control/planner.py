@@ -222,7 +222,7 @@ class Planner:
         here = pose.moment[0] / pose.carried[0]
         for _ in range(4):
             course, targets = self._targets(start, motion, speed, knot_s, here)
-            ground = plan_ground(course, motion.footwork, start.ground)
+            ground = plan_ground(self._reference, course, motion.footwork, start.ground)
             weight = plan_weight(course, sole_middles(self._reference, ground), here[:2], knot_s)
             cog = weight.path(here[2], knot_s)
             q, error = self._follow(start, targets, ground, cog)

@@ -10,21 +10,24 @@ from mplearn.recording import FloatArray, IntArray
 
 from .course import Course, shift_time_s
 from .footwork import Footwork
-from .kinematics import rotate_quaternion
 from .pendulum import plan_cog
 from .reference import Reference, ReferenceRobot
 
-SAME_PLACE_M = 0.07  # a foot that lands so near to where it stood lands there
-SAME_YAW_RAD = 0.2
+SAME_PLACE_M = 0.1  # a foot that lands so near to where it stood lands there
+SAME_YAW_RAD = 0.25
+APART_M = 0.02  # between soles beside each other
 CARRY_M = 0.12  # from this height on a foot follows the motion of the leg alone
 _STILL_M = 1e-5
 RESTS_S = 0.4  # where the weight has so long to come to rest, it rests where it shall
 
 
-def plan_ground(course: Course, footwork: Footwork | None, start: FloatArray) -> FloatArray:
+def plan_ground(
+    robot: ReferenceRobot, course: Course, footwork: Footwork | None, start: FloatArray
+) -> FloatArray:
     """Return where each foot stands or would: x, y [m] and yaw [rad], shape (K, 2, 3).
 
     Args:
+        robot: The reference robot.
         course: The plan's times.
         footwork: The motion's feet.
         start: Where they stand at first, shape (2, 3).
@@ -35,7 +38,7 @@ def plan_ground(course: Course, footwork: Footwork | None, start: FloatArray) ->
         out[first:last] = here
         if part.lands >= 0 and footwork is not None:
             frame = min(part.lands, len(footwork.rise) - 1)
-            place = landing(here, part.up, footwork.left_from_right[frame])
+            place = landing(robot, here, part.up, footwork.left_from_right[frame])
             x = ((np.arange(last - first) + 1.0) / (last - first))[:, None]
             x = x * x * (3.0 - 2.0 * x)
             out[first:last, part.up] = here[part.up] * (1.0 - x) + place * x
@@ -44,14 +47,23 @@ def plan_ground(course: Course, footwork: Footwork | None, start: FloatArray) ->
     return out
 
 
-def landing(ground: FloatArray, side: int, left_from_right: FloatArray) -> FloatArray:
-    """Return where a foot lands: x, y [m] and yaw [rad], shape (3,)."""
+def landing(
+    robot: ReferenceRobot, ground: FloatArray, side: int, left_from_right: FloatArray
+) -> FloatArray:
+    """Return where a foot lands: x, y [m] and yaw [rad], shape (3,).
+
+    It does not land on the other foot, however narrow the demonstrator stands.
+    """
     stands = ground[1 - side]
     c, s = np.cos(stands[2]), np.sin(stands[2])
     dx, dy, turn = left_from_right
     if side == 1:  # the right foot in the left one's frame
         ct, st = np.cos(turn), np.sin(turn)
         dx, dy, turn = -(ct * dx + st * dy), -(ct * dy - st * dx), -turn
+    length, width = np.ptp(robot.corners, axis=1).max(axis=0)[:2]
+    if abs(dx) < length:
+        clear = width + APART_M + 0.5 * length * abs(np.sin(turn))
+        dy = max(dy, clear) if side == 0 else min(dy, -clear)
     place = np.array([stands[0] + c * dx - s * dy, stands[1] + s * dx + c * dy, stands[2] + turn])
     moved = place - ground[side]
     moved[2] = np.arctan2(np.sin(moved[2]), np.cos(moved[2]))
@@ -107,7 +119,14 @@ def recentred(q: FloatArray, ground: FloatArray) -> tuple[FloatArray, FloatArray
     turn = np.array([[c, s], [-s, c]])
     q, ground = q.copy(), ground.copy()
     q[:2] = turn @ (q[:2] - middle)
-    q[3:7] = rotate_quaternion(q[3:7], np.array([0.0, 0.0, -yaw]))
+    half_c, half_s = np.cos(0.5 * yaw), -np.sin(0.5 * yaw)
+    w, a, b, z = q[3:7]
+    q[3:7] = (
+        half_c * w - half_s * z,
+        half_c * a - half_s * b,
+        half_c * b + half_s * a,
+        half_c * z + half_s * w,
+    )
     ground[:, :2] = (ground[:, :2] - middle) @ turn.T
     ground[:, 2] -= yaw
     return q, ground
