@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,27 +13,21 @@ if TYPE_CHECKING:
     from .counts import TransitionCounts
 
 
-def left_out_surprises(counts: TransitionCounts) -> FloatArray:
+def left_out_surprises(counts: TransitionCounts, length: int) -> FloatArray:
     """Return the surprise of each counted transition, itself left out, sorted, shape (n,) [nat].
 
-    A transition is held against the longest context that it was counted in.
+    Args:
+        counts: The counts.
+        length: How many primitives before it are looked at; transitions that were counted after
+            fewer are not held against anything.
     """
-    tables = _tables(counts)
-    longest = [dict(table) for table in tables]
-    for shorter, longer in pairwise(longest):  # counted once, at the longest
-        for (context, next_id), count in longer.items():
-            key = context[1:], next_id
-            if key in shorter:
-                shorter[key] -= count
+    tables = _tables(counts)[: length + 1]
     totals, kinds = _sums(tables)
-    scores: list[float] = []
-    weights: list[int] = []
-    for table in longest[1:]:
-        for (context, next_id), count in table.items():
-            if count > 0:
-                scores.append(_surprise(counts, tables, totals, kinds, context, next_id))
-                weights.append(count)
-    return np.sort(np.repeat(np.array(scores), weights)) if scores else np.zeros(0)
+    scores = [
+        _surprise(counts, tables, totals, kinds, context, next_id)
+        for context, next_id in tables[length]
+    ]
+    return np.sort(np.repeat(np.array(scores), list(tables[length].values())))
 
 
 _Table = dict[tuple[tuple[int, ...], int], int]

@@ -17,7 +17,7 @@ from .walks import stationary
 class Forecast(TransitionCounts):
     """Counts that predict; nothing here changes them."""
 
-    _usual: FloatArray | None
+    _usual: dict[int, FloatArray]
 
     def prior(self, id: int) -> FloatArray:
         """Return the observed transition probabilities from a primitive, shape (n,), as `ids`.
@@ -71,20 +71,21 @@ class Forecast(TransitionCounts):
         self._require(*(id for id in sequence if id is not None))
         return surprise(self, sequence)
 
-    def p_value(self, surprise: float) -> float:
-        """Return which share of the transitions seen is at least as surprising, in (0, 1].
+    def p_values(self, sequence: History) -> FloatArray:
+        """Return which share of transitions is at least as surprising, shape (len(sequence) - 1,).
 
         Conformal [Vovk2005]: where a transition comes from the same source as those counted, the
         chance of a value of at most a is at most a, so that alarms below a are false at that rate.
-        Each counted transition is held against the others, itself left out. NaN gives NaN.
+        It is held against all transitions counted after as many known primitives, each left out of
+        what it is scored by. In (0, 1]; NaN where `surprises` is.
         """
-        if math.isnan(surprise):
-            return math.nan
-        if self._usual is None:
-            self._usual = left_out_surprises(self)
-        usual = self._usual
-        as_large = len(usual) - np.searchsorted(usual, surprise * (1 - 1e-12), side="left")
-        return float((1 + as_large) / (1 + len(usual)))
+        scores = self.surprises(sequence)
+        shares = np.full(len(scores), np.nan)
+        for t in np.flatnonzero(~np.isnan(scores)).tolist():
+            usual = self._surprises_after(len(usable_context(sequence[: t + 1], self.order)))
+            reached = np.searchsorted(usual, scores[t] * (1 - 1e-12), side="left")
+            shares[t] = (1 + len(usual) - reached) / (1 + len(usual))
+        return shares
 
     def stationary(self, restart: float = 0.01) -> FloatArray:
         """Return how often an endless walk is at each primitive, shape (n,), as `ids`.
@@ -101,7 +102,12 @@ class Forecast(TransitionCounts):
 
     def _before_change(self) -> None:
         super()._before_change()
-        self._usual = None
+        self._usual = {}
+
+    def _surprises_after(self, length: int) -> FloatArray:
+        if length not in self._usual:
+            self._usual[length] = left_out_surprises(self, length)
+        return self._usual[length]
 
     def _indexed_edges(self) -> tuple[IntArray, IntArray, IntArray]:
         edges = self._edges

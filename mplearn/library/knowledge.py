@@ -57,11 +57,12 @@ class Knowledge(Holdings):
                 recognised.
 
         Returns:
-            A score for each primitive but the first, see `TransitionGraph.surprises` and `p_value`;
+            A score for each but the first, see `TransitionGraph.surprises` and `p_values`;
             NaN where it or the one before it was not recognised.
         """
-        scores = self.graph.surprises(self._known(sequence)).tolist()
-        return tuple(AnomalyScore(score, self.graph.p_value(score)) for score in scores)
+        known = self._known(sequence)
+        scores, shares = self.graph.surprises(known), self.graph.p_values(known)
+        return tuple(map(AnomalyScore, scores.tolist(), shares.tolist()))
 
     def predict_next(self, history: Sequence[Key | None], k: int = 3) -> tuple[Prediction, ...]:
         """Return the ``k`` primitives most likely to come next, see `TransitionGraph.predict`.
