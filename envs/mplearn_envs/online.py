@@ -20,6 +20,7 @@ from mplearn.learner.events import Event
 from .demonstration import StreamLike, open_stream
 from .macro_steps import EpisodeState
 from .primitive_humanoid import PrimitiveHumanoidEnv
+from .tasks import FollowTask
 
 CAPACITY = 64
 
@@ -83,6 +84,11 @@ class OnlinePrimitiveHumanoidEnv(PrimitiveHumanoidEnv):
         self.learner = MotionLearner(self.learner_config)
         options = {"capacity": CAPACITY} | options
         super().__init__(self.learner, **options)
+        if isinstance(self.task, FollowTask):
+            raise InvalidValueError(
+                "the task 'follow' draws a demonstrator of its own from a library that is known: "
+                "choose another task in an online environment"
+            )
 
     def _begin(self) -> None:
         known = self.carry_over and self.learner.n_frames > 0

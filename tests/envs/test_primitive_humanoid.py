@@ -1,10 +1,12 @@
 """The environment: compliance, masks and priors, determinism, saving, bad input."""
 
 import copy
+import json
 import os
 import pickle
 import subprocess
 import sys
+import zipfile
 
 import gymnasium
 import numpy as np
@@ -317,6 +319,20 @@ def test_a_damaged_file_is_refused(tmp_path):
         gymnasium.make(ID, library=path)
 
 
+def test_a_file_of_another_version_is_refused(tmp_path):
+    path = standing_library().save(tmp_path / "one.mplearn")
+    with zipfile.ZipFile(path) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    header = json.loads(parts["header.json"])
+    for schema, message in ((99, "newer mplearn"), ("one", "damaged")):
+        parts["header.json"] = json.dumps(header | {"schema": schema}).encode()
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, data in parts.items():
+                archive.writestr(name, data)
+        with pytest.raises(LibraryError, match=message):
+            gymnasium.make(ID, library=path)
+
+
 def test_a_library_the_robot_cannot_perform_is_refused_with_reasons():
     frames = [sweep({}, JUMP, 0.8)] * 4
     jump = Primitive.from_exemplars(1, fit(frames, 8, variance_floor=1e-4), frames, RATE_HZ)
@@ -342,6 +358,11 @@ def test_a_library_the_robot_cannot_perform_is_refused_with_reasons():
         {"frame_rate_hz": 0.0},
         {"illegal_penalty": np.inf},
         {"style": "wild"},
+        {"dynamics": "dreamt"},
+        {"flat": "yes"},
+        {"novel_penalty": np.nan},
+        {"max_steps": 2.5},
+        {"width": 0},
     ],
 )
 def test_bad_options_are_refused(options):
