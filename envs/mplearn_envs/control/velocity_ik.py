@@ -159,7 +159,7 @@ def errors(stance: Stance, pose: Pose, height: float, orientation: FloatArray) -
             stance.foot_rotation[side], pose.rotation[foot]
         )
         span = pose.position[stance.thighs[side]] - stance.foot_position[side]
-        reach = stance.reach[side] + stance.carried[side]  # no bound on a foot in the air
+        reach = stance.reach[side] + stance.carried[side] ** 4  # no bound on a foot in the air
         flat = reach**2 - span[0] ** 2 - span[1] ** 2
         rise = min(rise, np.sqrt(max(flat, 1e-4)) - span[2])
     out[12:14] = stance.cog - pose.moment[0, :2] / pose.carried[0]

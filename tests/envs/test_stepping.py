@@ -1,0 +1,254 @@
+"""Feet that leave the ground: what is read from motions, how it is planned and performed."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from standing_library import KICK, RATE_HZ, posture, sweep
+
+from mplearn_envs.control import Motion, Planner, reference_robot, rest_reference
+from mplearn_envs.control.footwork import Footwork, Lift, read_footwork
+from mplearn_envs.control.gravity import holding_torques
+from mplearn_envs.control.kinematics import places, points_along
+from mplearn_envs.control.pendulum import JERK_WEIGHT, plan_cog, zmp_along
+from mplearn_envs.control.stride import landing, sole_middles
+from mplearn_envs.experiments.model_error import disturb
+from mplearn_envs.robot import humanoid
+from mplearn_envs.simulation import Simulation
+
+HUMANOID = humanoid()
+REFERENCE = reference_robot(HUMANOID)
+PLANNER = Planner(HUMANOID)
+REST = rest_reference(HUMANOID)
+KNEE_UP = {"hip_pitch_r": -1.2, "knee_r": 1.4, "shoulder_pitch_l": -0.6}
+RAISE = PLANNER.motion(sweep({}, KNEE_UP, 1.0), RATE_HZ)
+LOWER = PLANNER.motion(sweep(KNEE_UP, {}, 1.0), RATE_HZ)
+
+
+def started(seed=None, feedback="steps"):
+    simulation = Simulation(HUMANOID, feedback)
+    if seed is not None:
+        disturb(simulation.model, 0.1, np.random.default_rng(seed))
+    simulation.reset()
+    return simulation
+
+
+def step(side, before, after, speed_hz=100.0):
+    """Return a motion of one step that takes the left foot, seen from the right, to ``after``."""
+    x = np.clip((np.linspace(0.0, 1.0, 101) - 0.2) / 0.6, 0.0, 1.0)
+    share = (x**3 * (10 - 15 * x + 6 * x**2))[:, None]
+    apart = np.array(before) * (1 - share) + np.array(after) * share
+    rise = np.zeros((101, 2))
+    rise[:, side] = 0.06 * np.sin(np.pi * x) ** 2
+    up = np.flatnonzero(rise[:, side] > 1e-6)
+    legs = np.repeat(REST.swing[None, :-2], 101, axis=0)
+    lifts = (Lift(side, int(up[0]), int(up[-1]) + 1),)
+    frames = np.repeat(REST.target[None], 101, axis=0)
+    return Motion(frames, speed_hz, Footwork(legs, rise, apart, lifts))
+
+
+def test_lifts_are_read_from_the_motion():
+    there_and_back = np.vstack((sweep({}, KICK, 0.8), sweep(KICK, {}, 0.8)[1:]))
+    whole = read_footwork(HUMANOID, there_and_back, RATE_HZ)
+    (lift,) = whole.lifts
+    assert lift.side == 0 and 5 < lift.start < 40 and 120 < lift.end < 160
+    assert (whole.up_at(False), whole.up_at(True)) == (-1, -1)
+    assert whole.rise[:, 1].max() == 0 and 0.15 < whole.rise[:, 0].max() < 0.3
+    assert np.all(whole.rise[[0, -1]] == 0)
+    assert (RAISE.footwork.up_at(False), RAISE.footwork.up_at(True)) == (-1, 1)
+    assert (LOWER.footwork.up_at(False), LOWER.footwork.up_at(True)) == (1, -1)
+    assert PLANNER.motion(sweep({}, {"base_pitch": 0.5}, 1.0), RATE_HZ).footwork is None
+
+
+def test_one_foot_after_the_other_is_two_lifts():
+    other = {"hip_pitch_l": -1.2, "knee_l": 1.4}
+    frames = np.vstack([sweep(a, b, 0.8) for a, b in ((KNEE_UP, {}), ({}, other), (other, {}))])
+    footwork = read_footwork(HUMANOID, frames, RATE_HZ)
+    assert [lift.side for lift in footwork.lifts] == [1, 0]
+    assert footwork.lifts[0].start == -1 and footwork.lifts[0].end <= footwork.lifts[1].start
+    assert not (footwork.rise > 0).all(axis=1).any()
+
+
+def test_feet_are_seen_from_each_other():
+    frame = posture({"hip_yaw_l": 0.4, "hip_roll_l": 0.3})
+    footwork = read_footwork(HUMANOID, np.stack((frame, frame)), RATE_HZ)
+    q = np.concatenate(([0.0, 0.0, frame[0], 1.0, 0.0, 0.0, 0.0], frame[3:]))
+    left, right = places(REFERENCE.tree, REFERENCE.stance.feet, q[None])[0]
+    np.testing.assert_allclose(footwork.left_from_right[0], left - right, atol=1e-12)
+
+
+@pytest.mark.parametrize("settled", [True, False])
+def test_the_pendulums_plan_is_the_least_squares_optimum(settled):
+    """Against a dense solution of the same problem."""
+    n, dt, height = 120, 0.02, 0.8
+    zmp = np.zeros((n + 1, 2))
+    zmp[:, 1] = np.interp(np.arange(n + 1), [0, 45, 75, n], [0, 0, 0.09, 0.09])
+    start, end = zmp[0], zmp[-1]
+    ours = plan_cog(zmp, start, end, settled, height, dt)
+    size = n - 1 if settled else n
+    rows, right = [], []
+
+    def add(coefficients, first, value):
+        row, value = np.zeros(size), np.array(value, float)
+        for i, weight in enumerate(coefficients):
+            k = first + i
+            if k <= 0:
+                value -= weight * start
+            elif settled and k >= n:
+                value -= weight * end
+            else:
+                row[min(k, n) - 1] += weight
+        rows.append(row)
+        right.append(value)
+
+    lean, jerk = height / 9.81 / dt**2, np.sqrt(JERK_WEIGHT) / dt**3
+    for k in range(-1, n + 2):
+        if 1 <= k <= n:
+            add((-lean, 1 + 2 * lean, -lean), k - 1, zmp[k])
+        add((-jerk, 3 * jerk, -3 * jerk, jerk), k - 1, (0.0, 0.0))
+    dense = np.linalg.lstsq(np.array(rows), np.array(right), rcond=None)[0]
+    np.testing.assert_allclose(ours[1 : size + 1], dense, atol=1e-9)
+    assert np.abs(zmp_along(ours, height, dt) - zmp).max() < 0.03
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.0])
+def test_a_raised_knee_is_performed_held_and_lowered(speed):
+    simulation = started(seed=1)
+    up = PLANNER.plan(REST, RAISE, speed)
+    assert up.end.lifted == 1 and up.error.max() < 1e-6 and up.zmp_margin_m.min() > 0.02
+    first = simulation.perform(up)
+    held = simulation.perform(PLANNER.hold(up.end, 3.0))
+    # the leg is where the demonstrator had it
+    names = [HUMANOID.joint_names.index(name) for name in ("hip_pitch_r", "knee_r")]
+    assert np.abs(simulation.data.qpos[7:][names] - (-1.2, 1.4)).max() < np.deg2rad(2.0)
+    soles = points_along(
+        REFERENCE.tree, REFERENCE.stance.feet, REFERENCE.corners, simulation.data.qpos[None]
+    )[0, ..., 2]
+    assert soles[0].max() < 0.004 and soles[1].min() > 0.7 * RAISE.footwork.rise[-1, 1]
+    down = PLANNER.plan(up.end, LOWER, speed)
+    last = simulation.perform(down)
+    assert down.end.lifted == -1
+    for performance in (first, held, last):
+        assert not performance.fallen
+        assert performance.cog_deviation_m.max() < 0.01
+        assert np.rad2deg(performance.tracking_error_rad.max()) < 1.0
+        assert performance.zmp_margin_m.min() > 0.0
+
+
+def test_the_weight_need_not_return_to_the_middle():
+    down = PLANNER.plan(PLANNER.plan(REST, RAISE, 1.0).end, LOWER, 1.0)
+    left, _ = sole_middles(REFERENCE, REFERENCE.ground)
+    assert abs(down.cog[-1, 1] - left[1]) < 0.07
+    hold = PLANNER.hold(down.end, 2.0)
+    assert abs(hold.cog[-1, 1]) < 1e-4
+    assert hold.steps and not PLANNER.hold(hold.end, 2.0).steps
+
+
+def test_where_another_foot_is_up_it_is_exchanged_first():
+    up = PLANNER.plan(REST, RAISE, 1.0)
+    left = {name.replace("_r", "_l"): value for name, value in KNEE_UP.items()}
+    motion = PLANNER.motion(sweep(left, {}, 1.0), RATE_HZ)
+    plan = PLANNER.plan(up.end, motion, 1.0)
+    changes = plan.up[np.flatnonzero(np.diff(plan.up, prepend=9))]
+    assert changes.tolist() == [1, -1, 0, -1]
+    simulation = started(seed=2)
+    assert not simulation.perform(up).fallen
+    assert not simulation.perform(plan).fallen
+
+
+NARROW = [0.0, 0.18, 0.0]
+WALKS = {
+    "forward": [(1, NARROW, [-0.2, 0.18, 0]), (0, [-0.2, 0.18, 0], [0.2, 0.18, 0])],
+    "sideways": [(0, NARROW, [0, 0.36, 0]), (1, [0, 0.36, 0], NARROW)],
+    "turn": [(0, NARROW, [0, 0.2, 0.5]), (1, [0, 0.2, 0.5], NARROW)],
+}
+
+
+@pytest.mark.parametrize("name", WALKS)
+def test_steps_end_where_the_motion_ends_them(name):
+    simulation = started(seed=3)
+    here = REST
+    for side, before, after in WALKS[name]:
+        plan = PLANNER.plan(here, step(side, before, after), 1.0)
+        assert not simulation.perform(plan).fallen
+        here = plan.end
+    left, right = places(REFERENCE.tree, REFERENCE.stance.feet, simulation.data.qpos[None])[0]
+    c, s = np.cos(right[2]), np.sin(right[2])
+    x, y, turn = left - right
+    wanted = WALKS[name][-1][2]
+    np.testing.assert_allclose([c * x + s * y, c * y - s * x], wanted[:2], atol=0.005)
+    assert turn == pytest.approx(wanted[2], abs=0.01)
+    moved = {"forward": right[0] - 0.2, "sideways": right[1] - 0.09, "turn": right[2] - 0.5}
+    assert abs(moved[name]) < 0.03
+
+
+def test_a_foot_lands_beside_the_other_not_on_it():
+    ground = np.array([[0.3, 0.09, 0.0], [0.0, -0.09, 0.0]])
+    place = landing(REFERENCE, ground, 0, np.array([0.0, 0.05, 0.0]))
+    width = np.ptp(REFERENCE.corners[0, :, 1])
+    assert place[1] + 0.09 > width
+    np.testing.assert_array_equal(  # almost where it stood is where it stood
+        landing(REFERENCE, REFERENCE.ground, 1, np.array([0.03, 0.2, 0.1])), REFERENCE.ground[1]
+    )
+
+
+def test_steps_are_a_pure_function_and_cached():
+    first = PLANNER.plan(REST, RAISE, 0.5, key="raise")
+    assert PLANNER.plan(REST, RAISE, 0.5, key="raise") is first
+    fresh = Planner(HUMANOID).plan(REST, RAISE, 0.5)
+    assert fresh.commands.tobytes() == first.commands.tobytes()
+    states = []
+    for _ in range(2):
+        simulation = started()
+        simulation.perform(first)
+        states.append(simulation.state().tobytes())
+    assert states[0] == states[1]
+
+
+def test_holding_torques_are_those_of_a_robot_on_one_foot():
+    simulation = started()
+    up = PLANNER.plan(REST, RAISE, 0.5)
+    simulation.perform(up)
+    hold = PLANNER.hold(up.end, 2.0)
+    simulation.perform(hold)
+    middles = sole_middles(REFERENCE, hold.ground[-1:])
+    expected = holding_torques(REFERENCE, hold.q[-1:], hold.share[-1:], hold.cog[-1:, :2], middles)[
+        0
+    ]
+    assert np.abs(expected).max() > 20.0
+    np.testing.assert_allclose(simulation.data.actuator_force, expected, atol=2.5)
+
+
+def test_feedback_of_the_ankles_damps_a_push():
+    largest = {}
+    for feedback in ("never", "always"):
+        simulation = started(feedback=feedback)
+        simulation.data.qvel[0] += 0.12
+        performance = simulation.perform(PLANNER.hold(REST, 1.0))
+        assert not performance.fallen
+        largest[feedback] = performance.cog_deviation_m.max()
+    assert largest["always"] < 0.9 * largest["never"]
+
+
+unit = st.floats(0.0, 1.0)
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    st.lists(unit, min_size=33, max_size=33),
+    st.lists(unit, min_size=33, max_size=33),
+    st.floats(0.2, 1.5),
+    st.floats(0.3, 2.0),
+)
+def test_no_command_ever_leaves_the_limits_on_one_foot_either(first, last, seconds, speed):
+    """Any motion of the whole body between any two postures."""
+    limits = HUMANOID.position_limits
+    low = np.concatenate((REFERENCE.limits[:3, 0], limits[:, 0]))
+    high = np.concatenate((REFERENCE.limits[:3, 1], limits[:, 1]))
+    ends = np.array([first, last]) * 1.2 - 0.1
+    x = np.linspace(0, 1, max(2, round(50 * seconds)))[:, None]
+    frames = low + (ends[0] * (1 - x) + ends[1] * x) * (high - low)
+    plan = PLANNER.plan(REST, PLANNER.motion(frames, 50.0), speed)
+    assert np.isfinite(plan.commands).all()
+    assert (plan.commands >= limits[:, 0]).all() and (plan.commands <= limits[:, 1]).all()
+    assert len(plan.commands) == (len(plan.q) - 1) * 5 and np.isfinite(plan.end.q).all()
