@@ -18,8 +18,8 @@ class PeopleConfig:
 
     Attributes:
         posture: Weight of the mean posture beside the movement about it, in [0, 1].
-        scatter: That unit is at most this multiple of the distance at which executions usually lie
-            from their mean; it holds while few primitives are known, which lie far apart.
+        repertoire: Primitives of a person from which on that scale is taken as it is; the fewer
+            are known, the farther they lie apart.
         link: Two groups of leaves by different people are one primitive up to this tension
             (`links.tension`), taken of the average distance over all pairs of leaves.
         link_own: Two leaves of one person are one primitive only up to this distance.
@@ -31,7 +31,7 @@ class PeopleConfig:
     """
 
     posture: float = 0.5
-    scatter: float = 4.0
+    repertoire: int = 20
     link: float = 1.0
     link_own: float = 0.3
     join: float = 0.7
@@ -39,7 +39,7 @@ class PeopleConfig:
     offset_prior: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("scatter", "link", "link_own", "join", "reach", "offset_prior"):
+        for name in ("repertoire", "link", "link_own", "join", "reach", "offset_prior"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InvalidValueError(f"{name} must be positive, not {getattr(self, name)}")
         if not 0 <= self.posture <= 1:

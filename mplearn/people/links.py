@@ -12,13 +12,12 @@ _ROUNDS = 3  # links and people's offsets are found in turn
 
 
 def solve(
-    shapes: Shape, scatters: FloatArray, people: IntArray, n_people: int, config: PeopleConfig
+    shapes: Shape, people: IntArray, n_people: int, config: PeopleConfig
 ) -> tuple[IntArray, FloatArray, float]:
     """Find the groups of leaves that are one primitive each.
 
     Args:
         shapes: Of all n leaves, stacked.
-        scatters: How far each leaf's executions usually lie from its shape, shape (n,).
         people: Whose leaf each is, 0, 1, ..., shape (n,).
         n_people: How many people there are.
         config: The rules.
@@ -30,12 +29,10 @@ def solve(
     offsets = np.zeros((n_people, shapes.posture.shape[1]))
     groups = np.arange(len(people))
     unit = float("inf")
-    known = scatters[np.isfinite(scatters)]
-    usual = config.scatter * float(np.median(known)) if len(known) else float("inf")
     for _ in range(_ROUNDS):
         level = corrected(shapes, people, offsets)
         matrix = distances(level, level, config.posture)
-        unit = min(unit_of(matrix, people), usual)
+        unit = unit_of(matrix, people, config.repertoire)
         if not np.isfinite(unit):
             break
         before, groups = groups, agglomerate(matrix / unit, people, config)
@@ -50,12 +47,24 @@ def corrected(shapes: Shape, people: IntArray, offsets: FloatArray) -> Shape:
     return Shape(shapes.posture - offsets[people], shapes.movement)
 
 
-def unit_of(matrix: FloatArray, people: IntArray) -> float:
-    """Return the median distance from a leaf to the nearest other leaf of the same person."""
+def unit_of(matrix: FloatArray, people: IntArray, repertoire: int) -> float:
+    """Return how far a person's primitives lie apart, or will when as many are known as are usual.
+
+    It is the median distance from a leaf to the nearest other leaf of the same person. While few
+    are known they lie far apart: neighbours of n points in a volume do so by n^(-1/3).
+
+    Args:
+        matrix: Distances, shape (n, n).
+        people: Whose leaf each is, shape (n,).
+        repertoire: Leaves of a person from which on the distance is taken as it is.
+    """
     own = (people[:, None] == people) & ~np.eye(len(people), dtype=np.bool_)
     nearest = np.where(own, matrix, np.inf).min(axis=1, initial=np.inf)
-    nearest = nearest[np.isfinite(nearest)]
-    return float(np.median(nearest)) if len(nearest) else float("inf")
+    known = np.isfinite(nearest)
+    if not known.any():
+        return float("inf")
+    share = min(1.0, (1.0 + float(own.sum(axis=1)[known].mean())) / repertoire)
+    return float(np.median(nearest[known])) * float(np.cbrt(share))
 
 
 def tension(nearest: FloatArray, second: FloatArray, reach: float) -> FloatArray:

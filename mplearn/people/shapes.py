@@ -44,19 +44,6 @@ def shape_of(exemplars: Iterable[FloatArray], config: FormConfig) -> Shape:
     return Shape(posture, (np.sqrt(weights)[:, None] * (mean - posture)).ravel())
 
 
-def scatter_of(exemplars: Iterable[FloatArray], config: FormConfig, posture: float) -> float:
-    """Return the usual distance of executions from their mean trajectory, root mean square.
-
-    NaN where there is only one.
-    """
-    each = [shape_of([frames], config) for frames in exemplars]
-    if len(each) < 2:
-        return float("nan")
-    postures, movements = (np.array(part) for part in zip(*each, strict=True))
-    variance = posture * postures.var(axis=0, ddof=1).sum() + movements.var(axis=0, ddof=1).sum()
-    return float(np.sqrt(variance))
-
-
 def squares(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the squared distances between rows, shape (n, D) and (m, D) to (n, m)."""
     lengths = np.einsum("nd,nd->n", a, a)[:, None] + np.einsum("md,md->m", b, b)

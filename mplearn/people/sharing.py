@@ -13,7 +13,7 @@ from ..recording import FloatArray, IntArray
 from ..tree import ROOT, Merge, Node, Placement, PrimitiveTree, Split, TreeConfig
 from .config import PeopleConfig
 from .links import corrected, solve, tension
-from .shapes import Shape, distances, scatter_of, shape_of
+from .shapes import Shape, distances, shape_of
 
 
 @dataclass
@@ -27,7 +27,6 @@ class Leaf:
         primitive: Id of the primitive; `ROOT` before it is known.
         founded: Id of the primitive that was born with this leaf; `ROOT` if none was.
         shape: Its mean trajectory.
-        scatter: How far its executions usually lie from that.
     """
 
     person: int
@@ -36,7 +35,6 @@ class Leaf:
     primitive: int
     founded: int
     shape: Shape
-    scatter: float
 
 
 class Sharing:
@@ -81,7 +79,7 @@ class Sharing:
                 self._parents[node.id] = node.parent or ROOT
                 if node.is_leaf:
                     seen = self._seen(tree, node.id)
-                    self.leaves.append(Leaf(person, node.id, node.id, node.id, node.id, *seen))
+                    self.leaves.append(Leaf(person, node.id, node.id, node.id, node.id, seen))
                 else:
                     self._above[node.id] = node
         if self.leaves:
@@ -199,9 +197,9 @@ class Sharing:
         self.leaves = [leaf for leaf in self.leaves if leaf.person != person or leaf.local in now]
         for leaf in self.leaves:
             if leaf.person == person and leaf.local in touched:
-                leaf.shape, leaf.scatter = self._seen(tree, leaf.local)
+                leaf.shape = self._seen(tree, leaf.local)
         for local in sorted(now - known):
-            self.leaves.append(Leaf(person, local, ROOT, ROOT, ROOT, *self._seen(tree, local)))
+            self.leaves.append(Leaf(person, local, ROOT, ROOT, ROOT, self._seen(tree, local)))
         return now != known
 
     def _solve(
@@ -313,16 +311,7 @@ class Sharing:
             "n_seen": self._n_seen,
             "unit": self._unit,
             "leaves": [
-                [
-                    leaf.person,
-                    leaf.local,
-                    leaf.id,
-                    leaf.primitive,
-                    leaf.founded,
-                    leaf.scatter,
-                    *leaf.shape,
-                ]
-                for leaf in self.leaves
+                [*(getattr(leaf, name) for name in _IDS), *leaf.shape] for leaf in self.leaves
             ],
             "numbers": [
                 [person, [list(pair) for pair in numbers.items()]]
@@ -340,15 +329,10 @@ class Sharing:
         self._unit = float(state["unit"])
         self.leaves = [
             Leaf(
-                int(person),
-                int(local),
-                int(id),
-                int(primitive),
-                int(founded),
-                Shape(np.array(posture), np.array(movement)),
-                float(scatter),
+                **dict(zip(_IDS, map(int, ids), strict=True)),
+                shape=Shape(np.array(posture), np.array(movement)),
             )
-            for person, local, id, primitive, founded, scatter, posture, movement in state["leaves"]
+            for *ids, posture, movement in state["leaves"]
         ]
         self._numbers = {
             int(person): {int(there): int(here) for there, here in pairs}
@@ -363,13 +347,10 @@ class Sharing:
     # ---- inside
 
     def _solved(self) -> tuple[IntArray, FloatArray, float]:
-        scatters = np.array([leaf.scatter for leaf in self.leaves])
-        return solve(self._stacked(), scatters, self._whose(), len(self._trees), self.rules)
+        return solve(self._stacked(), self._whose(), len(self._trees), self.rules)
 
-    def _seen(self, tree: PrimitiveTree, leaf: int) -> tuple[Shape, float]:
-        exemplars = tree.exemplars(leaf)
-        form = self.config.form
-        return shape_of(exemplars, form), scatter_of(exemplars, form, self.rules.posture)
+    def _seen(self, tree: PrimitiveTree, leaf: int) -> Shape:
+        return shape_of(tree.exemplars(leaf), self.config.form)
 
     def _home(self, person: int, node: int, number: int) -> int:
         for leaf in self.leaves:
@@ -403,6 +384,7 @@ class Sharing:
                 self._joined.pop(numbers.pop(n), None)
 
 
+_IDS = ("person", "local", "id", "primitive", "founded")
 _NONE: tuple[tuple[()], tuple[()], tuple[()], tuple[()]] = ((), (), (), ())
 
 

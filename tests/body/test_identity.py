@@ -1,0 +1,142 @@
+"""Who stands there: synthetic people before the cameras, one after another."""
+
+import numpy as np
+import pytest
+
+from mplearn.body import MotionObserver
+from mplearn.body.identity import BodyIdentity, IdentityConfig
+from mplearn.body.rigid import distances_of, rigid_pairs
+from mplearn.demonstrator import Person, demonstrate
+from mplearn.errors import BodyError, InvalidValueError
+from mplearn.recording import Recording
+
+SIZES = {"small": 1.58, "middle": 1.70, "tall": 1.84}
+
+
+@pytest.fixture(scope="module")
+def people() -> dict[str, Recording]:
+    """Three people who raise and lower an arm and bow."""
+    script = ("RAR", "RAL", "BAD", "BAU")
+    return {
+        name: demonstrate(script, seed=i, person=Person(name, height)).recording
+        for i, (name, height) in enumerate(SIZES.items())
+    }
+
+
+@pytest.fixture(scope="module")
+def stream(people: dict[str, Recording]) -> tuple[np.ndarray, list[tuple[int, int]]]:
+    """Pieces of their motion, each going on where that person was; frames and true changes."""
+    at = dict.fromkeys(people, 0)
+    pieces, truth, names, length = [], [], [], 0
+    for name, n in [("small", 300), ("tall", 200), ("small", 90), ("middle", 150), ("tall", 120)]:
+        pieces.append(people[name].frames[at[name] : at[name] + n])
+        at[name] += n
+        if name not in names:
+            names.append(name)
+        truth.append((length, names.index(name)))
+        length += n
+    return np.concatenate(pieces), truth
+
+
+def watch(observer: MotionObserver, frames: np.ndarray):
+    """Return all features, and who they were of: the first row and the number."""
+    rows, seen, arrivals = [], [], 0
+    for frame in frames:
+        features = observer.update(frame)
+        if len(features) and observer.arrivals != arrivals:
+            arrivals = observer.arrivals
+            seen.append((sum(map(len, rows)), observer.person))
+        rows.append(features)
+    rows.append(observer.flush())
+    return np.concatenate(rows), seen
+
+
+def test_people_are_told_apart_and_recognised_when_they_come_back(people, stream):
+    frames, truth = stream
+    features, seen = watch(MotionObserver(people["small"].marker_names, 100.0), frames)
+    assert len(features) == len(frames)
+    assert [person for _, person in seen] == [person for _, person in truth]
+    assert max(abs(a - b) for (a, _), (b, _) in zip(seen, truth, strict=True)) <= 3
+    assert np.isfinite(features).all()
+
+
+def test_who_comes_back_is_followed_on_the_body_fitted_before(people, stream):
+    frames, truth = stream
+    features, _ = watch(MotionObserver(people["small"].marker_names, 100.0), frames)
+    alone = MotionObserver(people["small"].marker_names, 100.0).observe(people["small"].frames)
+    assert np.array_equal(features[:300], alone[:300])
+    again = features[truth[2][0] + 10 : truth[3][0]] - alone[310:390]
+    assert np.abs(again[:, 0]).max() < 0.01
+    assert np.median(np.abs(again)) < 0.02
+
+
+def test_one_person_is_one_person(people):
+    for recording in people.values():
+        observer = MotionObserver(recording.marker_names, 100.0)
+        _, seen = watch(observer, recording.frames)
+        assert seen == [(0, 0)]
+
+
+def test_a_saved_observer_goes_on_in_the_middle_of_a_doubt(people, stream):
+    frames, truth = stream
+    for at in (truth[1][0] + 4, truth[1][0] + 30):
+        one = MotionObserver(people["small"].marker_names, 100.0)
+        for frame in frames[:at]:
+            one.update(frame)
+        other = MotionObserver(people["small"].marker_names, 100.0)
+        other.load_state(one.state())
+        for frame in frames[at : at + 60]:
+            assert np.array_equal(one.update(frame), other.update(frame))
+        assert one.person == other.person
+
+
+def test_a_new_stream_recognises_people(people):
+    observer = MotionObserver(people["small"].marker_names, 100.0)
+    for name in ("small", "tall", "small", "tall"):
+        watch(observer, people[name].frames[:250])
+        assert observer.person == ("small", "tall").index(name)
+        observer.restart()
+    assert observer.person == -1
+
+
+def test_a_gap_of_the_whole_body_changes_nobody(people):
+    frames = people["tall"].frames.copy()
+    frames[200:260] = np.nan
+    observer = MotionObserver(people["tall"].marker_names, 100.0)
+    features, seen = watch(observer, frames)
+    assert seen == [(0, 0)]
+    assert len(features) == len(frames)
+
+
+def test_one_more_than_can_be_told_apart_is_the_nearest(people):
+    observer = MotionObserver(
+        people["small"].marker_names, 100.0, identity=IdentityConfig(max_people=2)
+    )
+    for name in ("small", "tall", "middle"):
+        watch(observer, people[name].frames[:200])
+        assert observer.person in (0, 1)
+        observer.restart()
+    assert observer.identity.n_people == 2
+
+
+def test_rigid_pairs_share_a_segment_and_keep_their_distance(people):
+    recording = people["small"]
+    pairs, give = rigid_pairs(recording.marker_names)
+    assert len(pairs) == len(give) >= 20
+    names = [{recording.marker_names[i] for i in pair} for pair in pairs]
+    assert {"LFHD", "RFHD"} in names
+    assert {"LFHD", "LTOE"} not in names
+    seen = np.array([distances_of(markers, pairs) for markers in recording.markers])
+    i, j = pairs.T
+    truth = np.linalg.norm(recording.markers[:, i] - recording.markers[:, j], axis=2)
+    assert np.allclose(seen, truth, equal_nan=True)
+    assert np.nanstd(seen, axis=0).max() < 0.006
+
+
+def test_what_cannot_be_is_refused(people):
+    with pytest.raises(BodyError):
+        BodyIdentity(("a", "b"), 100.0)
+    with pytest.raises(InvalidValueError, match="strikes"):
+        IdentityConfig(strikes=0)
+    with pytest.raises(InvalidValueError, match="person"):
+        BodyIdentity(people["small"].marker_names, 100.0).meet(4)
