@@ -20,7 +20,7 @@ from mplearn.recording import FloatArray
 from .choices import Choices, choose_among
 from .control.controller import tracked_columns
 from .control.planner import Plan, Planner
-from .control.reference import Reference
+from .control.reference import Reference, rest_reference
 from .feasibility import Feasibility, FeasibilityCheck, FeasibilityConfig
 from .robot import Robot
 from .slots import Slots
@@ -184,12 +184,27 @@ class Repertoire:
         with self.lock:
             frames, rate_hz = self.frames(id)
             motion = self.planner.motion(frames, rate_hz)
-            return self.planner.plan(start, motion, self.feasibility(id).speed, self.key(id))
+            plan = self.planner.plan(start, motion, self.feasibility(id).speed, self.key(id))
+        return plan._replace(end=self._settled(plan.end))
 
     def hold(self, start: Reference, duration_s: float) -> Plan:
         """Return the commands that come to rest in the present posture."""
         with self.lock:
-            return self.planner.hold(start, duration_s)
+            plan = self.planner.hold(start, duration_s)
+        return plan._replace(end=self._settled(plan.end))
+
+    def _settled(self, end: Reference) -> Reference:
+        """Return where a motion ends, such that the same place recurs, to the last bit.
+
+        The legs are solved for to about 1e-5 and depend that much on the way; and with both feet
+        down it does not matter how they swung.
+        """
+        if end.lifted >= 0:
+            return end
+        q = np.round(end.q, 4)
+        q[3:7] /= np.linalg.norm(q[3:7])
+        swing = rest_reference(self.robot).swing
+        return end._replace(q=q, swing=swing, swing_velocity=np.zeros_like(swing))
 
     def recall(self, key: Hashable) -> Any:
         """Return what was kept under a key; None if that is not, or no longer, in `memory`."""
