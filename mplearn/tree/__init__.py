@@ -2,6 +2,7 @@
 
 from .config import FormConfig as FormConfig
 from .config import TreeConfig as TreeConfig
+from .mirror import MirrorMap as MirrorMap
 from .node import Node as Node
 from .placement import ROOT as ROOT
 from .placement import Change as Change
@@ -12,4 +13,6 @@ from .placement import Reparent as Reparent
 from .placement import Split as Split
 from .recogniser import Recogniser as Recogniser
 from .recogniser import Recognition as Recognition
+from .relations import Relation as Relation
+from .relations import related as related
 from .tree import PrimitiveTree as PrimitiveTree

@@ -69,14 +69,13 @@ class TreeConfig:
         split_scale: And when the mean between them exceeds the median diameter of the other leaves
             by this.
         min_branch: Members of each branch from which on it is one.
-        mature: Exemplars from which on a leaf is known well enough for that.
         merge_ratio: Two leaves that a segment lies in are merged when the distance between them is
             below that inside them times this; 0 for never.
         false_acceptance: Share of the motions of unknown kinds that may be taken for known ones:
             all radii are scaled to it (`mplearn.tree.rejection`); None leaves them as they are.
         n_candidates: Leaves, by mean trajectory, that are looked at closely; 0 to search down from
             the root, as printed.
-        max_exemplars: Exemplars kept by a node.
+        max_exemplars: Exemplars kept by a node; a leaf that has so many may be split.
         max_unplaced: Segments that wait in the root.
         n_sampled: Segments, of all ever seen, that mu and sigma are taken over.
         seed: Seed of the choice of those.
@@ -95,11 +94,10 @@ class TreeConfig:
     reach_cap: float = 1.75
     reach_limit: float = 1.0
     n_nearest: int = 2
-    split_ratio: float = 1.8
+    split_ratio: float = 2.0
     split_gap: float = 1.45
     split_scale: float = 0.9
     min_branch: int = 4
-    mature: int = 10
     merge_ratio: float = 1.4
     false_acceptance: float | None = None
     n_candidates: int = 6
@@ -148,7 +146,6 @@ class TreeConfig:
             "split_gap": 0,
             "split_scale": 0,
             "min_branch": 2,
-            "mature": 4,
             "merge_ratio": 0,
         }
         for name, low in lowest.items():

@@ -16,10 +16,10 @@ def split_mixed(structure: Structure, leaf: Node, when: int) -> Change:
     """Split a leaf if its two branches lie too far apart.
 
     On average, by what is inside them and by how wide other leaves are; and with a break between
-    them. Few exemplars look like two groups by chance, so a leaf must be known well.
+    them. Few exemplars look like two groups by chance, so the leaf must keep all that it may.
     """
     config = structure.config
-    if leaf.whole or len(leaf.members) < config.mature:
+    if leaf.whole or len(leaf.members) < config.max_exemplars:
         return Change()
     branches = two_branches(leaf.matrix, config.min_branch)
     if branches is None:
