@@ -152,10 +152,10 @@ def settle(
     """Solve each frame by itself from a posture that may be far away, in place.
 
     Args:
-        follower: The body as the solver sees it.
-        tree: Its kinematics in the person's size.
-        bodies: Body of each marker, shape (M,).
-        offsets: Place of each marker, shape (M, 3) [m].
+        follower: See `first_posture`, as for ``tree``, ``bodies`` and ``offsets``.
+        tree: See there.
+        bodies: See there.
+        offsets: See there.
         postures: Where to start, shape (K, 7 + n); the solutions afterwards.
         frames: Measured positions, shape (K, M, 3) [m]; NaN where missing.
 

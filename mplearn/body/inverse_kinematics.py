@@ -24,6 +24,7 @@ from .gauss_newton import Linkage, solve_frame
 from .markers import MarkerSet, find_marker_set
 
 FEWEST_MARKERS = 3  # fewer do not say where a body is: the posture is held
+LARGEST_M = 3.5  # no person's markers span more along an axis
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,9 @@ class InverseKinematics:
     def update(self, markers: FloatArray) -> FloatArray:
         """Take one frame and return the posture, shape (7 + n,): never NaN, never a jump.
 
-        With too few markers in sight the posture is held, and `uncertainty` grows.
+        With too few markers in sight the posture is held, and `uncertainty` grows. Markers that
+        are too far from the others to be on one person count as missing: one that flies off, or
+        all of them if they come in millimetres.
 
         Args:
             markers: Positions, shape (M, 3) [m]; NaN where missing.
@@ -167,6 +170,7 @@ class InverseKinematics:
         np.minimum(self._variance, config.most_uncertain**2, out=self._variance)
         residuals = np.full(len(frame), np.nan)
         self.iterations = 0
+        frame = _of_one_person(frame)
         if np.isfinite(frame).all(axis=1).sum() >= FEWEST_MARKERS:
             self.iterations = self._solve(frame, residuals, dt)
         self.residual_m = np.full(len(self.marker_names), np.nan)
@@ -246,3 +250,13 @@ class InverseKinematics:
         self._variance = np.array(state["variance"], dtype=np.float64)
         self._fresh = bool(state["fresh"])
         self.q = self._on_body()
+
+
+def _of_one_person(frame: FloatArray) -> FloatArray:
+    """Return the markers (M, 3), NaN where they are too far from most others for a person."""
+    with np.errstate(invalid="ignore"):
+        span = np.fmax.reduce(frame) - np.fmin.reduce(frame)
+    if not (span > LARGEST_M).any():
+        return frame
+    far = np.abs(frame - np.nanmedian(frame, axis=0)) > LARGEST_M / 2  # (M, 3)
+    return np.where(far.any(axis=1, keepdims=True), np.nan, frame)

@@ -12,6 +12,7 @@ from mplearn.body.follower import follower
 from mplearn.body.gauss_newton import Linkage, solve_frame
 from mplearn.body.kinematics import integrate
 from mplearn.errors import BodyError, FrameError, InvalidValueError
+from mplearn.mocap import GapTracker
 
 NAMES = marker_set("plug_in_gait39").names
 
@@ -317,3 +318,82 @@ def test_minks_solution_is_ours():
     assert np.linalg.norm(turned_by(found, configuration.q)) < 1e-3
     np.testing.assert_allclose(found[7:], configuration.q[7:], atol=0.015)  # flat about shoulders
     assert np.degrees(np.abs(found - truth)[7:]).mean() < 2.5
+
+
+def wrong_stretch(kind, frames):
+    """Spoil the frames 60 to 160 of a stream in one of the ways in which streams go wrong."""
+    bad = frames.copy()
+    part = slice(60, 160)
+    if kind == "all missing":
+        bad[part] = np.nan
+    elif kind == "millimetres":
+        bad[part] *= 1000
+    elif kind == "upside down":
+        bad[part, :, 1:] *= -1
+    elif kind == "mirrored":
+        bad[part, :, 1] *= -1
+    elif kind == "names shuffled":
+        bad[part] = bad[part, np.random.default_rng(0).permutation(39)]
+    elif kind == "elsewhere":
+        bad[part] += (3.0, -2.0, 0.0)
+    else:
+        bad[part] = np.random.default_rng(1).normal(0, 1, bad[part].shape)
+    return bad
+
+
+@pytest.mark.parametrize("fill_gaps", [False, True])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "all missing",
+        "millimetres",
+        "upside down",
+        "mirrored",
+        "names shuffled",
+        "elsewhere",
+        "noise",
+    ],
+)
+def test_a_bad_second_never_becomes_a_wild_motion(kind, fill_gaps):
+    """Within limits and speeds throughout, said to be uncertain, and right again afterwards."""
+    body = robot_body()
+    truth = smooth_motion(body, 300, 100.0, seed=7, amplitude=0.1)
+    gaps = GapTracker(39, 100.0)
+    ik = known(body, truth[0])
+    postures, worst = [], []
+    for frame in wrong_stretch(kind, markers_of(body, truth)):
+        postures.append(ik.update(gaps.update(frame) if fill_gaps else frame))
+        seen = ik.residual_m[np.isfinite(ik.residual_m)]
+        worst.append(seen.mean() if len(seen) else np.inf)
+    postures = np.array(postures)
+    assert np.isfinite(postures).all()
+    assert (postures[:, 7:] >= body.joint_limits[:, 0] - 1e-9).all()
+    assert (postures[:, 7:] <= body.joint_limits[:, 1] + 1e-9).all()
+    assert np.abs(np.diff(postures[:, 7:], axis=0)).max() <= 17.0 / 100 + 1e-9
+    assert np.abs(np.diff(postures[:, :3], axis=0)).max() <= 10.0 / 100 + 1e-9
+    if kind in ("upside down", "elsewhere"):  # a person may turn over, or come back elsewhere
+        assert np.median(worst[140:155]) < 0.02
+    else:
+        assert np.median(worst[80:150]) > 0.05  # it does not fit, and says so
+    after = np.abs(markers_of(body, postures[-20:]) - markers_of(body, truth[-20:]))
+    assert after.mean() < 0.01 and after.max() < 0.15  # a hand may stay turned for a while
+
+
+@pytest.mark.parametrize("rate_hz", [30.0, 250.0])
+def test_other_rates_are_followed_as_well(rate_hz):
+    body = robot_body()
+    truth = smooth_motion(body, int(4 * rate_hz), rate_hz, seed=9, amplitude=0.15)
+    ik = known(body, truth[0])
+    ik.rate_hz = rate_hz
+    found = np.array([ik.update(frame) for frame in markers_of(body, truth)])
+    assert np.abs(markers_of(body, found) - markers_of(body, truth)).max() < 0.02
+
+
+def test_a_stream_slower_than_said_is_followed_late_not_wildly():
+    """30 frames a second taken for 100: every third of a fast motion, and no joint flies."""
+    body = robot_body()
+    truth = smooth_motion(body, 400, 100.0, seed=10, amplitude=0.15)
+    ik = known(body, truth[0])
+    found = np.array([ik.update(frame) for frame in markers_of(body, truth)[::3]])
+    assert np.abs(np.diff(found[:, 7:], axis=0)).max() <= 17.0 / 100 + 1e-9
+    assert np.abs(markers_of(body, found) - markers_of(body, truth[::3])).mean() < 0.01
