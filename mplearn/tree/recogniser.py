@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from typing import Any, NamedTuple
 
@@ -93,8 +94,10 @@ class Recogniser:
         return cls(config, bank, index, int(state["shortest_frames"]))
 
 
-def refusal(frames: FloatArray, shortest_frames: int) -> str:
-    """Return why a segment cannot be compared; empty where it can."""
+def refusal(frames: FloatArray, shortest_frames: int, longest_frames: float = math.inf) -> str:
+    """Return why a segment cannot be compared, or learned; empty where it can."""
+    if len(frames) > longest_frames:
+        return f"{len(frames)} frames are too many for a motion; at most {longest_frames}"
     if len(frames) < shortest_frames:
         return f"{len(frames)} frames are too few for a motion; at least {shortest_frames}"
     missing = np.isnan(frames).mean(axis=0)

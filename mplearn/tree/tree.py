@@ -23,6 +23,7 @@ from .search import NodeIndex
 from .structure import Structure
 
 _SHORTEST_S = 0.1
+_LONGEST_S = 60.0
 _MODEL_FLOOR = 0.1  # smallest standard deviation of a primitive's model, as a share of all motion's
 
 
@@ -139,19 +140,20 @@ class PrimitiveTree:
     def insert(self, frames: FloatArray) -> Placement:
         """Place a segment, shape (L, D), and let the tree grow.
 
-        A segment that is too short for a motion, or lacks a channel for most of the time, is
-        refused: it changes nothing.
+        A segment that is too short or too long for a motion, or lacks a channel for most of the
+        time, is refused: it changes nothing.
 
         Raises:
             FrameError: The frames have another width, or hold infinite values.
         """
-        frames = as_frames(frames, self.n_channels).copy()
-        reason = refusal(frames, self._shortest_frames)
+        frames = as_frames(frames, self.n_channels)
+        longest = round(_LONGEST_S * self.rate_hz)
+        reason = refusal(frames, self._shortest_frames, longest)
         if reason:
             return Placement(-1, ROOT, False, np.inf, np.inf, refused=reason)
         structure, bank, number = self._structure, self._memory.bank, self.n_seen
         self.n_seen += 1
-        self._memory.remember(number, frames)
+        self._memory.remember(number, frames.copy())
         matches = structure.index.search(bank[number], bank)
         distance, ratio = (matches[0].distance, matches[0].ratio) if matches else (np.inf, np.inf)
         node = self.node(matches[0].node if ratio <= 1 else ROOT)

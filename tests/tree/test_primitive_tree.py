@@ -229,6 +229,8 @@ def test_poison_leaves_no_trace():
         if i % 4 == 0:
             assert "channel 2" in poisoned.insert(lost).refused
             assert "1 frames" in poisoned.insert(frames[:1]).refused
+            assert "too many" in poisoned.insert(np.zeros((1_000_000, D))).refused
+            assert poisoned.insert(np.full((40, D), np.nan)).refused
             with pytest.raises(FrameError, match="infinite"):
                 poisoned.insert(np.full((30, D), np.inf))
             with pytest.raises(FrameError, match="6"):
@@ -345,3 +347,25 @@ def test_state_is_plain():
     assert plain(tree.state())
     assert plain(tree.recogniser().state())
     json.dumps(tree.recogniser().state()["config"])
+
+
+def test_a_constant_channel_and_a_segment_that_rests_spoil_nothing():
+    motions = Motions(4, D, 9)
+    tree = PrimitiveTree(TreeConfig(), D + 1, RATE_HZ)
+    for i, (_, frames) in enumerate(motions.session(7)):
+        tree.insert(np.hstack([frames, np.full((len(frames), 1), 3.0)]))
+        if i % 5 == 0:
+            tree.insert(np.full((60, D + 1), 0.1))  # nothing moves
+    known = {
+        m: tree.recogniser().recognise(np.hstack([f, np.full((len(f), 1), 3.0)])).primitive
+        for m in range(4)
+        for f in [motions.perform(m)]
+    }
+    assert None not in known.values() and len(set(known.values())) == 4
+    assert all(np.isfinite(tree.model(leaf).means).all() for leaf in tree.leaves)
+
+
+def test_an_insertion_far_into_a_stream_touches_few_leaves():
+    tree, _, _, motions = learned(12, 6)
+    looked = tree.recogniser().recognise(motions.perform(0)).alternatives
+    assert len(looked) == tree.config.n_candidates < len(tree.leaves)

@@ -1,0 +1,141 @@
+"""A person changes the tree by hand: what holds afterwards, and what is refused."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from motions import RATE_HZ, Motions
+
+from mplearn.errors import InvalidValueError, UnknownPrimitiveError
+from mplearn.tree import ROOT, Merge, PrimitiveTree, Reparent, TreeConfig
+
+D = 6
+
+
+def learned(n_motions=4, n_rounds=7, seed=0, **rules):
+    motions = Motions(n_motions, D, seed)
+    tree = PrimitiveTree(TreeConfig(**rules), D, RATE_HZ)
+    home = {}
+    for motion, frames in motions.session(n_rounds):
+        home[motion] = tree.insert(frames).node_id
+    return tree, motions, home
+
+
+def whole(tree):
+    """Every link goes both ways, every segment that is held is needed, and none is missing."""
+    for node in tree.nodes:
+        if node.id != ROOT:
+            assert node.id in tree.node(node.parent).children
+        assert node.matrix.shape == (len(node.members),) * 2
+        np.testing.assert_allclose(node.matrix, node.matrix.T)
+    state = tree.state()
+    needed = {n for node in state["nodes"] for n in node["members"]}
+    assert set(state["bank"]["numbers"]) == needed | set(state["sample"]["numbers"].tolist())
+    again = PrimitiveTree(tree.config, D, RATE_HZ)
+    again.load_state(state)
+    np.testing.assert_equal(again.state(), state)
+    assert set(tree.recogniser().primitives) == set(tree.leaves)
+
+
+def test_a_split_by_hand_stays_split():
+    tree, motions, home = learned()
+    leaf = home[0]
+    n_placed, k = tree.node(leaf).n_placed, len(tree.node(leaf).members)
+    change = tree.split(leaf, [range(k // 2), range(k // 2, k)])
+    assert change.splits[0].node == leaf and change.born == change.splits[0].into
+    assert leaf not in tree.leaves and set(change.born) <= set(tree.leaves)
+    assert sum(tree.node(id).n_placed for id in change.born) == pytest.approx(n_placed, abs=1)
+    whole(tree)
+    for _ in range(5):  # one motion for the rules, but a person knows better
+        assert not tree.insert(motions.perform(0)).merges
+    assert set(change.born) <= set(tree.leaves)
+    assert tree.node(leaf).history[-1][0] == "split"
+
+
+def test_a_merge_by_hand_stays_merged():
+    tree, motions, home = learned(max_exemplars=10)
+    first, second = sorted((home[0], home[1]))
+    placed = tree.node(first).n_placed + tree.node(second).n_placed
+    change = tree.merge(second, first)
+    assert change.merges == (Merge(first, second),) and not change.removed
+    assert second not in [node.id for node in tree.nodes]
+    assert tree.node(first).n_placed == placed
+    whole(tree)
+    for m in (0, 1) * 6:
+        placement = tree.insert(motions.perform(m))
+        assert not placement.splits
+    assert first in tree.leaves
+
+
+def test_what_was_split_and_merged_again_leaves_no_empty_node():
+    tree, _, home = learned()
+    change = tree.split(home[0])
+    first, second = sorted(change.born)
+    undone = tree.merge(first, second)
+    assert undone.merges == (Merge(first, second),)
+    assert undone.removed == (home[0],) and undone.reparented == (Reparent(first, ROOT),)
+    assert tree.node(first).parent == ROOT
+    whole(tree)
+
+
+def test_a_removed_primitive_waits_or_is_forgotten():
+    tree, motions, home = learned()
+    leaf = home[2]
+    members = tuple(tree.node(leaf).members)
+    waiting = len(tree.node(ROOT).members)
+    change = tree.remove(leaf)
+    assert change.removed == (leaf,)
+    assert change.moved == tuple((number, ROOT) for number in members)
+    assert len(tree.node(ROOT).members) == waiting + len(members)
+    whole(tree)
+    again = tree.insert(motions.perform(2))
+    assert not again.recognised and len(again.born) == 1 and again.born[0] != leaf
+    assert {number for number, _ in again.moved} == set(members)
+    tree.remove(again.born[0], forget=True)
+    assert not set(members) & set(tree.node(ROOT).members)
+    assert tree.insert(motions.perform(2)).node_id == ROOT
+    whole(tree)
+
+
+def test_a_node_is_hung_below_another():
+    tree, motions, home = learned()
+    pair = tree.split(home[0]).born
+    change = tree.reparent(home[1], home[0])
+    assert change.reparented == (Reparent(home[1], home[0]),)
+    assert tree.node(home[1]).parent == home[0]
+    assert tree.node(home[1]).history[-1][0] == "moved"
+    whole(tree)
+    assert tree.insert(motions.perform(1)).node_id == home[1]
+    change = tree.reparent(pair[0], ROOT)
+    assert tree.node(pair[0]).parent == ROOT and not change.removed
+    change = tree.reparent(pair[1], ROOT)  # the node above holds one other only: it goes
+    assert change.removed == (home[0],) and Reparent(home[1], ROOT) in change.reparented
+    whole(tree)
+
+
+def test_what_cannot_be_done_is_refused_and_changes_nothing():
+    tree, _, home = learned()
+    inner = home[0]
+    pair = tree.split(inner).born
+    before = tree.state()
+    for act, error, said in [
+        (lambda: tree.split(99), UnknownPrimitiveError, "99"),
+        (lambda: tree.split(ROOT), UnknownPrimitiveError, "known are"),
+        (lambda: tree.split(inner), UnknownPrimitiveError, "no primitive"),
+        (lambda: tree.split(home[1], [[0, 1], [1, 2]]), InvalidValueError, "once"),
+        (lambda: tree.split(home[1], [[0], [1, 2, 3]]), InvalidValueError, "at least 2"),
+        (lambda: tree.merge(home[1], home[1]), InvalidValueError, "itself"),
+        (lambda: tree.merge(home[1], 99), UnknownPrimitiveError, "99"),
+        (lambda: tree.remove(inner), UnknownPrimitiveError, "no primitive"),
+        (lambda: tree.reparent(home[1], home[2]), InvalidValueError, "must be one of"),
+        (lambda: tree.reparent(inner, inner), InvalidValueError, "above it"),
+        (lambda: tree.reparent(ROOT, inner), InvalidValueError, "root"),
+        (lambda: tree.reparent(pair[0], 99), UnknownPrimitiveError, "99"),
+        (lambda: tree.radius(inner), UnknownPrimitiveError, "radius"),
+    ]:
+        with pytest.raises(error, match=said):
+            act()
+        np.testing.assert_equal(tree.state(), before)
