@@ -9,10 +9,10 @@ import numpy as np
 from mplearn.recording import BoolArray, FloatArray
 
 from .control.guide import support
-from .control.kinematics import places, points_along
 from .control.momentum import ground_reaction, momenta
 from .control.planner import Plan
 from .control.reference import reference_robot
+from .control.stride import sole_middles
 from .control.support import margins_along
 from .robot import Robot
 
@@ -56,13 +56,13 @@ def assess(robot: Robot, plan: Plan, q: FloatArray, v: FloatArray, fallen: bool)
     """
     ref = reference_robot(robot)
     n = len(q)
-    cog, linear, angular = momenta(ref.tree, ref.inertia, q, v)
+    cog, linear, angular, soles = momenta(ref.tree, ref.inertia, ref.stance.feet, ref.corners, q, v)
     zmp = ground_reaction(float(ref.tree.mass.sum()), cog, linear, angular, plan.knot_s)
-    feet = places(ref.tree, ref.stance.feet, q)
-    share = plan.share[:n]
-    seen = support(share, feet).see(cog[:, :2])
-    wanted = support(share, plan.ground[:n]).see(plan.cog[:n, :2])
-    soles = points_along(ref.tree, ref.stance.feet, ref.corners, q[1:])
+    share, ground = plan.share[:n], plan.ground[:n]
+    seen = support(share, _feet(soles)).see(cog[:, :2])
+    planned = np.concatenate((sole_middles(ref, ground), ground[..., 2:]), axis=-1)
+    wanted = support(share, planned).see(plan.cog[:n, :2])
+    soles = soles[1:]
     landed = soles[..., 2].min(axis=2).max(axis=1) < _TOUCHES_M
     up = np.where(landed, -1, plan.up[1:n])
     margin = margins_along(soles[..., :2], up, np.nan_to_num(zmp, nan=np.inf))
@@ -76,6 +76,13 @@ def assess(robot: Robot, plan: Plan, q: FloatArray, v: FloatArray, fallen: bool)
         fallen,
         float(time[-1]),
     )
+
+
+def _feet(soles: FloatArray) -> FloatArray:
+    """Return middle x, y [m] and yaw [rad] of soles with corners (S, 2, 4, 3), front ones first."""
+    ahead = soles[..., :2, :2].sum(axis=2) - soles[..., 2:, :2].sum(axis=2)
+    yaw = np.arctan2(ahead[..., 1], ahead[..., 0])
+    return np.concatenate((soles[..., :2].mean(axis=2), yaw[..., None]), axis=-1)
 
 
 def fallen_at(q: FloatArray, wanted: FloatArray) -> BoolArray:

@@ -18,7 +18,10 @@ def test_momenta_are_mujocos():
     data = mujoco.MjData(model)
     q, v = rng.normal(scale=0.5, size=(5, model.nq)), rng.normal(size=(5, model.nv))
     q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1)[:, None]
-    cog, linear, angular = momenta(REFERENCE.tree, REFERENCE.inertia, q, v)
+    feet = REFERENCE.stance.feet
+    cog, linear, angular, soles = momenta(
+        REFERENCE.tree, REFERENCE.inertia, feet, REFERENCE.corners, q, v
+    )
     for t in range(len(q)):
         data.qpos[:], data.qvel[:] = q[t], v[t]
         mujoco.mj_forward(model, data)
@@ -28,6 +31,10 @@ def test_momenta_are_mujocos():
             linear[t], data.subtree_linvel[1] * model.body_subtreemass[1], atol=1e-10
         )
         np.testing.assert_allclose(angular[t], data.subtree_angmom[1], atol=1e-10)
+        for side, foot in enumerate(feet):
+            turn, place = data.xmat[foot + 1].reshape(3, 3), data.xpos[foot + 1]
+            expected = REFERENCE.corners[side] @ turn.T + place
+            np.testing.assert_allclose(soles[t, side], expected, atol=1e-10)
 
 
 def test_the_grounds_reaction_is_what_the_contacts_carry():
@@ -53,8 +60,9 @@ def test_the_grounds_reaction_is_what_the_contacts_carry():
             total += lift
             weighted += lift * contact.pos[:2]
         expected.append(weighted / max(total, 1.0))
-    dynamics = momenta(REFERENCE.tree, REFERENCE.inertia, np.array(q), np.array(v))
-    zmp = ground_reaction(float(REFERENCE.tree.mass.sum()), *dynamics, model.opt.timestep)
+    points = REFERENCE.stance.feet[:0], REFERENCE.corners[:0]
+    dynamics = momenta(REFERENCE.tree, REFERENCE.inertia, *points, np.array(q), np.array(v))
+    zmp = ground_reaction(float(REFERENCE.tree.mass.sum()), *dynamics[:3], model.opt.timestep)
     np.testing.assert_allclose(zmp[20:], np.array(expected)[20:-1], atol=0.004)
     assert np.ptp(np.array(expected)[20:, 0]) > 0.01
 

@@ -9,7 +9,7 @@ from standing_library import KICK, RATE_HZ, posture, sweep
 from mplearn_envs.control import Motion, Planner, reference_robot, rest_reference
 from mplearn_envs.control.footwork import Footwork, Lift, read_footwork
 from mplearn_envs.control.gravity import holding_torques
-from mplearn_envs.control.kinematics import places, points_along
+from mplearn_envs.control.kinematics import places
 from mplearn_envs.control.pendulum import JERK_WEIGHT, plan_cog, zmp_along
 from mplearn_envs.control.stride import landing, sole_middles
 from mplearn_envs.experiments.model_error import disturb
@@ -121,9 +121,7 @@ def test_a_raised_knee_is_performed_held_and_lowered(speed):
     # the leg is where the demonstrator had it
     names = [HUMANOID.joint_names.index(name) for name in ("hip_pitch_r", "knee_r")]
     assert np.abs(simulation.data.qpos[7:][names] - (-1.2, 1.4)).max() < np.deg2rad(2.0)
-    soles = points_along(
-        REFERENCE.tree, REFERENCE.stance.feet, REFERENCE.corners, simulation.data.qpos[None]
-    )[0, ..., 2]
+    soles = simulation.soles()[..., 2]
     assert soles[0].max() < 0.004 and soles[1].min() > 0.7 * RAISE.footwork.rise[-1, 1]
     down = PLANNER.plan(up.end, LOWER, speed)
     last = simulation.perform(down)

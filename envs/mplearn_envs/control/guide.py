@@ -29,7 +29,7 @@ class Support(NamedTuple):
 
     Attributes:
         share: Which share of the weight the left foot carries as planned, shape (S,).
-        origin: Point between the ankles that divides them as the weight, shape (S, 2) [m].
+        origin: Point between the feet that divides them as the weight, shape (S, 2) [m].
         heading: Yaw, between the feet's, shape (S,) [rad].
     """
 
@@ -49,7 +49,7 @@ def support(share: FloatArray, feet: FloatArray) -> Support:
 
     Args:
         share: Which share of it the left foot carries, shape (S,).
-        feet: Ankles: x, y [m] and yaw [rad], shape (S, 2, 3).
+        feet: Where the feet are: x, y [m] and yaw [rad], shape (S, 2, 3).
     """
     weight = np.stack((share, 1.0 - share), axis=1)[..., None]
     place = (weight * feet[..., :2]).sum(axis=1)

@@ -147,30 +147,6 @@ def places(tree: MassTree, bodies: IntArray, q: FloatArray) -> FloatArray:
     return out
 
 
-@njit(cache=True, nogil=True)
-def points_along(tree: MassTree, bodies: IntArray, points: FloatArray, q: FloatArray) -> FloatArray:
-    """Return points of bodies along a motion.
-
-    Args:
-        tree: The robot.
-        bodies: Bodies, shape (N,).
-        points: Points in their frames, shape (N, P, 3) [m].
-        q: Postures, shape (T, 7 + J).
-
-    Returns:
-        The points in the world, shape (T, N, P, 3) [m].
-    """
-    out = np.empty((q.shape[0], *points.shape))
-    for t in range(q.shape[0]):
-        pose = forward(tree, q[t])
-        for i in range(bodies.shape[0]):
-            for k in range(points.shape[1]):
-                moved = turned(pose.rotation[bodies[i]], points[i, k])
-                for axis in range(3):
-                    out[t, i, k, axis] = pose.position[bodies[i], axis] + moved[axis]
-    return out
-
-
 @njit(cache=True)
 def _relative(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return a b^T of (3, 3) matrices (at this size BLAS costs more than the product)."""

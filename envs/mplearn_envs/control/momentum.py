@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from mplearn.recording import FloatArray
+from mplearn.recording import FloatArray, IntArray
 
 from .kinematics import MassTree, forward, turned
 from .support import GRAVITY, zero_moment_point
@@ -13,24 +13,32 @@ from .support import GRAVITY, zero_moment_point
 
 @njit(cache=True, nogil=True)
 def momenta(
-    tree: MassTree, inertia: FloatArray, q: FloatArray, v: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return COGs and momenta along a motion (as MuJoCo's ``mj_subtreeVel``).
+    tree: MassTree,
+    inertia: FloatArray,
+    bodies: IntArray,
+    points: FloatArray,
+    q: FloatArray,
+    v: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return COGs and momenta along a motion (as MuJoCo's ``mj_subtreeVel``), and some points.
 
     Args:
         tree: The robot.
         inertia: Rotational inertia of each body about its centre of mass, in its own frame, shape
             (B, 3, 3) [kg m^2].
+        bodies: Bodies whose points are wanted, shape (N,).
+        points: The points in their frames, shape (N, P, 3) [m].
         q: Postures, shape (T, 7 + J).
         v: Velocities in the layout of qvel, shape (T, 6 + J).
 
     Returns:
         The COGs [m], the momenta [N s] and the angular momenta about the COGs [N m s], each of
-        shape (T, 3).
+        shape (T, 3); and where the points are, shape (T, N, P, 3) [m].
     """
     n_times, n_bodies, n_hinges = q.shape[0], tree.parent.shape[0], tree.axis.shape[0]
     cog, linear, angular = np.empty((n_times, 3)), np.zeros((n_times, 3)), np.zeros((n_times, 3))
     turning, moving = np.empty((n_bodies, 3)), np.empty((n_bodies, 3))
+    there = np.empty((n_times, *points.shape))
     centre, spin, momentum = np.empty(3), np.empty(3), np.empty(3)
     for t in range(n_times):
         pose = forward(tree, q[t])
@@ -66,7 +74,15 @@ def momenta(
                 for k in range(3):
                     angular[t, k] += turn[k, i] * inside
             _add_cross(momentum, cog[t], centre, 1.0, angular[t])
-    return cog, linear, angular
+        for n in range(bodies.shape[0]):
+            position, turn = pose.position[bodies[n]], pose.rotation[bodies[n]]
+            for p in range(points.shape[1]):
+                for i in range(3):
+                    at = position[i]
+                    for k in range(3):
+                        at += turn[i, k] * points[n, p, k]
+                    there[t, n, p, i] = at
+    return cog, linear, angular, there
 
 
 @njit(cache=True)

@@ -323,7 +323,8 @@ class Planner:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return COG (K + 1, 3), zero-moment point (K + 1, 2) and its margin (K + 1,) [m]."""
         ref = self._reference
-        cog, linear, angular = momenta(ref.tree, ref.inertia, q, velocities(q, knot_s))
+        feet, rate = ref.stance.feet, velocities(q, knot_s)
+        cog, linear, angular, _ = momenta(ref.tree, ref.inertia, feet, ref.corners[:, :0], q, rate)
         between = ground_reaction(self._mass, cog, linear, angular, knot_s)
         zmp = np.vstack((between[:1], 0.5 * (between[1:] + between[:-1]), between[-1:]))
         points = np.nan_to_num(zmp, nan=np.inf)
