@@ -1,0 +1,93 @@
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mplearn.errors import InvalidValueError
+from mplearn.learner import LearnerConfig, MotionLearner, SegmentClosed
+from mplearn.learner.merge import merge
+from mplearn.recording import Recording
+
+
+def learned(features: Recording, first: int, last: int) -> MotionLearner:
+    learner = MotionLearner(LearnerConfig(features.channels, features.rate_hz))
+    learner.learn_many(features.frames[first:last])
+    learner.end_stream()
+    return learner
+
+
+@pytest.fixture(scope="module")
+def shards(features: Recording) -> tuple[MotionLearner, MotionLearner]:
+    half = len(features.frames) // 2
+    return learned(features, 0, half), learned(features, half, len(features.frames))
+
+
+def counts(learner: MotionLearner) -> Counter[int]:
+    return Counter(row[2] for row in learner.graph.edge_rows().tolist())
+
+
+def test_shards_make_one_learner_whatever_their_order(shards, features) -> None:
+    a, b = shards
+    ab, ba = merge([a, b]), merge([b, a])
+    assert len(ab.tree.leaves) == len(ba.tree.leaves) == 4
+    assert counts(ab) == counts(ba)
+    assert ab.graph.n_transitions >= a.graph.n_transitions + b.graph.n_transitions
+    assert set(a.tree.leaves) <= set(ab.tree.leaves)
+    assert ab.n_frames == len(features.frames)
+    placed = [sum(each.tree.node(id).n_placed for id in each.tree.leaves) for each in (ab, a, b)]
+    waiting = [len(each.tree.node(0).members) for each in (ab, a, b)]
+    assert placed[0] + waiting[0] == sum(placed[1:] + waiting[1:])
+
+
+def test_counts_are_those_of_one_learner_but_for_the_seam(shards, features) -> None:
+    whole, merged = learned(features, 0, len(features.frames)), merge(shards)
+    asked = whole.tree.recogniser()
+    same = {}
+    for id in merged.tree.leaves:
+        votes = Counter(asked.recognise(x).primitive for x in merged.tree.exemplars(id))
+        same[id] = votes.most_common(1)[0][0]
+    assert len(set(same.values())) == 4
+    differences = [
+        abs(merged.graph.count(i, j) - whole.graph.count(same[i], same[j]))
+        for i in same
+        for j in same
+    ]
+    # the seam, and segments that one learner recognised and another did not
+    assert sum(differences) <= 0.15 * whole.graph.n_transitions
+    assert abs(whole.graph.n_transitions - merged.graph.n_transitions) <= 5
+
+
+def test_a_merged_learner_goes_on(shards, features) -> None:
+    merged = merge(shards)
+    before = len(merged.tree.leaves), merged.graph.n_transitions
+    events = [e for frame in features.frames[:6000] for e in merged.learn_one(frame)]
+    closed = [e.placement for e in events if isinstance(e, SegmentClosed) and e.placement]
+    assert np.mean([placement.recognised for placement in closed]) > 0.8
+    assert 0 <= len(merged.tree.leaves) - before[0] <= 1
+    assert merged.graph.n_transitions > before[1]
+    resumed = MotionLearner.from_state(merge(shards).state())
+    again = [e for frame in features.frames[:6000] for e in resumed.learn_one(frame)]
+    assert again == events
+
+
+def test_merging_changes_nobody_and_three_are_as_good_as_two(shards) -> None:
+    a, b = shards
+    before = a.graph.n_transitions, a.tree.n_seen, a.n_frames
+    three = merge([a, b, a])
+    assert (a.graph.n_transitions, a.tree.n_seen, a.n_frames) == before
+    assert len(three.tree.leaves) == 4
+    nested = merge([merge([a, b]), a]), merge([a, merge([b, a])])
+    assert counts(nested[0]) == counts(nested[1]) == counts(three)
+
+
+def test_what_cannot_be_merged(shards) -> None:
+    with pytest.raises(InvalidValueError, match="at least one"):
+        merge([])
+    other = MotionLearner(replace(shards[0].config, longest_pause_s=3.0))
+    with pytest.raises(InvalidValueError, match="same configuration"):
+        merge([shards[0], other])
+    alone = merge([shards[0]])
+    assert alone.tree.leaves == shards[0].tree.leaves
+    empty = MotionLearner(shards[0].config)
+    assert counts(merge([empty, shards[0]])) == counts(merge([shards[0], empty]))
