@@ -106,10 +106,11 @@ def compare(
             COLUMNS,
             tuple(rows),
             f"Mean over seeds and its {100 * CONFIDENCE:.0f} % interval (Student's t), of "
-            f"{comparison.episodes} kinematic or {comparison.simulated_episodes} simulated episodes "
-            f"a seed (so many of {', '.join(SLOW)}, too). The return is discounted by time. Agents are trained kinematically, "
-            f"one a seed, for {comparison.steps} macro steps. 'search' knows the environment's "
-            "hidden state: in 'follow' it foresees the demonstrator: a bound for the rest.",
+            f"{comparison.episodes} kinematic or {comparison.simulated_episodes} simulated "
+            f"episodes a seed (so few of {', '.join(SLOW)}, too). The return is discounted by "
+            f"time. Agents are trained kinematically, one a seed, for {comparison.steps} macro "
+            "steps. 'search' knows the environment's hidden state: in 'follow' it foresees the "
+            "demonstrator, a bound for the rest.",
         )
 
 

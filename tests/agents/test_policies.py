@@ -1,17 +1,30 @@
 """Policies against closed forms: the prior itself, argmax, brute force over all paths."""
 
+import copy
 from itertools import pairwise, permutations
 
 import networkx as nx
 import numpy as np
 import pytest
+from graph_world import DISCOUNT, GraphWorld
 from gymnasium.spaces import Discrete
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chisquare
 
 from mplearn.errors import InvalidValueError, NoPathError, UnknownPrimitiveError
-from mplearn_agents.policies import POLICIES, Greedy, PathToGoal, RandomWalk, UniformLegal
+from mplearn.graph import TransitionGraph
+from mplearn_agents.policies import (
+    POLICIES,
+    Greedy,
+    Imitation,
+    Mirror,
+    PathToGoal,
+    PathToTask,
+    RandomWalk,
+    Search,
+    UniformLegal,
+)
 
 
 def make_info(weights, legal=None):
@@ -146,3 +159,117 @@ def test_an_info_that_contradicts_itself_is_refused(change, said):
 def test_an_info_without_a_prior_is_refused():
     with pytest.raises(InvalidValueError, match=r"needs info\['transition_prior'\].*\['x'\]"):
         RandomWalk().act(None, {"x": 1})
+
+
+def test_the_quick_path_is_the_one_of_least_time():
+    rng = np.random.default_rng(3)
+    weights = rng.integers(1, 9, (6, 6)) * (rng.random((6, 6)) < 0.5)
+    weights[np.arange(6), np.arange(1, 7) % 6] += 1
+    graph, rows = graph_of(weights)
+    nx.set_node_attributes(graph, dict(enumerate(rng.uniform(0.5, 5.0, 6))), "duration_s")
+
+    def time_s(path):
+        return sum(graph.nodes[node]["duration_s"] for node in path[1:])
+
+    for goals in ({4}, {2, 5}):
+        policy, walked = PathToGoal(graph, goals, "quick"), [0]
+        while walked[-1] not in goals:
+            walked.append(policy.act(None, make_info(rows[walked[-1]])))
+        assert time_s(walked) == pytest.approx(
+            min(time_s(path) for goal in goals for path, _ in all_paths(rows, 0, goal))
+        )
+
+
+def test_paths_to_what_a_task_wants():
+    graph, rows = graph_of(np.ones((4, 4)) - np.eye(4))
+    info = make_info(rows[0]) | {"task": {"slots": (3, 1)}}
+    assert PathToTask(graph, in_order=True, prefer="short").act(None, info) == 3
+    assert PathToTask(graph, in_order=False, prefer="short").act(None, info) == 1
+    with pytest.raises(InvalidValueError, match="names slots in info"):
+        PathToTask(graph, in_order=True).act(None, make_info(rows[0]))
+
+
+def test_imitation_draws_from_the_longer_history():
+    """From 1 by 0 always to 2 and from 2 by 0 to 1: the last primitive alone does not tell."""
+    graph, walked = TransitionGraph(), [11, 10, 12, 10] * 40
+    for id in (10, 11, 12):
+        graph.add_node(id)
+    for t in range(1, len(walked)):
+        graph.observe(walked[t - 1], walked[t], 1.0, before=walked[max(0, t - 3) : t - 1])
+    slots = {10: 1, 11: 2, 12: 3}
+    policy = Imitation(graph, slots, seed=1)
+    counts = np.zeros((4, 4))
+    at, before = 2, None
+    policy.act(None, make_info([0, 0, 1, 0]) | {"primitive": None})
+    for _ in range(400):
+        weights = [0, 0, 1, 1] if at == 1 else [0, 1, 0, 0]
+        action = policy.act(None, make_info(weights) | {"primitive": at})
+        if at == 1:
+            counts[before, action] += 1
+        at, before = action, at
+    wanted = graph.probabilities([11, 10])[list(graph.ids).index(12)]
+    assert wanted > 0.8
+    assert counts[2, 3] / counts[2].sum() == pytest.approx(wanted, abs=0.1)
+    assert counts[3, 2] / counts[3].sum() == pytest.approx(wanted, abs=0.1)
+    policy.act(None, make_info([0, 0, 1, 1]) | {"primitive": None})  # a new episode: by the prior
+
+
+def test_mirroring_weighs_what_is_predicted_by_the_time_left():
+    n, info = 4, make_info([0, 1, 1, 0], legal=[1, 1, 1, 0])
+    now, then = np.array([0.0, 0.8, 0.2, 0.0]), np.array([0.0, 0.1, 0.3, 0.6])
+
+    def seen(tau):
+        return {"task": np.concatenate((np.zeros(n), now, then, [tau]))}
+
+    assert Mirror().act(seen(0.0), info) == 1  # what is done now
+    assert Mirror().act(seen(1.0), info) == 2  # the likeliest next that is legal
+    with pytest.raises(InvalidValueError, match="shows 13 numbers, not 5"):
+        Mirror().act({"task": np.zeros(5)}, info)
+
+
+def best_return(world, at, time_s, horizon_s):
+    """Brute force over all sequences, each action paid as far as it lies within the horizon."""
+    best = 0.0
+    for node in [0, *world.edges[at]]:
+        duration_s, reward = (0.5, 0.0) if node == 0 else world.paid(node)
+        value = reward * min(1.0, (horizon_s - time_s) / duration_s)
+        there, end_s = (node or at), time_s + duration_s
+        if there not in world.ends and end_s < horizon_s:
+            value += DISCOUNT**duration_s * best_return(world, there, end_s, horizon_s)
+        best = max(best, value)
+    return best
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_search_finds_the_best_sequence(seed):
+    rng = np.random.default_rng(seed)
+    world = GraphWorld(
+        edges={k: sorted({1 + k % 5, *rng.integers(1, 6, 2).tolist()}) for k in range(6)},
+        duration_s=[0.5, *rng.uniform(0.8, 2.0, 5)],
+        reward=[0.0, *rng.normal(0.3, 1.0, 5)],
+        ends=(5,),
+    )
+    horizon_s = 4.0
+    policy = Search(world, copy.deepcopy(world), horizon_s, beam=10_000)
+    observation, info = world.reset()
+    policy.twin.reset()
+    state = world.state()
+    action = policy.act(observation, info)
+    assert world.state() == state
+    duration_s, reward = (0.5, 0.0) if action == 0 else world.paid(action)
+    value = reward * min(1.0, horizon_s / duration_s)
+    if action not in world.ends and duration_s < horizon_s:
+        rest = best_return(world, action or 0, duration_s, horizon_s)
+        value += DISCOUNT**duration_s * rest
+    assert value == pytest.approx(best_return(world, 0, 0.0, horizon_s))
+
+
+def test_search_takes_the_likelier_of_equal_ways():
+    world = GraphWorld({0: [1, 2], 1: [3], 2: [3], 3: [1]}, [0.5, 1, 1, 1], [0, 0, 0, 1], (3,))
+    info = world.reset()[1]
+    info["transition_prior"][[1, 2]] = 0.2, 0.8
+    assert Search(world, copy.deepcopy(world), 5.0).act(None, info) == 2
+    with pytest.raises(InvalidValueError, match="0 and 3"):
+        Search(world, world, 0, 3)
+    with pytest.raises(InvalidValueError, match=r"gymnasium\.make supplies"):
+        Search.for_env(world)

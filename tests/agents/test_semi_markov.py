@@ -56,7 +56,7 @@ def collected(world, n_steps=64):
             return True
 
     envs = DummyVecEnv([world] * 2)
-    model = new_model(TrainingConfig(), envs)
+    model = new_model(TrainingConfig(), envs, {})
     model.rollout_buffer.buffer_size = model.n_steps = n_steps
     _, callback = model._setup_learn(10_000, Stop())
     model.collect_rollouts(envs, callback, model.rollout_buffer, n_steps)
@@ -114,7 +114,7 @@ def test_agents_learn_the_way_that_is_quick_not_the_one_of_few_steps(algorithm, 
     make = two_ways if algorithm == "maskable-ppo" else lambda: ProjectIllegal(two_ways())
     config = TrainingConfig(algorithm=algorithm)
     envs = DummyVecEnv([make] * RECIPES[algorithm].n_envs)
-    model = new_model(config, envs)
+    model = new_model(config, envs, {})
     model.learn(steps)
     agent, env = TrainedPolicy(model, config, {}), two_ways()
     observation, info = env.reset()

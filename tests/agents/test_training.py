@@ -105,7 +105,7 @@ def test_what_the_prior_is_to_an_untrained_agent(config, prior):
     from mplearn_agents.rl.algorithms import new_model
 
     env = make_environment(config)
-    model = new_model(replace(config, prior=prior), DummyVecEnv([lambda: env]))
+    model = new_model(replace(config, prior=prior), DummyVecEnv([lambda: env]), {})
     observation, info = env.reset(seed=1)
     for _ in range(4):
         policy = model.policy
@@ -194,7 +194,7 @@ def test_a_grown_agent_is_trained_further(folder, config, agent):
 
     larger = replace(config, library=str(folder / "grown.mplearn"), steps=1, round_steps=1)
     env = make_environment(larger)
-    with pytest.raises(InvalidValueError, match=r"primitives \[7, 8, 9, 10, 11\]"):
+    with pytest.raises(InvalidValueError, match=r"primitives \[7, 8, "):
         agent.require_fit(env)
     grown = grow(agent, env)
     grown.require_fit(env)

@@ -11,6 +11,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
 from .config import AlgorithmName, TrainingConfig
+from .encoding import Scaling
 from .features import PrimitiveFeatures
 from .networks import MaskedPriorPolicy, PriorPolicy
 from .semi_markov import (
@@ -33,10 +34,10 @@ ON_POLICY = {
 OFF_POLICY = {
     "learning_rate": 5e-4,
     "buffer_size": 50_000,
-    "learning_starts": 1_000,
+    "learning_starts": 500,
     "batch_size": 128,
-    "train_freq": 4,
-    "target_update_interval": 500,
+    "train_freq": 2,
+    "target_update_interval": 250,
     "exploration_fraction": 1.0,  # of each round
     "exploration_final_eps": 0.05,
 }
@@ -81,14 +82,16 @@ def rollout_steps(algorithm: AlgorithmName) -> int:
     return int(recipe.settings.get("n_steps", 1)) * recipe.n_envs
 
 
-def new_model(config: TrainingConfig, envs: VecEnv) -> BaseAlgorithm:
-    """Return an untrained model."""
+def new_model(config: TrainingConfig, envs: VecEnv, scaling: Scaling) -> BaseAlgorithm:
+    """Return an untrained model, which scales what it sees."""
     recipe = RECIPES[config.algorithm]
-    network: dict[str, Any] = {"net_arch": WIDTHS, "activation_fn": nn.Tanh}
-    if config.algorithm == "dqn":
-        network = {"net_arch": WIDTHS, "features_extractor_class": PrimitiveFeatures}
-    else:
-        network["prior"] = config.prior
+    network: dict[str, Any] = {
+        "net_arch": WIDTHS,
+        "features_extractor_class": PrimitiveFeatures,
+        "features_extractor_kwargs": {"scaling": scaling},
+    }
+    if config.algorithm != "dqn":
+        network |= {"activation_fn": nn.Tanh, "prior": config.prior}
     return recipe.cls(
         recipe.policy,
         envs,

@@ -4,39 +4,46 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
 import torch
 from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
-from .encoding import LEAST_PRIOR, PRIOR, scale_of
+from .encoding import FAR, LEAST_PRIOR, PRIOR, Scaling, width_of_slots
 
 
 class PrimitiveFeatures(BaseFeaturesExtractor):
     """Flattens an observation of a primitive environment, key by key in the order of the space.
 
-    Slots become one-hot vectors, measurements are scaled, and the logarithm of the prior comes
+    Slots become one-hot vectors, other numbers are scaled, and the logarithm of the prior comes
     last, shape (N, capacity), see `log_prior`.
 
     Args:
         observation_space: A Dict with ``"transition_prior"``; of Discrete, MultiBinary and Box.
+        scaling: How numbers are scaled that are not about slots, see `measure_scaling`.
     """
 
-    def __init__(self, observation_space: spaces.Dict) -> None:
+    def __init__(self, observation_space: spaces.Dict, scaling: Scaling) -> None:
         parts = observation_space.spaces
-        widths = [spaces.flatdim(part) for part in parts.values()]
-        super().__init__(observation_space, sum(widths) + spaces.flatdim(parts[PRIOR]))
+        widths = {key: spaces.flatdim(part) for key, part in parts.items()}
+        super().__init__(observation_space, sum(widths.values()) + widths[PRIOR])
         self._keys = tuple(parts)
-        for key, part in parts.items():
-            self.register_buffer(f"scale_{key}", torch.as_tensor(scale_of(key, part)))
+        self._scaled = tuple(key for key in parts if key in scaling)
+        for key in self._scaled:
+            self.register_buffer(f"mean_{key}", torch.as_tensor(scaling[key].mean))
+            self.register_buffer(f"factor_{key}", torch.as_tensor(scaling[key].factor))
 
     def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
         """Return the features, shape (N, F)."""
-        blocks = [
-            torch.flatten(observations[key], 1) * self.get_buffer(f"scale_{key}")
-            for key in self._keys
-        ]
+        blocks = [self._block(key, torch.flatten(observations[key], 1)) for key in self._keys]
         return torch.cat((*blocks, log_prior(observations)), dim=1)
+
+    def _block(self, key: str, values: torch.Tensor) -> torch.Tensor:
+        if key not in self._scaled:
+            return values
+        mean, factor = self.get_buffer(f"mean_{key}"), self.get_buffer(f"factor_{key}")
+        slots = values.shape[1] - len(mean)
+        scaled = torch.clamp((values[:, slots:] - mean) * factor, -FAR, FAR)
+        return torch.cat((values[:, :slots], scaled), dim=1)
 
 
 def log_prior(observations: dict[str, torch.Tensor]) -> torch.Tensor:
@@ -62,19 +69,10 @@ class Feature(NamedTuple):
 
 
 def features_of(observation_space: spaces.Dict, capacity: int) -> list[Feature]:
-    """Return what each of `PrimitiveFeatures` is, in their order.
-
-    A part of the observation is about slots if it is ``Discrete(capacity)`` or begins with blocks
-    of ``capacity`` numbers within [0, 1].
-    """
+    """Return what each of `PrimitiveFeatures` is, in their order."""
     out: list[Feature] = []
     for key, part in observation_space.spaces.items():
-        width = spaces.flatdim(part)
-        within = width
-        if isinstance(part, spaces.Box):
-            outside = ~((part.low >= 0.0) & (part.high <= 1.0)).ravel()
-            within = int(np.argmax(outside)) if outside.any() else width
-        n_slots = within // capacity * capacity
+        n_slots = width_of_slots(part, capacity)
         out += [Feature(f"{key} {k // capacity}", None, k % capacity) for k in range(n_slots)]
-        out += [Feature(key, k, None) for k in range(width - n_slots)]
+        out += [Feature(key, k, None) for k in range(spaces.flatdim(part) - n_slots)]
     return out + [Feature("log prior", None, slot) for slot in range(capacity)]

@@ -36,7 +36,7 @@ def grow(agent: TrainedPolicy, env: gymnasium.Env[Any, Any]) -> TrainedPolicy:
         raise InvalidValueError("agents of maskable-ppo and ppo can grow, not of dqn")
     slots: dict[int, int] = dict(env.unwrapped.repertoire.slots)  # type: ignore[attr-defined]
     moved = {0: 0} | {agent.slots[id]: slots[id] for id in agent.slots if id in slots}
-    model = new_model(agent.config, DummyVecEnv([lambda: env]))
+    model = new_model(agent.config, DummyVecEnv([lambda: env]), agent.scaling)
     known: dict[str, Tensor] = agent.model.policy.state_dict()
     grown: dict[str, Tensor] = model.policy.state_dict()
     columns = _columns(agent.model, model, moved)

@@ -11,7 +11,7 @@ from stable_baselines3.common.torch_layers import MlpExtractor
 from torch import nn
 
 from .config import PriorUse
-from .features import PrimitiveFeatures, log_prior
+from .features import log_prior
 
 
 class Trunk(nn.Module):
@@ -53,7 +53,6 @@ class _WithPrior:
 
     def __init__(self, *args: Any, prior: PriorUse = "logits", **kwargs: Any) -> None:
         self.prior = prior
-        kwargs.setdefault("features_extractor_class", PrimitiveFeatures)
         super().__init__(*args, **kwargs)
 
     def _build_mlp_extractor(self: Any) -> None:

@@ -37,7 +37,7 @@ from torch import nn
 from mplearn_agents.episodes import play
 from mplearn_agents.policies import Policy
 
-from .encoding import LEAST_PRIOR, PRIOR, scale_of
+from .encoding import FAR, LEAST_PRIOR, PRIOR, measure_scaling
 from .returns import advantages
 
 NAME = "mplearn-flat"
@@ -56,7 +56,7 @@ class FlatObservation(gymnasium.Wrapper[Any, Any, Any, Any]):
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
         super().__init__(env)
         parts = dict(env.observation_space.spaces)  # type: ignore[attr-defined]
-        self._parts = {key: (part, scale_of(key, part)) for key, part in parts.items()}
+        self._parts, self._scaling = parts, measure_scaling(env)
         n = int(env.action_space.n)  # type: ignore[attr-defined]
         width = sum(spaces.flatdim(part) for part in parts.values()) + 2 * n
         self.observation_space = spaces.Box(-np.inf, np.inf, (width,), np.float32)
@@ -77,10 +77,14 @@ class FlatObservation(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def flat(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
         """Return the vector."""
-        blocks = [
-            np.asarray(spaces.flatten(part, observation[key])) * scale
-            for key, (part, scale) in self._parts.items()
-        ]
+        blocks = []
+        for key, part in self._parts.items():
+            values = np.array(spaces.flatten(part, observation[key]), np.float32)
+            if key in self._scaling:
+                mean, factor = self._scaling[key]
+                rest = values[-len(mean) :]
+                rest[:] = np.clip((rest - mean) * factor, -FAR, FAR)
+            blocks.append(values)
         log_prior = np.log(np.maximum(observation[PRIOR] / LEAST_PRIOR, 1.0))
         return np.concatenate((*blocks, log_prior, observation[MASK])).astype(np.float32)
 

@@ -20,6 +20,7 @@ from mplearn.errors import InvalidValueError
 from mplearn_agents.extras import require
 
 from .config import TrainingConfig
+from .encoding import measure_scaling
 from .projection import ProjectIllegal
 from .trained import CONFIG, POLICY, TrainedPolicy
 
@@ -102,7 +103,8 @@ def train(
     if done:
         model = load_model(config.algorithm, out / _CHECKPOINT.format(done), envs)
     else:
-        model = new_model(config, envs)
+        scaling = measure_scaling(tested) if start is None else start.scaling
+        model = new_model(config, envs, scaling)
         if start is not None:
             start.require_fit(tested)
             model.policy.load_state_dict(start.model.policy.state_dict())

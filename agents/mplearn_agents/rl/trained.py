@@ -14,6 +14,7 @@ from mplearn_agents.extras import require
 from mplearn_agents.policies import Policy, legal_actions
 
 from .config import TrainingConfig
+from .encoding import Scaling
 from .projection import project
 
 POLICY = "policy.zip"
@@ -58,6 +59,11 @@ class TrainedPolicy(Policy):
         if not (folder / POLICY).is_file():
             raise InvalidValueError(f"{folder} holds no {POLICY}: the training has not ended")
         return cls(load_model(config.algorithm, folder / POLICY), config, slots, deterministic)
+
+    @property
+    def scaling(self) -> Scaling:
+        """How it scales what it sees."""
+        return self.model.policy_kwargs["features_extractor_kwargs"]["scaling"]  # type: ignore[no-any-return]
 
     def require_fit(self, env: gymnasium.Env[Any, Any]) -> None:
         """Check that an environment shows what the agent was trained on, in the same slots.
