@@ -103,7 +103,7 @@ def step_direction(
         for j in range(n):
             if abs(changes[j] - q.window // 2 - m.valley_frame) <= q.tolerance:
                 hysteresis = q.hysteresis_turned
-    return int(watch(m, p, s, hysteresis * ready, speeds, out))
+    return int(watch(m, p, s, min(0.95, hysteresis * ready), speeds, out))
 
 
 @njit(cache=True)

@@ -48,6 +48,8 @@ class ZeroVelocityConfig:
     def __post_init__(self) -> None:
         check_positive(self, "cutoff_hz", "still_s", "min_length_s", "memory_s", "trust")
         check_share(self, "hysteresis", "still_share")
+        if not self.trust >= 1.0:
+            raise InvalidValueError(f"trust must be at least 1, not {self.trust}")
         if not self.max_length_s > 2 * max(self.min_length_s, self.still_s):
             raise InvalidValueError(
                 f"max_length_s must exceed twice min_length_s and still_s, not {self.max_length_s}"

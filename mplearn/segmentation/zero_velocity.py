@@ -26,7 +26,7 @@ def _step(frame: FloatArray, watcher: Any, hysteresis: float, out: FloatArray) -
     s = take_speed(frame, filter_, memory, m, p, speeds)
     if s < 0.0:
         return -1
-    return int(watch(m, p, s, hysteresis * readiness(m, p), speeds, out))
+    return int(watch(m, p, s, min(0.95, hysteresis * readiness(m, p)), speeds, out))
 
 
 class ZeroVelocity(SpeedSegmenter):
