@@ -35,6 +35,9 @@ from .events import (
 )
 from .snapshot import library_of
 
+STILL_M = (
+    0.02  # a segment in which no part of the body, and no joint's lever, goes farther: a pause
+)
 CLOCK_TOLERANCE = 0.5  # of a sampling interval: beyond it, a time stamp does not fit the rate
 
 
@@ -284,7 +287,8 @@ class MotionLearner:
             end=segment.end + self._stream_start,
             decided_at=segment.decided_at + self._stream_start,
         )
-        if segment.still:
+        if segment.still or (self._body and np.ptp(frames, axis=0).max() < STILL_M):
+            segment = replace(segment, still=True)
             self._chain.paused(segment)
             return [SegmentClosed(segment)]
         known = len(self.tree.leaves)

@@ -31,8 +31,8 @@ class PeopleConfig:
     """
 
     posture: float = 0.5
-    repertoire: int = 20
-    link: float = 1.0
+    repertoire: int = 30
+    link: float = 1.2
     link_own: float = 0.3
     join: float = 0.7
     reach: float = 1.5
