@@ -1,8 +1,10 @@
-"""The environment against the raw simulation, and how long it takes to get there."""
+"""The environment against the raw simulation, its modes against each other, and its start."""
 
+import itertools
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 
 import gymnasium as gym
 import mujoco
@@ -10,62 +12,162 @@ import numpy as np
 
 import mplearn_envs  # noqa: F401
 
+from .interleaved import interleaved
 
-def wall(code: str) -> float:
-    """Return the median time of a new interpreter running ``code`` beyond importing numpy [s]."""
-
-    def run(what: str) -> float:
-        begin = time.perf_counter()
-        subprocess.run([sys.executable, "-c", what], check=True)
-        return time.perf_counter() - begin
-
-    return float(np.median([run(code) - run("import numpy") for _ in range(5)]))
+ID = "mplearn/PrimitiveHumanoid-v0"
+CYCLE = ("right arm raise", "right arm lower", "bow down", "bow up")  # both feet down
+Row = tuple[str, str, str, str]
 
 
-def rows() -> list[tuple[str, str, str, str]]:
-    env = gym.make("mplearn/PrimitiveHumanoid-v0", max_episode_steps=10_000)
-    _, info = env.reset(seed=1)
+def wall_s(code: str, before: str = "pass") -> float:
+    """Return the median time of ``code`` in a new interpreter that has run ``before`` [s]."""
+    timed = (
+        f"{before}\nimport time; t = time.perf_counter()\n{code}\nprint(time.perf_counter() - t)"
+    )
+
+    def run() -> float:
+        command = [sys.executable, "-c", timed]
+        return float(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+    return float(np.median([run() for _ in range(5)]))
+
+
+def walker(**options: object) -> tuple[gym.Env, Callable[[], None]]:
+    """Return an environment and what makes a step of a random walk in it."""
+    env = gym.make(ID, **options)
+    info = env.reset(seed=1)[1]
     env.action_space.seed(1)
-    simulated_s, step_s, raw_s = 0.0, [], []
-    for _ in range(12):
+
+    def step() -> None:
+        nonlocal info
         action = env.action_space.sample(probability=info["transition_prior"])
-        begin = time.process_time()
-        _, _, terminated, truncated, info = env.step(action)
-        step_s.append(time.process_time() - begin)
-        simulated_s += info["duration_s"]
-        simulation = env.unwrapped.simulation
-        model, data = simulation.model, simulation.data
-        copy = mujoco.MjData(model)
-        copy.qpos[:], copy.ctrl[:] = data.qpos, data.ctrl
-        substeps = round(info["duration_s"] / model.opt.timestep)
-        begin = time.process_time()
-        mujoco.mj_step(model, copy, nstep=substeps)
-        raw_s.append(time.process_time() - begin)
-        if terminated or truncated:
-            _, info = env.reset()
-    env.close()
+        *_, over, truncated, info = env.step(action)
+        if over or truncated:
+            info = env.reset()[1]
+
+    return env, step
+
+
+def per_call_us(function: Callable[[], object], n: int = 1000) -> float:
+    """Return the processor time of a call [us]."""
+    function()
+    begin = time.process_time()
+    for _ in range(n):
+        function()
+    return 1e6 * (time.process_time() - begin) / n
+
+
+def double_support() -> Row:
+    """A macro step with both feet down against ``mj_step`` of as many substeps, interleaved."""
+    env = gym.make(ID, max_steps=10**6).unwrapped
+    env.reset(seed=0)
+    slots = [env.repertoire.slots[env.library[name].id] for name in CYCLE]
+    raw = mujoco.MjData(env.model)
+    turn = itertools.cycle(slots)
+    n_steps = 0
+
+    def perform() -> None:
+        nonlocal n_steps
+        n_steps = 0
+        for _ in slots:
+            info = env.step(next(turn))[-1]
+            n_steps += round(info["duration_s"] / env.model.opt.timestep)
+
+    def simulate() -> None:
+        raw.qpos[:], raw.qvel[:] = env.simulation.data.qpos, 0.0
+        raw.ctrl[:] = env.simulation.data.ctrl
+        mujoco.mj_step(env.model, raw, nstep=n_steps)
+
+    times = interleaved({"environment": perform, "mj_step": simulate})
+    return (
+        "step, both feet down",
+        f"{250 * times['environment']:.1f} ms",
+        f"{250 * times['mj_step']:.1f} ms, mj_step of the same substeps",
+        f"{times['environment'] / times['mj_step']:.2f} x",
+    )
+
+
+def modes() -> list[Row]:
+    """The two modes, steps of a random walk."""
+    walks = {mode: walker(dynamics=mode)[1] for mode in ("simulated", "kinematic")}
+    for step in walks.values():
+        for _ in range(150):
+            step()
+
+    def many(step: Callable[[], None], n: int) -> Callable[[], None]:
+        return lambda: [step() for _ in range(n)] and None
+
+    times = interleaved(
+        {"simulated": many(walks["simulated"], 10), "kinematic": many(walks["kinematic"], 1000)}
+    )
+    simulated, kinematic = 10 / times["simulated"], 1000 / times["kinematic"]
     return [
         (
-            "environment step",
-            f"{1e3 * np.median(step_s):.1f} ms",
-            f"{1e3 * np.median(raw_s):.1f} ms, mj_step of the same substeps",
-            f"{np.sum(step_s) / np.sum(raw_s):.2f} x",
-        ),
-        (
-            "simulation",
-            f"{np.sum(step_s):.2f} s",
-            "real time",
-            f"{simulated_s / np.sum(step_s):.0f} x",
-        ),
-        ("import mplearn", f"{wall('import mplearn'):.2f} s", "beyond numpy", "-"),
-        ("import mplearn_envs", f"{wall('import mplearn_envs'):.2f} s", "beyond numpy", "-"),
-        (
-            "gym.make",
-            f"{wall(chr(10).join(('import gymnasium, mplearn_envs', MAKE))):.2f} s",
-            "imports included, beyond numpy",
-            "-",
-        ),
+            "kinematic mode",
+            f"{kinematic:.0f} steps/s",
+            f"{simulated:.0f} steps/s, simulated",
+            f"{kinematic / simulated:.0f} x",
+        )
     ]
 
 
-MAKE = "gymnasium.make('mplearn/PrimitiveHumanoid-v0')"
+def threads() -> Row:
+    """Eight environments on two threads against one, wall-clock time, interleaved."""
+    vectors = {n: gym.make_vec(ID, num_envs=8, n_threads=n, max_steps=10**6) for n in (1, 2)}
+    infos = {n: vector.reset(seed=1)[1] for n, vector in vectors.items()}
+    times: dict[int, list[float]] = {n: [] for n in vectors}
+    for _ in range(14):
+        for n, vector in vectors.items():
+            actions = [np.flatnonzero(prior)[0] for prior in infos[n]["transition_prior"]]
+            begin = time.perf_counter()
+            infos[n] = vector.step(np.array(actions))[-1]
+            times[n].append(time.perf_counter() - begin)
+    took = {n: float(np.median(each[4:])) for n, each in times.items()}
+    for vector in vectors.values():
+        vector.close()
+    return (
+        "8 environments, 2 threads",
+        f"{8 / took[2]:.0f} steps/s",
+        f"{8 / took[1]:.0f} steps/s, 1 thread",
+        f"{took[1] / took[2]:.2f} x",
+    )
+
+
+def online() -> Row:
+    """The online environment: real time of demonstrator and robot over processor time."""
+    env = gym.make("mplearn/OnlinePrimitiveHumanoid-v0", warm_up_s=30.0)
+    info = env.reset(seed=1)[1]
+    env.action_space.seed(1)
+    passed_s, begin = 0.0, time.process_time()
+    for _ in range(40):
+        action = env.action_space.sample(probability=info["transition_prior"])
+        info = env.step(action)[-1]
+        passed_s += info["duration_s"]
+    took_s = time.process_time() - begin
+    return ("online environment", f"{took_s:.1f} s", "real time", f"{passed_s / took_s:.0f} x")
+
+
+def rows() -> list[Row]:
+    env, _ = walker()
+    inner = env.unwrapped
+    look = per_call_us(
+        lambda: (inner.performer._sensors.read(), inner._observation(), inner._info())
+    )
+    reset = per_call_us(env.reset, 200)
+    make = f"gymnasium.make({ID!r})"
+    imported = "import numpy, gymnasium, mplearn_envs"
+    seconds = {
+        "import mplearn": wall_s("import mplearn", "import numpy"),
+        "import mplearn_envs": wall_s("import mplearn_envs", "import numpy"),
+        "gym.make": wall_s(make, imported),
+        "first reset": wall_s("env.reset()", f"{imported}\nenv = {make}"),
+    }
+    return [
+        ("mask, prior, observation", f"{look:.0f} us", "50 us", f"{look / 50:.2f} x"),
+        ("reset", f"{1e-3 * reset:.2f} ms", "2 ms", f"{reset / 2000:.2f} x"),
+        double_support(),
+        *modes(),
+        threads(),
+        online(),
+        *((what, f"{took:.2f} s", "a new interpreter", "-") for what, took in seconds.items()),
+    ]

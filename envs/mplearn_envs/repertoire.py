@@ -19,7 +19,7 @@ from mplearn.recording import FloatArray
 
 from .choices import Choices, choose_among
 from .control.controller import tracked_columns
-from .control.planner import Plan, Planner
+from .control.planner import Motion, Plan, Planner
 from .control.reference import Reference, rest_reference
 from .feasibility import Feasibility, FeasibilityCheck, FeasibilityConfig
 from .robot import Robot
@@ -85,6 +85,7 @@ class Repertoire:
         self.capacity = self._slots.capacity
         self._slots.require_room(len(library))
         self._frames: dict[int, tuple[FloatArray, float]] = {}
+        self._motions: dict[int, Motion] = {}
         self._verdicts: dict[int, Feasibility] = {}
         self._revision: dict[int, int] = {}
         self._check: FeasibilityCheck | None = None
@@ -115,6 +116,7 @@ class Repertoire:
             columns = {name: i for i, name in enumerate(library.channels)}
             self._columns = [columns[name] for name in self.robot.channels]
             self._frames = {id: self._frames[id] for id in self.ids if id in self._frames}
+            self._motions = {id: self._motions[id] for id in self.ids if id in self._motions}
             self._verdicts = {id: self._verdicts[id] for id in self.ids if id in self._verdicts}
             self._fresh: set[int] = set()  # ids whose frames are known to be this library's
             self._after: dict[int, Choices] = {}
@@ -126,6 +128,7 @@ class Repertoire:
         with self.lock:
             self._slots.clear()
             self._frames.clear()
+            self._motions.clear()
             self._verdicts.clear()
 
     def require_room(self, n_primitives: int) -> None:
@@ -156,6 +159,7 @@ class Repertoire:
         known = self._frames.get(id)
         if known is None or known[1] != motion.rate_hz or not np.array_equal(known[0], frames):
             self._frames[id] = (np.ascontiguousarray(frames), motion.rate_hz)
+            self._motions.pop(id, None)
             self._verdicts.pop(id, None)
             self._revision[id] = self._revision.get(id, 0) + 1
 
@@ -183,8 +187,10 @@ class Repertoire:
         """Return the commands that perform a primitive from the present reference."""
         with self.lock:
             frames, rate_hz = self.frames(id)
-            motion = self.planner.motion(frames, rate_hz)
-            plan = self.planner.plan(start, motion, self.feasibility(id).speed, self.key(id))
+            if id not in self._motions:
+                self._motions[id] = self.planner.motion(frames, rate_hz)
+            speed = self.feasibility(id).speed
+            plan = self.planner.plan(start, self._motions[id], speed, self.key(id))
         return plan._replace(end=self._settled(plan.end))
 
     def hold(self, start: Reference, duration_s: float) -> Plan:
@@ -203,8 +209,11 @@ class Repertoire:
             return end
         q = np.round(end.q, 4)
         q[3:7] /= np.linalg.norm(q[3:7])
-        swing = rest_reference(self.robot).swing
-        return end._replace(q=q, swing=swing, swing_velocity=np.zeros_like(swing))
+        return end._replace(q=q, swing=self._rest.swing, swing_velocity=self._rest.swing_velocity)
+
+    @cached_property
+    def _rest(self) -> Reference:
+        return rest_reference(self.robot)
 
     def recall(self, key: Hashable) -> Any:
         """Return what was kept under a key; None if that is not, or no longer, in `memory`."""
