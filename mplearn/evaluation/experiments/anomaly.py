@@ -73,7 +73,8 @@ def anomaly_table(results: Iterable[tuple[str, Mapping[str, Judged]]]) -> Table:
     for kind, each in pooled.items():
         right = tuple(score for judged in each for score in judged.right)
         wrong = tuple(score for judged in each for score in judged.wrong)
-        auc = float(np.nanmean([judged.auc for judged in each if judged.right and judged.wrong]))
+        areas = [judged.auc for judged in each if judged.right and judged.wrong]
+        auc = float(np.mean(areas)) if areas else float("nan")
         rows.append(("mean", *_cells(kind, Judged(right, wrong), auc)))
     return Table(
         "Planted anomalies, told by a library from what is usual",
