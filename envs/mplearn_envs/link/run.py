@@ -25,7 +25,7 @@ from .upper_body import UpperBody
 PATH = ("both arms raise", "both arms lower", "bow down", "bow up", "squat down", "squat raise")
 _REST_S = 1.0  # how long the lower body goes on after the last posture
 _START_S = 0.3  # how long the upper body sends the first posture
-_UPRIGHT = np.cos(0.6)
+_DROP_M = 0.2  # below the reference it has fallen
 
 
 class LinkReport(NamedTuple):
@@ -107,7 +107,7 @@ def run_lower(
     model, data = simulation.model, simulation.data
     period_s = float(model.opt.timestep)
     limits = robot.position_limits
-    outside, slowest_s = 0, 0.0
+    outside, slowest_s, fallen = 0, 0.0, False
     n_periods = None if seconds is None else round(seconds / period_s)
     with Receiver(robot, host, port) as receiver:
         lower = LowerBody(robot, receiver, period_s)
@@ -120,9 +120,9 @@ def run_lower(
             data.ctrl[:] = commands
             mujoco.mj_step(model, data)
             slowest_s = max(slowest_s, time.perf_counter() - begin)
+            fallen = fallen or not data.qpos[2] > lower.controller.reference.q[2] - _DROP_M
             if lower.phase == "settling" and lower.spent_s["settling"] >= _REST_S:
                 break
-    fallen = not data.xmat[1, 8] > _UPRIGHT
     spent_s = {str(phase): spent for phase, spent in lower.spent_s.items()}
     return LinkReport(receiver.counts, spent_s, fallen, outside, slowest_s)
 
