@@ -8,14 +8,19 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 from rich.console import Console
 from rich.table import Table
 
-from . import chain, environment, hmm
+from . import chain, environment, generation, graph, hmm, inverse_kinematics, segmentation, tree
 
 
 def main() -> None:
     console = Console(width=130)
     for title, module in (
         ("The learning chain (processor time, one core)", chain),
+        ("Inverse kinematics", inverse_kinematics),
+        ("Segmentation (one core)", segmentation),
         ("Hidden Markov models (interleaved, one core)", hmm),
+        ("The tree", tree),
+        ("The graph", graph),
+        ("Generation", generation),
         ("The environment", environment),
     ):
         table = Table("what", "took", "against", "ratio", title=title, title_justify="left")
