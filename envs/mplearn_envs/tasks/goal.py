@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from gymnasium import spaces
@@ -15,33 +14,14 @@ from mplearn.recording import FloatArray
 from mplearn_envs.measurement import Measured
 from mplearn_envs.performance import Performance
 from mplearn_envs.reach import Arrival, soonest_arrivals
-from mplearn_envs.repertoire import HEIGHT_SCALE, Repertoire
+from mplearn_envs.repertoire import Repertoire
 
 from .base import Choice, Scene, Task
+from .targets import Goal, hand_bodies, hand_target, posture_gap, posture_target
 
 GoalKind: TypeAlias = Literal["hand", "posture", "primitive"]
-SIDES = ("left", "right")
 _FAR_M = 3.0  # no hand is farther from the feet
 _NO_POINT = np.zeros(3)
-
-
-class Goal(NamedTuple):
-    """What shall be reached.
-
-    Attributes:
-        side: 0: the left hand, 1: the right one; of a hand's goal.
-        point: Where the hand shall be, from the middle of the soles, x forward, shape (3,) [m].
-        posture: Base height, roll, pitch and joint angles, shape (3 + n,) [m, rad]; of a posture's
-            goal. NaN where it does not matter.
-        slots: Slots of the primitives at whose end the goal is reached.
-        least_time_s: Least time until then [s].
-    """
-
-    side: int
-    point: FloatArray
-    posture: FloatArray
-    slots: tuple[int, ...]
-    least_time_s: float
 
 
 @dataclass
@@ -117,7 +97,7 @@ class GoalTask(Task):
     def space(self, repertoire: Repertoire) -> spaces.Box:
         """Return the bounds of the observation, see the table."""
         if self.kind == "hand":
-            _hands(repertoire)
+            hand_bodies(repertoire)
             high = np.array([1.0, 1.0, *[_FAR_M] * 3, *[2 * _FAR_M] * 3, 1.0])
             low = -high
             low[[0, 1, 8]] = 0.0
@@ -143,7 +123,7 @@ class GoalTask(Task):
         if self._library is not repertoire.library:
             self._arrivals = soonest_arrivals(repertoire, repertoire.entries(scene.reference))
             self._library = repertoire.library
-            self._hands = _hands(repertoire) if self.kind == "hand" else ()
+            self._hands = hand_bodies(repertoire) if self.kind == "hand" else ()
         target = scene.options.get("target", self.target)
         self.goal = self._drawn(scene) if target is None else self._given(target, scene)
         self._slots = scene.repertoire.slots
@@ -210,7 +190,7 @@ class GoalTask(Task):
         if self.kind == "hand":
             return self._hand_gap(self.goal, scene.measured) <= self.tolerance_m
         if self.kind == "posture":
-            return _posture_gap(self.goal.posture, scene.measured) <= self.tolerance_rad
+            return posture_gap(self.goal.posture, scene.measured) <= self.tolerance_rad
         return scene.current is not None and self._slots.get(scene.current) in self.goal.slots
 
     def _hand_gap(self, goal: Goal, there: Measured) -> float:
@@ -229,7 +209,7 @@ class GoalTask(Task):
                     point = there.bodies[hand]
                     if np.linalg.norm(point - start.bodies[hand]) >= self.far_m:
                         goals.append((side, point, there.posture))
-            elif _posture_gap(there.posture, start) > self.tolerance_rad:
+            elif posture_gap(there.posture, start) > self.tolerance_rad:
                 goals.append((0, _NO_POINT, there.posture))
         if self.kind == "primitive":
             ids = sorted(self._in_time())
@@ -251,10 +231,10 @@ class GoalTask(Task):
         if self.kind == "primitive":
             return self._primitive_goal(scene.repertoire.library[target].id, scene)
         if self.kind == "hand":
-            side, point = _hand_target(target)
+            side, point = hand_target(target)
             goal = Goal(side, point, np.zeros(0), (), np.inf)
             return self._completed(goal, scene, f"the {target[0]} hand to {point.tolist()}")
-        posture = _posture_target(target, scene.repertoire)
+        posture = posture_target(target, scene.repertoire)
         return self._completed(Goal(0, _NO_POINT, posture, (), np.inf), scene, f"{dict(target)}")
 
     def _primitive_goal(self, id: int, scene: Scene) -> Goal:
@@ -277,7 +257,7 @@ class GoalTask(Task):
         gaps = {
             id: self._hand_gap(goal, arrival.measured)
             if self.kind == "hand"
-            else _posture_gap(goal.posture, arrival.measured)
+            else posture_gap(goal.posture, arrival.measured)
             for id, arrival in self._arrivals.items()
         }
         allowed = self.tolerance_m if self.kind == "hand" else self.tolerance_rad
@@ -305,51 +285,3 @@ class GoalTask(Task):
 
     def _in_time(self) -> dict[int, Arrival]:
         return {id: a for id, a in self._arrivals.items() if a.time_s <= self.deadline_s}
-
-
-def _hands(repertoire: Repertoire) -> tuple[int, ...]:
-    """Return the bodies of the left and of the right hand."""
-    robot = repertoire.robot
-    roles = dict(robot.segments)
-    if not {"hand_l", "hand_r"} <= set(roles):
-        raise InvalidValueError(
-            f"robot {robot.name!r} has no hands among its segments {sorted(roles)}; "
-            "choose another kind of goal"
-        )
-    model = robot.model()
-    return tuple(model.body(roles[role]).id for role in ("hand_l", "hand_r"))
-
-
-def _hand_target(target: Any) -> tuple[int, FloatArray]:
-    try:
-        side, point = target
-        point = np.array(point, dtype=np.float64)
-        if side not in SIDES or point.shape != (3,) or not np.isfinite(point).all():
-            raise ValueError
-    except (TypeError, ValueError):
-        raise InvalidValueError(
-            f"a hand's target is ('left' or 'right', (x, y, z)) [m], not {target!r}"
-        ) from None
-    return SIDES.index(side), point
-
-
-def _posture_target(target: Any, repertoire: Repertoire) -> FloatArray:
-    channels = repertoire.robot.channels
-    if not isinstance(target, Mapping) or not target or not set(target) <= set(channels):
-        raise InvalidValueError(
-            f"a posture's target maps some of the channels {channels[:4]}... to values, "
-            f"not {target!r}"
-        )
-    posture = np.full(len(channels), np.nan)
-    for channel, value in target.items():
-        posture[channels.index(channel)] = value
-    if not np.isfinite([posture[channels.index(channel)] for channel in target]).all():
-        raise InvalidValueError(f"a posture's target must be finite, not {target!r}")
-    return posture
-
-
-def _posture_gap(wanted: FloatArray, there: Measured) -> float:
-    """Return the largest difference of a coordinate that matters [rad]."""
-    apart = np.abs(there.posture - wanted)
-    apart[0] *= HEIGHT_SCALE
-    return float(np.nanmax(apart))
