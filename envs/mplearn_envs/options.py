@@ -24,6 +24,7 @@ _INTEGERS = ("max_steps", "width", "height")
 _WORDS: dict[str, tuple[object, ...]] = {
     "illegal": ("hold", "raise"),
     "render_mode": (None, "human", "rgb_array"),
+    "draw_balance": (False, True),
     "dynamics": ("simulated", "kinematic"),
     "flat": (False, True),
 }

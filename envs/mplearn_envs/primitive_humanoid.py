@@ -135,6 +135,7 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
         render_mode: None, "rgb_array" or "human".
         width: Width of pictures [pixels].
         height: Height of pictures [pixels].
+        draw_balance: Whether support polygon, COG and ZMP are drawn on the floor of pictures.
         frame_rate_hz: How often ``frame_callback`` is called [1/s of simulated time].
 
     Attributes:
@@ -173,6 +174,7 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
         render_mode: Literal["human", "rgb_array"] | None = None,
         width: int = 640,
         height: int = 480,
+        draw_balance: bool = False,
         frame_rate_hz: float = 25.0,
     ) -> None:
         require_options(locals())
@@ -190,9 +192,10 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
         self.novel_penalty = novel_penalty
         self.feasibility = feasibility
         self.flat = flat
+        self.draw_balance = draw_balance
         self.frame_rate_hz = frame_rate_hz
         self.repertoire = self._repertoire(capacity)
-        self._set_up(flat, Screen(render_mode, width, height))
+        self._set_up(flat, Screen(render_mode, width, height, draw_balance))
 
     def _begin(self) -> None:
         if self.source.live:

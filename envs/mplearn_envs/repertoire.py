@@ -22,7 +22,7 @@ from .control.controller import tracked_columns
 from .control.planner import Motion, Plan, Planner
 from .control.reference import Reference, rest_reference
 from .feasibility import Feasibility, FeasibilityCheck, FeasibilityConfig
-from .robot import Robot
+from .robot import Retargeting, Robot
 from .slots import Slots
 
 ENTRY_GAP = 0.5  # largest difference of a tracked coordinate [rad]
@@ -107,14 +107,13 @@ class Repertoire:
         Raises:
             LibraryError: The library is for another body.
         """
-        _require_fit(library, self.robot)
+        retargeting = _retargeting(library, self.robot)
         with self.lock:
             left_out = self._slots.update(library.ids)
             self.library = library
             self.slots = self._slots.of
             self.ids = tuple(sorted(self.slots))
-            columns = {name: i for i, name in enumerate(library.channels)}
-            self._columns = [columns[name] for name in self.robot.channels]
+            self._retargeting = retargeting
             self._frames = {id: self._frames[id] for id in self.ids if id in self._frames}
             self._motions = {id: self._motions[id] for id in self.ids if id in self._motions}
             self._verdicts = {id: self._verdicts[id] for id in self.ids if id in self._verdicts}
@@ -153,7 +152,7 @@ class Repertoire:
 
     def _generate(self, id: int) -> None:
         motion = self.library.generate([id], style=self.style)
-        frames = motion.frames[:, self._columns]
+        frames = self._retargeting(motion.frames)
         if len(frames) == 1:
             frames = np.repeat(frames, 2, axis=0)
         known = self._frames.get(id)
@@ -321,14 +320,11 @@ class Repertoire:
         self.lock = RLock()
 
 
-def _require_fit(library: PrimitiveLibrary, robot: Robot) -> None:
-    missing = [name for name in robot.channels if name not in library.channels]
-    if missing or library.body not in ("", robot.name):
-        raise LibraryError(
-            f"the library is for body {library.body!r} with channels {library.channels[:4]}...; "
-            f"robot {robot.name!r} needs {len(robot.channels)} channels"
-            + (f" and misses {missing[:4]}" if missing else "")
-        )
+def _retargeting(library: PrimitiveLibrary, robot: Robot) -> Retargeting:
+    try:
+        return Retargeting(library.channels, library.body, robot)
+    except RobotError as error:
+        raise LibraryError(f"the library is not for this robot: {error}") from error
 
 
 _SHARED: WeakValueDictionary[Hashable, Repertoire] = WeakValueDictionary()

@@ -21,12 +21,20 @@ class Screen:
         mode: None, "rgb_array" or "human".
         width: Width of pictures [pixels].
         height: Height of pictures [pixels].
+        balance: Whether support polygon, COG and ZMP are drawn on the floor of pictures.
     """
 
-    def __init__(self, mode: Literal["human", "rgb_array"] | None, width: int, height: int) -> None:
+    def __init__(
+        self,
+        mode: Literal["human", "rgb_array"] | None,
+        width: int,
+        height: int,
+        balance: bool = False,
+    ) -> None:
         self.mode = mode
         self.width = width
         self.height = height
+        self.balance = balance
         self._drawer: Any = None
 
     def picture(self, simulation: Simulation) -> NDArray[np.uint8] | None:
@@ -43,7 +51,9 @@ class Screen:
         if self._drawer is None:
             from .rendering import Renderer
 
-            self._drawer = Renderer(simulation.model, self.width, self.height)
+            self._drawer = Renderer(
+                simulation.model, self.width, self.height, balance=self.balance
+            )
         picture: NDArray[np.uint8] = self._drawer.render(simulation.data)
         return picture
 

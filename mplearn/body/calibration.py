@@ -27,7 +27,9 @@ from .markers import MarkerSet
 from .sizes import fit_sizes, match_sizes
 from .tree import KinematicTree
 
-ROUNDS, ROUNDS_AGAIN = 6, 3  # for the person, and then for another body of that size
+# how far markers may be from their usual places, round after round [m]: the sizes must explain what
+# they can before the places may take up the rest, or a bent knee passes for misplaced markers
+PLACE_SIGMAS_M = (*[0.001] * 6, 0.003, 0.01, 0.02)
 SIZE_SIGMA, FIXED_SIGMA = 0.08, 1e-4  # of a segment's length, relative to the overall size
 FRAMES = 12  # postures that the fit takes from the stretch it is given
 WORST_FIT_M = 0.06  # root mean square distance above which the markers are not this body's
@@ -96,9 +98,7 @@ def fit(follower: Follower, markers: MarkerSet, frames: FloatArray) -> Calibrati
         start = follower.tree.rest
         start[:7] = found.postures[0, :7]
         template = template / sizes[bodies]
-        found = _alternate(
-            follower, sizes, FIXED_SIGMA, bodies, template, start, chosen, ROUNDS_AGAIN
-        )
+        found = _alternate(follower, sizes, FIXED_SIGMA, bodies, template, start, chosen)
     rms = float(np.sqrt(np.nanmean(found.residuals**2)))
     if rms > WORST_FIT_M:
         mean = np.nan_to_num(np.nanmean(found.residuals, axis=0))
@@ -136,7 +136,6 @@ def _alternate(
     template: FloatArray,
     start: FloatArray,
     frames: FloatArray,
-    rounds: int = ROUNDS,
 ) -> _Fit:
     """Estimate postures, and sizes with places, in turn."""
     tree = follower.tree.scaled(sizes)
@@ -148,9 +147,9 @@ def _alternate(
         postures[k] = last
         settle(follower, tree, bodies, offsets, postures[k : k + 1], frames[k : k + 1])
         last = postures[k]
-    for _ in range(rounds):
+    for place_sigma_m in PLACE_SIGMAS_M:
         factors, offsets = fit_sizes(
-            follower.tree, sizes, size_sigma, bodies, template, postures, frames
+            follower.tree, sizes, size_sigma, bodies, template, postures, frames, place_sigma_m
         )
         tree = follower.tree.scaled(factors)
         residuals = settle(follower, tree, bodies, offsets, postures, frames)

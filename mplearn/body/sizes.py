@@ -10,7 +10,6 @@ from mplearn.recording import FloatArray, IntArray
 from .human import PROPORTIONS
 from .tree import KinematicTree
 
-PLACE_SIGMA_M = 0.02  # of a marker's place on its segment
 MARKER_SIGMA_M = 0.005
 SHORTEST_M = 0.03  # a link shorter than this along an axis says nothing about its body's size
 NARROWEST, WIDEST = 0.7, 1.4  # bounds on a segment's length relative to the overall size
@@ -24,6 +23,7 @@ def fit_sizes(
     template: FloatArray,
     postures: FloatArray,
     frames: FloatArray,
+    place_sigma_m: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Fit the sizes and places that explain the markers best, near what people are like.
 
@@ -40,6 +40,7 @@ def fit_sizes(
         template: Expected place of each marker on the body, shape (M, 3) [m].
         postures: Posture in each frame, shape (K, 7 + n).
         frames: Measured positions, shape (K, M, 3) [m]; NaN where missing.
+        place_sigma_m: Standard deviation of a marker's place on its segment [m].
 
     Returns:
         Factors on the body's sizes, shape (B, 3), and the markers' places, shape (M, 3) [m].
@@ -52,7 +53,7 @@ def fit_sizes(
     normal, gradient = np.zeros((n_unknowns, n_unknowns)), np.zeros(n_unknowns)
     normal[range(n_groups), range(n_groups)] = (size_sigma / MARKER_SIGMA_M) ** -2.0
     shifted = range(n_groups, n_groups + 3 * n_markers)
-    normal[shifted, shifted] = (PLACE_SIGMA_M / MARKER_SIGMA_M) ** -2.0
+    normal[shifted, shifted] = (place_sigma_m / MARKER_SIGMA_M) ** -2.0
     mats = np.array([tree.forward(q)[1] for q in postures])
     _add_markers(
         mats, tree.parent, tree.offset, size, groups, bodies, template, frames, normal, gradient
