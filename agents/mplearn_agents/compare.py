@@ -19,7 +19,7 @@ from mplearn.recording import FloatArray
 from .episodes import Episode, play
 from .policies import NEEDS_TASK, POLICIES, Policy
 from .rl import TrainedPolicy, TrainingConfig
-from .rl.config import AlgorithmName
+from .rl.config import AlgorithmName, PriorUse
 from .rl.train import train
 from .rl.trained import CONFIG, POLICY
 
@@ -40,6 +40,7 @@ class Comparison:
         dynamics: "kinematic", "simulated" or both. Agents are trained kinematically.
         policies: Names of policies; those that do not suit a task are left out there.
         algorithms: What agents are trained with.
+        priors: What the transition prior is to them; "dqn" knows "feature" only.
         seeds: Of the episodes, and of the trainings: one agent a seed.
         episodes: Episodes a seed, kinematic.
         simulated_episodes: Episodes a seed, simulated; and of policies that think long.
@@ -51,10 +52,11 @@ class Comparison:
     dynamics: tuple[str, ...] = ("kinematic",)
     policies: tuple[str, ...] = tuple(POLICIES)
     algorithms: tuple[AlgorithmName, ...] = ("maskable-ppo",)
+    priors: tuple[PriorUse, ...] = ("logits",)
     seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
     episodes: int = 100
     simulated_episodes: int = 10
-    steps: int = 80_000
+    steps: int = 20_000
     library: str | None = None
 
     def __post_init__(self) -> None:
@@ -77,11 +79,12 @@ def compare(
     """
     for task in comparison.tasks:
         trained = {
-            algorithm: [
-                _trained(comparison, task, algorithm, seed, agents, console)
+            f"{algorithm}, prior as {prior}": [
+                _trained(comparison, task, algorithm, prior, seed, agents, console)
                 for seed in comparison.seeds
             ]
             for algorithm in comparison.algorithms
+            for prior in (("feature",) if algorithm == "dqn" else comparison.priors)
         }
         rows = []
         for dynamics in comparison.dynamics:
@@ -118,7 +121,7 @@ def _contestants(
     comparison: Comparison,
     task: str,
     env: gymnasium.Env[Any, Any],
-    trained: dict[AlgorithmName, list[TrainedPolicy]],
+    trained: dict[str, list[TrainedPolicy]],
 ) -> Iterator[tuple[str, Sequence[Policy]]]:
     for name in comparison.policies:
         if task in NEEDS_TASK.get(name, (task,)):
@@ -130,6 +133,7 @@ def _trained(
     comparison: Comparison,
     task: str,
     algorithm: AlgorithmName,
+    prior: PriorUse,
     seed: int,
     agents: Path,
     console: Console | None,
@@ -137,12 +141,13 @@ def _trained(
     config = TrainingConfig(
         task=task,
         algorithm=algorithm,
+        prior=prior,
         steps=comparison.steps,
         seed=seed,
         library=comparison.library,
         round_steps=comparison.steps,
     )
-    folder = agents / f"{task}-{algorithm}-{seed}"
+    folder = agents / f"{task}-{algorithm}-{prior}-{seed}"
     if (folder / POLICY).exists() and TrainingConfig.load(folder / CONFIG)[0] == config:
         return TrainedPolicy.load(folder)
     return train(config, folder, console=console)

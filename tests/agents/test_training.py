@@ -244,6 +244,6 @@ def test_the_commands(folder, capsys):
     assert [row.split(" | ")[1:3] for row in rows] == [
         [dynamics, policy]
         for dynamics in ("kinematic", "simulated")
-        for policy in ("random", "quick-path", "maskable-ppo")
+        for policy in ("random", "quick-path", "maskable-ppo, prior as logits")
     ]
     assert all("100.0 ± 0.0 %" in row for row in rows if "quick-path" in row)

@@ -5,10 +5,16 @@ import numpy as np
 import pytest
 
 from mplearn.errors import InvalidValueError, RobotError, UnknownPrimitiveError
-from mplearn_agents.policies import Greedy, PathToGoal, Policy, RandomWalk
+from mplearn_agents.policies import (
+    NEEDS_TASK,
+    POLICIES,
+    Greedy,
+    PathToGoal,
+    Policy,
+    RandomWalk,
+)
 from mplearn_agents.walk import walk
-
-import mplearn_envs  # noqa: F401  isort: skip
+from mplearn_envs.feasibility import FeasibilityConfig
 
 
 class Ring(gymnasium.Env):
@@ -126,8 +132,42 @@ def test_the_humanoid_goes_to_a_goal(humanoid, library):
     assert library["SQR"].id in result.primitives
 
 
-def test_goals_that_cannot_be_are_said(humanoid):
+def test_goals_that_cannot_be_are_said(humanoid, library):
     with pytest.raises(UnknownPrimitiveError, match="no primitive 'jump'"):
         PathToGoal.for_env(humanoid, "jump")
-    with pytest.raises(RobotError, match=r"cannot perform the goal 'LKR'.*foot"):
-        PathToGoal.for_env(humanoid, "LKR")
+    weak = gymnasium.make(
+        "mplearn/PrimitiveHumanoid-v0",
+        library=library,
+        feasibility=FeasibilityConfig(torque_share=0.01),
+        disable_env_checker=True,
+    )
+    with pytest.raises(RobotError, match=r"cannot perform the goal 'SQD'.*torque"):
+        PathToGoal.for_env(weak, "SQD")
+    weak.close()
+
+
+@pytest.mark.parametrize("name", POLICIES)
+def test_every_policy_does_a_task_it_is_for(name, library_file):
+    task = NEEDS_TASK.get(name, ("goal",))[0]
+    env = gymnasium.make(
+        "mplearn/PrimitiveHumanoid-v0",
+        library=library_file,
+        task=task,
+        dynamics="kinematic",
+        disable_env_checker=True,
+    )
+    result = walk(env, POLICIES[name](env), 1, seed=2, episodes=1)
+    assert result.episodes == 1
+    assert not any(step.illegal for step in result.steps)
+    if name in ("quick-path", "short-path", "likely-path", "search"):
+        assert result.successes == 1
+    elif task == "follow":
+        assert result.successes is None
+    env.close()
+
+
+def test_policies_say_which_task_they_need(humanoid):
+    for name, tasks in NEEDS_TASK.items():
+        assert "free" not in tasks
+        with pytest.raises(InvalidValueError, match="task"):
+            walk(humanoid, POLICIES[name](humanoid), 1)

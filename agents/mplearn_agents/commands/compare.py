@@ -23,12 +23,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--policies", nargs="+", help="names of policies (default: all)")
     parser.add_argument("--algorithms", nargs="*", default=["maskable-ppo"])
+    parser.add_argument("--priors", nargs="+", default=["logits"], help="see `mplearn train`")
     parser.add_argument("--seeds", type=int, default=5, help="number of seeds (default: 5)")
     parser.add_argument("--episodes", type=int, default=100, help="kinematic episodes a seed")
     parser.add_argument(
         "--simulated-episodes", type=int, default=10, help="simulated episodes a seed"
     )
-    parser.add_argument("--steps", type=int, default=80_000, help="macro steps of a training")
+    parser.add_argument("--steps", type=int, default=20_000, help="macro steps of a training")
 
 
 def run(args: argparse.Namespace) -> None:
@@ -45,6 +46,7 @@ def run(args: argparse.Namespace) -> None:
         dynamics=tuple(args.dynamics),
         policies=tuple(args.policies or POLICIES),
         algorithms=tuple(args.algorithms),
+        priors=tuple(args.priors),
         seeds=tuple(range(args.seeds)),
         episodes=args.episodes,
         simulated_episodes=args.simulated_episodes,

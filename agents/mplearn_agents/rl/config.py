@@ -40,12 +40,12 @@ class TrainingConfig:
 
     task: str = "goal"
     algorithm: AlgorithmName = "maskable-ppo"
-    steps: int = 100_000
+    steps: int = 30_000
     seed: int = 0
     dynamics: str = "kinematic"
     library: str | None = None
     prior: PriorUse = "logits"
-    round_steps: int = 10_000
+    round_steps: int = 5_000
     episodes: int = 50
     environment: dict[str, Any] = field(default_factory=dict)
 
