@@ -12,7 +12,8 @@ from mplearn.recording import FloatArray
 from .control.controller import tracked_columns
 from .control.footwork import Footwork, Lift, sole_heights
 from .control.inverse_dynamics import InverseDynamics
-from .control.planner import Motion, Plan, Planner
+from .control.plan import Motion, Plan
+from .control.planner import Planner
 from .control.reference import Reference, reference_robot, rest_reference
 
 SLOWER = 0.8  # share of the speed that is tried next

@@ -10,7 +10,7 @@ from mplearn.recording import BoolArray, FloatArray
 
 from .control.guide import support
 from .control.momentum import ground_reaction, momenta
-from .control.planner import Plan
+from .control.plan import Plan
 from .control.reference import reference_robot
 from .control.stride import sole_middles
 from .control.support import margins_along

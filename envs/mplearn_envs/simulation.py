@@ -10,13 +10,12 @@ import mujoco
 import numpy as np
 
 from mplearn.errors import InvalidValueError
-from mplearn.recording import BoolArray, FloatArray
+from mplearn.recording import FloatArray
 
 from .control.gravity import standing_commands
 from .control.guide import Guide
-from .control.planner import Plan
+from .control.plan import Plan
 from .control.reference import rest_reference, sole_corners
-from .control.support import convex_hull, support_margin
 from .performance import Performance as Performance
 from .performance import assess, fallen_at
 from .robot import Robot
@@ -168,47 +167,6 @@ class Simulation:
         return np.asarray(
             np.einsum("sij,scj->sci", turn, self._corners) + self.data.xpos[self._feet][:, None]
         )
-
-    def posture(self) -> FloatArray:
-        """Return base height [m], roll, pitch and the joint angles [rad], shape (3 + n,)."""
-        w, x, y, z = self.data.qpos[3:7]
-        roll = np.arcsin(np.clip(2 * (y * z + w * x), -1.0, 1.0))
-        pitch = np.arctan2(2 * (w * y - x * z), 1 - 2 * (x * x + y * y))
-        return np.concatenate(([self.data.qpos[2], roll, pitch], self.data.qpos[7:]))
-
-    def velocity(self) -> FloatArray:
-        """Return velocities, shape (6 + n,).
-
-        Linear [m/s], x along the heading; angular [rad/s], base's frame; joints' [rad/s].
-        """
-        out = self.data.qvel.copy()
-        out[:2] = self._heading() @ out[:2]
-        return np.asarray(out)
-
-    def balance(self) -> tuple[FloatArray, float]:
-        """Return how the COG stands over the feet.
-
-        Returns:
-            The COG from the middle of the soles, x along the heading, shape (3,) [m]; and the
-            distance of its projection from the edge of the support polygon [m], negative outside.
-            Those corners of the soles support that are less than 1.5 cm above the floor; -1 if
-            fewer than three do.
-        """
-        corners = self.soles().reshape(8, 3)
-        cog = self.data.subtree_com[1].copy()
-        down: BoolArray = corners[:, 2] < 0.015
-        margin = -1.0
-        if np.count_nonzero(down) >= 3:
-            margin = float(support_margin(convex_hull(corners[down, :2]), cog[:2]))
-        cog[:2] = self._heading() @ (cog[:2] - corners[:, :2].sum(axis=0) / 8.0)
-        return cog, margin
-
-    def _heading(self) -> FloatArray:
-        """Return the (2, 2) matrix that turns vectors of the floor into the base's heading."""
-        w, x, y, z = self.data.qpos[3:7]
-        yaw = np.arctan2(2 * (w * z - x * y), 1 - 2 * (x * x + z * z))
-        c, s = np.cos(yaw), np.sin(yaw)
-        return np.array([[c, s], [-s, c]])
 
     def _update_positions(self) -> None:
         """Bring poses up to the state, which a step leaves one step behind."""

@@ -17,7 +17,7 @@ from mplearn_envs.control import (
     rest_reference,
 )
 from mplearn_envs.control.controller import tracked_columns
-from mplearn_envs.control.planner import refine
+from mplearn_envs.control.splines import refine
 from mplearn_envs.control.support import convex_hull, support_margin
 from mplearn_envs.robot import humanoid
 from mplearn_envs.simulation import Simulation
@@ -162,6 +162,14 @@ def test_bad_motions_are_refused():
     broken[3, 4] = np.nan
     with pytest.raises(InvalidValueError, match="finite"):
         PLANNER.plan(REST, Motion(broken, 100.0))
+    whole = sweep({}, BOW, 1.0)
+    with pytest.raises(InvalidValueError, match="shape"):
+        PLANNER.motion(whole[:, :5], 100.0)
+    with pytest.raises(InvalidValueError, match="rate_hz"):
+        PLANNER.motion(whole, 0.0)
+    whole[3, -1] = np.nan  # a leg's joint
+    with pytest.raises(InvalidValueError, match="finite"):
+        PLANNER.motion(whole, 100.0)
 
 
 def test_refining_reproduces_a_parabola_exactly():

@@ -4,8 +4,8 @@ from .balance import BalanceController as BalanceController
 from .cog_filter import CogFilter as CogFilter
 from .controller import Controller as Controller
 from .controller import StandingController as StandingController
-from .planner import Motion as Motion
-from .planner import Plan as Plan
+from .plan import Motion as Motion
+from .plan import Plan as Plan
 from .planner import Planner as Planner
 from .planner import PlannerConfig as PlannerConfig
 from .reference import Reference as Reference

@@ -16,7 +16,7 @@ from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.robot import Robot
 
 from .pendulum import pendulum_rate
-from .planner import Plan
+from .plan import Plan
 from .reference import reference_robot
 from .support import GRAVITY
 

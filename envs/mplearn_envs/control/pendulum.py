@@ -1,6 +1,6 @@
 """The COG's path for a wanted zero-moment point: a linear inverted pendulum, planned whole.
 
-Least squares on the zero-moment point's error and the jerk (as preview control [Kajita2003], with
+Least squares on the zero-moment point's error and the jerk (as preview control [Kajita2014], with
 the whole future known and both ends given): normal equations with seven bands, linear in time.
 """
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -26,7 +25,10 @@ from .kinematics import forward
 from .legs import balanced_path
 from .momentum import ground_reaction, momenta, velocities
 from .pendulum import zmp_along
+from .plan import Motion as Motion
+from .plan import Plan as Plan
 from .reference import N_BASE, Reference, reference_robot
+from .splines import fading, refine
 from .stride import (
     CARRY_M,
     left_share,
@@ -44,25 +46,6 @@ GRID_DECIMALS = 6
 CLOSE_M = 0.035  # a zero-moment point so near the edge is planned again, for all masses
 _SOLE_M = 0.1  # by no more than this
 OUT_OF_REACH = 1e-3  # [m, rad]: an error that slowing down does not mend
-
-
-class Motion(NamedTuple):
-    """What shall be performed.
-
-    Attributes:
-        frames: Tracked coordinates at human speed, shape (T, U) [m, rad].
-        rate_hz: Frames per second [1/s].
-        footwork: What the feet do; None where both stay down.
-    """
-
-    frames: FloatArray
-    rate_hz: float
-    footwork: Footwork | None = None
-
-    @property
-    def duration_s(self) -> float:
-        """Length at human speed [s]."""
-        return (len(self.frames) - 1) / self.rate_hz
 
 
 @dataclass(frozen=True)
@@ -83,49 +66,6 @@ class PlannerConfig:
     blend_s: float = 0.5
     blend_velocity: float = 0.3
     cache_size: int = 256
-
-
-class Plan(NamedTuple):
-    """A motion, ready to be performed.
-
-    Attributes:
-        commands: Servo commands, shape (N, n) [rad].
-        q: Reference postures, shape (K + 1, 7 + n), the first being the start.
-        knot_s: Time between reference postures [s].
-        error: Largest error of feet, COG and base that is left at each of them, shape (K + 1,).
-        end: Where the reference robot is at the end.
-        speed: Speed that was possible, as a share of the human's.
-        cog: COG of each posture, shape (K + 1, 3) [m].
-        zmp: Zero-moment point at each posture, all masses moving as planned, (K + 1, 2) [m].
-        zmp_margin_m: Its distance from the edge of the soles that stand, negative outside, shape
-            (K + 1,) [m].
-        ground: Where each foot stands or would: x, y [m] and yaw [rad], shape (K + 1, 2, 3).
-        up: Side of the foot in the air at each posture, 0 left, 1 right, -1 none, shape (K + 1,).
-        share: Which share of the weight the left foot carries, shape (K + 1,).
-    """
-
-    commands: FloatArray
-    q: FloatArray
-    knot_s: float
-    error: FloatArray
-    end: Reference
-    speed: float
-    cog: FloatArray
-    zmp: FloatArray
-    zmp_margin_m: FloatArray
-    ground: FloatArray
-    up: IntArray
-    share: FloatArray
-
-    @property
-    def duration_s(self) -> float:
-        """Length [s]."""
-        return (len(self.q) - 1) * self.knot_s
-
-    @property
-    def steps(self) -> bool:
-        """Whether a foot is in the air or the weight moves."""
-        return bool((self.up >= 0).any() or np.ptp(self.cog[:, :2], axis=0).max() > 1e-3)
 
 
 class Planner:
@@ -160,7 +100,19 @@ class Planner:
         Args:
             frames: Values of the robot's channels, shape (T, 3 + n) [m, rad].
             rate_hz: Frames per second, at human speed [1/s].
+
+        Raises:
+            InvalidValueError: The frames have another shape or are not finite.
         """
+        width = len(self.robot.channels)
+        if frames.ndim != 2 or frames.shape[1] != width or len(frames) < 2:
+            raise InvalidValueError(
+                f"a motion needs frames of shape (2 or more, {width}), not {frames.shape}"
+            )
+        if not np.isfinite(frames).all():
+            raise InvalidValueError("a motion's frames must be finite")
+        if not (np.isfinite(rate_hz) and rate_hz > 0):
+            raise InvalidValueError(f"rate_hz must be positive and finite, not {rate_hz}")
         footwork = read_footwork(self.robot, frames, rate_hz)
         tracked = np.ascontiguousarray(frames[:, self._tracked])
         return Motion(tracked, rate_hz, footwork if footwork.lifts else None)
@@ -309,7 +261,7 @@ class Planner:
         moves = wait_s == 0 and parts[0].first < parts[0].last
         first = (frames[1] - frames[0]) * motion.rate_hz * speed if moves else 0.0
         heights = path[:, -2:].copy()
-        path += _fading(time, blend_s, gap, before_rate - first)
+        path += fading(time, blend_s, gap, before_rate - first)
         path[:, -2:] = plan_rise(course, heights, start, path[:, -2:])
         path = np.clip(path, limits[:, 0], limits[:, 1])
         width = len(self._rates) - 2
@@ -343,32 +295,3 @@ class Planner:
         q, ground = recentred(q, ground)
         parts = (targets[-1, :width], rate[:width], q, targets[-1, width:], rate[width:], lifted)
         return Reference(*(np.round(part, GRID_DECIMALS) for part in (*parts, ground)))
-
-
-def _fading(time: FloatArray, over_s: float, gap: FloatArray, rate: FloatArray) -> FloatArray:
-    """Return the quintic that starts at ``gap`` with velocity ``rate`` and ends at rest in zero."""
-    x = np.minimum(time / over_s, 1.0)[:, None]
-    left = 1.0 - x
-    return np.asarray(left**3 * (gap * (1 + 3 * x + 6 * x**2) + rate * over_s * x * (1 + 3 * x)))
-
-
-def refine(knots: FloatArray, knot_s: float, n_steps: int) -> tuple[FloatArray, FloatArray]:
-    """Interpolate by cubic Hermite splines with the knots' central differences.
-
-    Args:
-        knots: Positions at the knots, shape (K + 1, n), K >= 2.
-        knot_s: Time between knots [s].
-        n_steps: Steps from knot to knot.
-
-    Returns:
-        Positions and velocities at the steps after the first knot, each of shape (K n_steps, n).
-    """
-    slope = np.gradient(knots, axis=0, edge_order=2)
-    x = np.arange(1, n_steps + 1)[:, None] / n_steps
-    basis = np.hstack(
-        (2 * x**3 - 3 * x**2 + 1, x**3 - 2 * x**2 + x, 3 * x**2 - 2 * x**3, x**3 - x**2)
-    )
-    change = np.hstack((6 * x**2 - 6 * x, 3 * x**2 - 4 * x + 1, 6 * x - 6 * x**2, 3 * x**2 - 2 * x))
-    corners = np.stack((knots[:-1], slope[:-1], knots[1:], slope[1:]), axis=1)  # (K, 4, n)
-    shape = (-1, knots.shape[1])
-    return (basis @ corners).reshape(shape), (change @ corners).reshape(shape) / knot_s

@@ -14,7 +14,13 @@ from mplearn_envs.simulation import Feedback, Simulation
 
 PUSH_S = 0.1
 RECOVERY_S = 2.5
-DIRECTIONS = {"forward": (1.0, 0.0), "backward": (-1.0, 0.0), "left": (0.0, 1.0)}
+DIRECTIONS = {
+    "forward": (1.0, 0.0),
+    "backward": (-1.0, 0.0),
+    "left": (0.0, 1.0),
+    "right": (0.0, -1.0),
+    "forward left": (0.7071, 0.7071),
+}
 _SQUAT_M = 0.15
 _LARGEST_NS = 80.0
 

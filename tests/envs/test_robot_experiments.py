@@ -1,0 +1,40 @@
+"""The experiments with the robot: what they vary, what they count."""
+
+import numpy as np
+from standing_library import standing_library
+
+from mplearn_envs.experiments import push_table, random_walks, speed_table, walk_table
+from mplearn_envs.experiments.model_error import disturb
+from mplearn_envs.robot import humanoid
+from mplearn_envs.simulation import Simulation
+
+
+def test_random_walks_count_what_happened():
+    library = standing_library()
+    walks = random_walks(library, seeds=(1,), n_primitives=5, speeds=(1.0,))
+    assert [walk.lifting for walk in walks] == [False, True]
+    assert all(len(walk.steps) == 5 and not walk.fell for walk in walks)
+    assert not {"kick", "retract"} & {step[0] for step in walks[0].steps}
+    again = random_walks(library, seeds=(1,), n_primitives=5, speeds=(1.0,))
+    assert [walk.steps for walk in again] == [walk.steps for walk in walks]
+    table = walk_table(walks)
+    assert [row[4] for row in table.rows] == ["0", "0"]
+    performed = speed_table(library, speeds=(0.5,)).rows[0][1:4]
+    assert sum(float(cell.split()[0]) for cell in performed) > 99.0
+
+
+def test_the_model_error_is_what_was_asked_for():
+    exact, wrong = Simulation(humanoid()).model, Simulation(humanoid()).model
+    disturb(wrong, 0.1, np.random.default_rng(0))
+    for name in ("body_mass", "actuator_gainprm", "geom_friction"):
+        before, after = getattr(exact, name), getattr(wrong, name)
+        share = after[before > 0] / before[before > 0] - 1.0
+        assert 0.0 < np.abs(share).max() <= 0.1
+    assert wrong.actuator_biasprm[0, 1] == -wrong.actuator_gainprm[0, 0]
+
+
+def test_pushes_are_survived_up_to_a_limit():
+    (row, _) = push_table(feedback=("never",), resolution_ns=8.0).rows
+    impulses = [float(cell) for cell in row[2:]]
+    assert all(5.0 < impulse < 60.0 for impulse in impulses)
+    assert abs(impulses[2] - impulses[3]) < 1e-9  # left and right
