@@ -35,7 +35,7 @@ class IdentityConfig:
         people_differ: How much people differ, as a share of each distance.
         given_s: Motion that the assumed variation with posture is worth [s].
         loyalty: By how much somebody else must fit better than who was there [nat a distance].
-        inertia: By how much a change must explain better than none [nat a distance].
+        caution: By how much somebody known must fit better than somebody new [nat a distance].
         slips: Share of a known person's distances that may differ as people do: markers slip, or
             are attached anew.
         glide_m_s: How fast skin and straps let distances change [m/s]; another body's jump.
@@ -50,7 +50,7 @@ class IdentityConfig:
     people_differ: float = 0.04
     given_s: float = 5.0
     loyalty: float = 0.25
-    inertia: float = 0.5
+    caution: float = 0.4
     slips: float = 0.03
     glide_m_s: float = 0.15
 
@@ -145,8 +145,9 @@ class BodyIdentity:
         mean = _mean(seen)
         scores = self._scores(mean)
         if self.person >= 0:
-            same = self._unchanged(seen) + self.config.inertia
-            scores[self.person] = max(scores[self.person] + self.config.loyalty, same)
+            own = max(scores[self.person], self._unchanged(seen))
+            scores[self.person] = own + self.config.loyalty
+        scores[-1] += self.config.caution
         if self.n_people >= self.config.max_people:
             scores = scores[: self.n_people]
         return int(scores.argmax())
@@ -174,8 +175,8 @@ class BodyIdentity:
         noise = self._spread * (1.0 / len(seen) + 0.5 * self._quick) + NOISE**2
         glide = self._steps + (self.config.glide_m_s / self.rate_hz) ** 2
         return max(
-            self._fit(_mean(seen), self._near, noise, 0.2),
-            self._fit(seen[0], self._last, glide, 0.2),
+            self._fit(_mean(seen), self._near, noise, self.config.slips),
+            self._fit(seen[0], self._last, glide, self.config.slips),
         )
 
     def _remember(self, seen: FloatArray) -> bool:
