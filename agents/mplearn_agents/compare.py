@@ -56,7 +56,7 @@ class Comparison:
     seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
     episodes: int = 100
     simulated_episodes: int = 10
-    steps: int = 20_000
+    steps: int = 40_000
     library: str | None = None
 
     def __post_init__(self) -> None:

@@ -78,7 +78,7 @@ class GraphWorld(gymnasium.Env):
         mask, prior = np.zeros(n, np.int8), np.zeros(n)
         mask[[0, *self.edges[self.at]]] = 1
         prior[self.edges[self.at]] = 1.0 / len(self.edges[self.at])
-        return {"action_mask": mask, "transition_prior": prior, "primitive": self.at or None}
+        return {"action_mask": mask, "transition_prior": prior, "primitive": self.at or -1}
 
 
 def two_ways():

@@ -200,7 +200,7 @@ def test_imitation_draws_from_the_longer_history():
     policy = Imitation(graph, slots, seed=1)
     counts = np.zeros((4, 4))
     at, before = 2, None
-    policy.act(None, make_info([0, 0, 1, 0]) | {"primitive": None})
+    policy.act(None, make_info([0, 0, 1, 0]) | {"primitive": -1})
     for _ in range(400):
         weights = [0, 0, 1, 1] if at == 1 else [0, 1, 0, 0]
         action = policy.act(None, make_info(weights) | {"primitive": at})
@@ -211,7 +211,7 @@ def test_imitation_draws_from_the_longer_history():
     assert wanted > 0.8
     assert counts[2, 3] / counts[2].sum() == pytest.approx(wanted, abs=0.1)
     assert counts[3, 2] / counts[3].sum() == pytest.approx(wanted, abs=0.1)
-    policy.act(None, make_info([0, 0, 1, 1]) | {"primitive": None})  # a new episode: by the prior
+    policy.act(None, make_info([0, 0, 1, 1]) | {"primitive": -1})  # a new episode: by the prior
 
 
 def test_mirroring_weighs_what_is_predicted_by_the_time_left():

@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--simulated-episodes", type=int, default=10, help="simulated episodes a seed"
     )
-    parser.add_argument("--steps", type=int, default=20_000, help="macro steps of a training")
+    parser.add_argument("--steps", type=int, default=40_000, help="macro steps of a training")
 
 
 def run(args: argparse.Namespace) -> None:

@@ -63,7 +63,7 @@ class Imitation(Policy):
 
     def act(self, observation: Any, info: Mapping[str, Any]) -> int:
         """Return an action drawn from the forecast."""
-        if info["primitive"] is None:
+        if info["primitive"] < 0:  # at the start, and after a dead end
             self._history = []
         weights = np.zeros(legal_actions(info).size)
         if self._history:

@@ -40,7 +40,7 @@ class TrainingConfig:
 
     task: str = "goal"
     algorithm: AlgorithmName = "maskable-ppo"
-    steps: int = 30_000
+    steps: int = 40_000
     seed: int = 0
     dynamics: str = "kinematic"
     library: str | None = None
