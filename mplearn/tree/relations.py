@@ -24,7 +24,7 @@ from .spread import ChannelSpread
 from .tree import PrimitiveTree
 
 MOVES = 0.3  # a part that varies less than this share of its usual standard deviation is at rest
-NEAR = 1.5  # radii; related motions are no executions of one motion
+NEAR = 1.0  # radii
 
 
 class Relation(NamedTuple):
