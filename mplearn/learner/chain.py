@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import astuple, dataclass
 from typing import Any
 
 from ..graph import TransitionGraph
 from ..recording import Segment
-from ..tree import Placement
+from ..tree import ROOT, Change, Placement
 from .events import Anomaly, Event, TransitionSeen
 
 REMEMBERED = 2048  # segments; older ones cannot be counted again
@@ -83,30 +83,41 @@ class Chain:
         if known is not None and not placement.born:
             events += self._surprised(surprise)
             events += self._count(len(self._links) - 1)
-        self._revise(placement)
-        if placement.born:
-            for id in placement.born:
-                self.graph.add_node(id)
-            for i in range(1, len(self._links)):
-                pair = {self._links[i - 1].primitive, self._links[i].primitive}
-                if pair & set(placement.born):
-                    events += self._count(i)
-        del self._links[:-REMEMBERED]
-        return events
-
-    def _revise(self, placement: Placement) -> None:
-        """Follow the tree where earlier segments turned out to be something else."""
-        for merge in placement.merges:
-            self.graph.merge_nodes(merge.kept, merge.absorbed)
-            self._rename({merge.absorbed}, merge.kept)
-        for split in placement.splits:
-            self.graph.remove_node(split.node)
-            self._rename({split.node}, None)
         moved = dict(placement.moved)
         if placement.number not in moved and placement.node_id in placement.born:
             moved[placement.number] = placement.node_id
+        events += self._revise(placement, moved)
+        del self._links[:-REMEMBERED]
+        return events
+
+    def revise(self, change: Change) -> list[Event]:
+        """Follow a change of the tree that a person asked for, and count what is known by it."""
+        for id in change.removed:
+            if id in self.graph:
+                self.graph.remove_node(id)
+            self._rename({id}, None)
+        return self._revise(change, dict(change.moved))
+
+    def _revise(self, change: Placement | Change, moved: Mapping[int, int]) -> list[Event]:
+        """Follow the tree where earlier segments turned out to be something else."""
+        for merge in change.merges:
+            self.graph.merge_nodes(merge.kept, merge.absorbed)
+            self._rename({merge.absorbed}, merge.kept)
+        for split in change.splits:
+            self.graph.remove_node(split.node)
+            self._rename({split.node}, None)
         for link in self._links:
             link.primitive = moved.get(link.number, link.primitive)
+            if link.primitive == ROOT:
+                link.primitive = None
+        for id in change.born:
+            self.graph.add_node(id)
+        events: list[Event] = []
+        for i in range(1, len(self._links)) if change.born else ():
+            pair = {self._links[i - 1].primitive, self._links[i].primitive}
+            if pair & set(change.born):
+                events += self._count(i)
+        return events
 
     def _rename(self, ids: Collection[int], to: int | None) -> None:
         for link in self._links:

@@ -5,7 +5,7 @@ frame of markers -> gap tracking -> inverse kinematics -> segmentation -> tree -
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
 from typing import Any
@@ -19,7 +19,7 @@ from ..library import PrimitiveLibrary
 from ..people import PeopleConfig, PeopleTree
 from ..recording import FloatArray, Recording, Segment, are_markers
 from ..segmentation import make_segmenter
-from ..tree import FormConfig, TreeConfig
+from ..tree import Change, FormConfig, TreeConfig
 from .buffer import FrameBuffer
 from .chain import Chain
 from .config import LearnerConfig
@@ -148,6 +148,28 @@ class MotionLearner:
         events += self._cut()
         self._clock_s = None
         return events
+
+    # ---- learning by hand
+
+    def split(self, id: int, groups: Sequence[Sequence[int]] | None = None) -> Change:
+        """Split a primitive as a person sees fit; see `PeopleTree.split`."""
+        return self._edited(self.tree.split(id, groups))
+
+    def merge(self, first: int, second: int) -> Change:
+        """Merge two primitives as a person sees fit; see `PeopleTree.merge`."""
+        return self._edited(self.tree.merge(first, second))
+
+    def reparent(self, id: int, parent: int) -> Change:
+        """Hang a node of the tree below another; see `PeopleTree.reparent`."""
+        return self._edited(self.tree.reparent(id, parent))
+
+    def remove(self, id: int, *, forget: bool = False) -> Change:
+        """Take a primitive out; see `PeopleTree.remove`."""
+        return self._edited(self.tree.remove(id, forget=forget))
+
+    def _edited(self, change: Change) -> Change:
+        self._chain.revise(change)
+        return change
 
     # ---- what was learned
 
@@ -291,6 +313,10 @@ class MotionLearner:
             segment = replace(segment, still=True)
             self._chain.paused(segment)
             return [SegmentClosed(segment)]
+        return self._place(segment, frames)
+
+    def _place(self, segment: Segment, frames: FloatArray) -> list[Event]:
+        """Learn from a segment in which something moves, as it is seen, shape (L, V)."""
         known = len(self.tree.leaves)
         placement = self.tree.insert(frames, self.person)
         events: list[Event] = [SegmentClosed(segment, placement)]

@@ -8,7 +8,7 @@ from typing import Any
 from ..errors import InvalidValueError, UnknownPrimitiveError
 from ..hmm import LeftRightHMM
 from ..recording import FloatArray
-from ..tree import ROOT, Node, Placement, PrimitiveTree, Recogniser, TreeConfig
+from ..tree import ROOT, Change, Node, Placement, PrimitiveTree, Recogniser, TreeConfig
 from .common import common_model, common_recogniser
 from .config import PeopleConfig
 from .sharing import Sharing
@@ -159,6 +159,74 @@ class PeopleTree:
             self._next_id = max((self._next_id, *(id + 1 for id in placement.born)))
             return placement
         return self._sharing.follow(person, placement, frames)
+
+    # ---- learning by hand
+
+    def split(self, id: int, groups: Sequence[Sequence[int]] | None = None) -> Change:
+        """Split a primitive of one person, as `PrimitiveTree.split` does.
+
+        Raises:
+            UnknownPrimitiveError: There is no such primitive.
+            InvalidValueError: The groups are wrong, or several people share the primitive.
+        """
+        person, leaf = self._own(id)
+        return self._edited(person, self._trees[person].split(leaf, groups))
+
+    def merge(self, first: int, second: int) -> Change:
+        """Merge two primitives of one person into the older one, as `PrimitiveTree.merge` does.
+
+        Raises:
+            UnknownPrimitiveError: There is no such primitive.
+            InvalidValueError: They are the same, or several people share them.
+        """
+        person, leaf = self._own(first)
+        other, second_leaf = self._own(second)
+        if person != other:
+            raise InvalidValueError(
+                f"primitive {first} is person {person}'s and {second} is person {other}'s: what "
+                "different people do is joined by its likeness only"
+            )
+        return self._edited(person, self._trees[person].merge(leaf, second_leaf))
+
+    def reparent(self, id: int, parent: int) -> Change:
+        """Hang a node below the root or another inner node.
+
+        Raises:
+            UnknownPrimitiveError: There is no such node.
+            InvalidValueError: The parent is no inner node, or there are several people, whose
+                primitives hang from the root.
+        """
+        if self._sharing is not None:
+            raise InvalidValueError("nodes are hung by hand only while there is one person")
+        return self._only.reparent(id, parent)
+
+    def remove(self, id: int, *, forget: bool = False) -> Change:
+        """Take a primitive of one person out, as `PrimitiveTree.remove` does.
+
+        Raises:
+            UnknownPrimitiveError: There is no such primitive.
+            InvalidValueError: Several people share it.
+        """
+        person, leaf = self._own(id)
+        return self._edited(person, self._trees[person].remove(leaf, forget=forget))
+
+    def _own(self, id: int) -> tuple[int, int]:
+        """Return the person whose a primitive is, and its leaf."""
+        if self._sharing is None:
+            return next(iter(self._trees)), id
+        leaves = self._leaves_of(id)
+        if len(leaves) > 1:
+            raise InvalidValueError(
+                f"primitive {id} is shared by {len(leaves)} leaves; one person's alone can be "
+                "changed by hand"
+            )
+        return leaves[0]
+
+    def _edited(self, person: int, change: Change) -> Change:
+        if self._sharing is not None:
+            return self._sharing.edited(person, change)
+        self._next_id = max((self._next_id, *(id + 1 for id in change.born)))
+        return change
 
     # ---- keeping
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..recording import FloatArray, IntArray
-from ..tree import ROOT, Merge, Node, Placement, PrimitiveTree, Split, TreeConfig
+from ..tree import ROOT, Change, Merge, Node, Placement, PrimitiveTree, Split, TreeConfig
 from .config import PeopleConfig
 from .links import corrected, solve, tension
 from .shapes import Shape, distances, shape_of
@@ -170,6 +170,18 @@ class Sharing:
             tuple(move for move in moved if move[0] != number),
         )
 
+    def edited(self, person: int, change: Change) -> Change:
+        """Take note of a change by hand in a person's tree; return what it means for all."""
+        before = {(leaf.person, leaf.local): leaf.primitive for leaf in self.leaves}
+        told = Placement(-1, ROOT, False, np.inf, np.inf, **change._asdict())
+        self._take_up(person, self._trees[person], told)
+        if not self.leaves:
+            return Change(removed=tuple(sorted(set(before.values()))))
+        born, splits, merges, moved = self._solve(before, person, told)
+        gone = set(before.values()) - {leaf.primitive for leaf in self.leaves}
+        gone -= {merge.absorbed for merge in merges} | {split.node for split in splits}
+        return Change(born, splits, merges, moved, removed=tuple(sorted(gone)))
+
     def _nearest(self, person: int, shape: Shape) -> tuple[int, float]:
         """Return the primitive that a segment joins, or `ROOT`; and how far out it lies."""
         if not np.isfinite(self._unit):
@@ -208,7 +220,7 @@ class Sharing:
         """Find again which leaves are one primitive, and say what changed by it."""
         groups, offsets, self._unit = self._solved()
         self._offsets = dict(zip(self._trees, offsets, strict=True))
-        held = self._held(groups, before)
+        held = self._held(groups, before, person, placement)
         ids = _identities(held)
         born, merges, splits = [], [], []
         for group in dict.fromkeys(groups.tolist()):
@@ -247,7 +259,11 @@ class Sharing:
         return tuple(born), tuple(splits), tuple(merges), tuple(moved)
 
     def _held(
-        self, groups: IntArray, before: Mapping[tuple[int, int], int]
+        self,
+        groups: IntArray,
+        before: Mapping[tuple[int, int], int],
+        person: int,
+        placement: Placement,
     ) -> dict[int, Counter[int]]:
         """Return how many executions of each old primitive are in each group of leaves.
 
@@ -268,6 +284,11 @@ class Sharing:
                 joined = self._joined.get(self._numbers[leaf.person][n])
                 if joined is not None:
                     counts[joined] += 1
+        for merge in placement.merges:  # what was absorbed counts where it went
+            lost = before.get((person, merge.absorbed))
+            for leaf, group in zip(self.leaves, groups.tolist(), strict=True):
+                if lost is not None and (leaf.person, leaf.local) == (person, merge.kept):
+                    held[group][lost] += 1
         for old, group in founders.items():
             held[group][old] += sum(counts[old] for counts in held.values())
         return held
@@ -377,13 +398,15 @@ class Sharing:
 
     def _tidy(self, person: int, tree: PrimitiveTree) -> None:
         """Forget the numbers of segments that the tree has forgotten."""
+        if tree.n_seen % TIDY:
+            return
         numbers = self._numbers[person]
         held = {n for node in tree.nodes for n in node.members}
-        if len(numbers) > 2 * len(held) + 100:
-            for n in numbers.keys() - held:
-                self._joined.pop(numbers.pop(n), None)
+        for n in numbers.keys() - held:
+            self._joined.pop(numbers.pop(n), None)
 
 
+TIDY = 32  # segments after which those are forgotten that the tree has forgotten
 _IDS = ("person", "local", "id", "primitive", "founded")
 _NONE: tuple[tuple[()], tuple[()], tuple[()], tuple[()]] = ((), (), (), ())
 

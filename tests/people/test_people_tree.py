@@ -8,6 +8,7 @@ import pytest
 
 from mplearn.errors import InvalidValueError, UnknownPrimitiveError
 from mplearn.people import PeopleConfig, PeopleTree
+from mplearn.people.sharing import TIDY
 from mplearn.tree import ROOT, PrimitiveTree, TreeConfig
 
 D, N_MOTIONS = 6, 5
@@ -151,13 +152,12 @@ def test_one_recogniser_knows_everybody():
 def test_memory_does_not_grow_with_the_stream():
     teacher = Teacher(2)
     tree = PeopleTree(replace(QUICK, max_unplaced=40), D, 100.0, people=RULES)
-    sizes = []
-    for i in range(300):
+    most = 40 + N_MOTIONS * QUICK.max_exemplars + TIDY  # waiting, kept, and not yet forgotten
+    for i in range(320):
         tree.insert(teacher(i % 2, int(teacher.rng.integers(N_MOTIONS))), i % 2)
-        if i in (149, 299):
-            sizes.append(len(repr(tree.state()["sharing"]["numbers"])))
-    assert sizes[1] < 1.5 * sizes[0]
-    assert all(len(numbers) < 300 for numbers in tree._sharing._numbers.values())
+    kept = tree.state()["sharing"]
+    assert all(len(numbers) <= most < 160 for _, numbers in kept["numbers"])
+    assert len(kept["joined"]) <= most
 
 
 def test_what_is_unknown_is_named():
@@ -168,3 +168,26 @@ def test_what_is_unknown_is_named():
         tree.exemplars(999)
     with pytest.raises(InvalidValueError, match="person 7"):
         tree.of(7)
+
+
+def test_a_person_can_split_merge_and_remove_what_is_ones_own():
+    teacher = Teacher(2)
+    tree = PeopleTree(QUICK, D, 100.0, people=RULES)
+    for i in range(60):  # the second person does two motions that the first one never does
+        person = i % 2
+        motion = int(teacher.rng.integers(3)) if person == 0 else int(teacher.rng.integers(3, 5))
+        tree.insert(teacher(person, motion), person)
+    mine = [id for id in tree.leaves if tree._own(id)[0] == 1]
+    theirs = [id for id in tree.leaves if tree._own(id)[0] == 0]
+    change = tree.merge(*mine)
+    kept, absorbed = change.merges[0]
+    assert {kept, absorbed} == set(mine)
+    assert set(tree.leaves) == {*theirs, kept}
+    change = tree.split(kept)
+    assert change.splits[0].node == kept
+    assert set(change.born) == set(change.splits[0].into)
+    gone = change.born[0]
+    assert tree.remove(gone).removed == (gone,)
+    assert gone not in tree.leaves
+    with pytest.raises(InvalidValueError, match="person"):
+        tree.merge(theirs[0], change.born[1])
