@@ -8,7 +8,17 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 from rich.console import Console
 from rich.table import Table
 
-from . import chain, environment, generation, graph, hmm, inverse_kinematics, segmentation, tree
+from . import (
+    chain,
+    environment,
+    generation,
+    graph,
+    hmm,
+    inverse_kinematics,
+    performing,
+    segmentation,
+    tree,
+)
 
 
 def main() -> None:
@@ -21,6 +31,7 @@ def main() -> None:
         ("The tree", tree),
         ("The graph", graph),
         ("Generation", generation),
+        ("Planning and performing", performing),
         ("The environment", environment),
     ):
         table = Table("what", "took", "against", "ratio", title=title, title_justify="left")

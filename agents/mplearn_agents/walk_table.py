@@ -55,8 +55,8 @@ def walk_table(
         f"Random walks of {steps} primitives, performed by the robot",
         COLUMNS,
         tuple(rows),
-        "By the transition prior, at half the human's speed, in simulation. Primitives that lift a "
-        "foot, or exceed what the robot can do, are masked.",
+        "By the transition prior, at half the human's speed, in simulation. Primitives that exceed "
+        "what the robot can do are masked.",
     )
 
 

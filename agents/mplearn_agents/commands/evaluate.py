@@ -1,27 +1,27 @@
-"""``mplearn evaluate``: the paper's experiments, as tables."""
+"""``mplearn evaluate``: the paper's experiments, and those beyond, as tables."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+from mplearn.errors import InvalidValueError
 
-    from mplearn.evaluation import Table
+from ..evaluations import BUILT_IN, Setting, evaluations_for
 
 HELP = "Measure segmentation, learning and performing, on synthetic sessions or on recordings."
-_SYNTHETIC = "paper-session"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument(
         "data",
-        help=f"{_SYNTHETIC!r}, or a recording or folder whose labels are repetitions of movements",
+        help=f"{' or '.join(repr(name) for name in BUILT_IN)}; a recording or folder whose labels "
+        "are repetitions of movements; or one whose labels are activities",
     )
     parser.add_argument("--out", type=Path, help="folder to write the tables to, as Markdown")
+    parser.add_argument("--only", nargs="+", metavar="NAME", help="run these experiments only")
+    parser.add_argument("--list", action="store_true", help="name the experiments, run none")
     parser.add_argument(
         "--orders", type=int, default=5, help="orders of presentation a person (default: 5)"
     )
@@ -30,7 +30,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         nargs="+",
         default=[101, 102, 103],
-        help=f"seeds of {_SYNTHETIC} and of the walks (default: 101 102 103)",
+        help="seeds of synthetic sessions and of walks (default: 101 102 103)",
+    )
+    parser.add_argument(
+        "--wrong",
+        type=Path,
+        help="takes of the movements performed wrongly on purpose (default: DATA_incorrect)",
     )
 
 
@@ -40,45 +45,34 @@ def run(args: argparse.Namespace) -> None:
     from rich.table import Table as Shown
 
     console = Console()
-    written = []
-    for table in _tables(args):
-        shown = Shown(*table.columns, title=table.title, caption=table.note, caption_justify="left")
-        for row in table.rows:
-            shown.add_row(*row)
-        console.print(shown)
-        written.append(table.to_markdown())
-    if args.out is not None:
-        args.out.mkdir(parents=True, exist_ok=True)
-        file = args.out / f"{Path(args.data).name}.md"
-        file.write_text("\n".join(written), encoding="utf-8")
-        console.print(f"written to {file}")
-
-
-def _tables(args: argparse.Namespace) -> Iterator[Table]:
-    from mplearn.evaluation.experiments import (
-        boundary_table,
-        learn_paper_sessions,
-        learn_people,
-        learning_table,
-    )
-    from mplearn_agents.walk_table import walk_table
-
-    if args.data == _SYNTHETIC:
-        outcomes = list(learn_paper_sessions(args.seeds))
-        yield learning_table("Sessions like the paper's, of the synthetic demonstrator", outcomes)
-        yield walk_table([(name, each.learner.snapshot()) for name, each in outcomes], args.seeds)
+    found = evaluations_for(args.data)
+    if args.list:
+        for name, evaluation in found.items():
+            console.print(f"{name}: {evaluation.__doc__}")
         return
-    from mplearn.learner import LearnerConfig, MotionLearner
-    from mplearn.mocap import open_recordings
+    names = list(found) if args.only is None else args.only
+    unknown = [name for name in names if name not in found]
+    if unknown:
+        raise InvalidValueError(f"experiments on {args.data} are {list(found)}, not {unknown}")
+    setting = Setting(args.data, tuple(args.seeds), args.orders, _wrong(args))
+    written: list[str] = []
+    for name in names:
+        for table in found[name](setting):
+            shown = Shown(
+                *table.columns, title=table.title, caption=table.note, caption_justify="left"
+            )
+            for row in table.rows:
+                shown.add_row(*row)
+            console.print(shown)
+            written.append(table.to_markdown())
+            if args.out is not None:  # after each: a long run that is stopped leaves what it has
+                args.out.mkdir(parents=True, exist_ok=True)
+                file = args.out / f"{Path(args.data).name}.md"
+                file.write_text("\n".join(written), encoding="utf-8")
+    if args.out is not None:
+        console.print(f"written to {args.out / Path(args.data).name}.md")
 
-    takes = open_recordings(args.data)
-    yield boundary_table(takes)
-    outcomes = list(learn_people(takes, args.orders))
-    yield learning_table("Sessions made of each person's takes", outcomes)
-    learner = MotionLearner(LearnerConfig(takes[0].channels, takes[0].rate_hz))
-    for take in takes:
-        for _ in learner.learn_recording(take):
-            pass
-    walked = [("all takes", learner.snapshot())]
-    walked += [(name, each.learner.snapshot()) for name, each in outcomes[:: args.orders]]
-    yield walk_table(walked, args.seeds)
+
+def _wrong(args: argparse.Namespace) -> Path | None:
+    beside = Path(f"{args.data.rstrip('/')}_incorrect")
+    return args.wrong or (beside if beside.is_dir() else None)

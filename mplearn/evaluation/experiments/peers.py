@@ -55,10 +55,10 @@ def peers_table(seed: int = 101) -> Table:
         tuple(rows),
         "Both are given the same features of the same stream. Primitives are learned on-line, "
         "frame by frame: segmentation, tree and graph; what the learner holds at the end is its "
-        "memory. The posture graph [Yamane2009] is built off-line from the positions and velocities "
-        "of key points, which it must all hold. Its nodes are the leaves, its graph's memory that "
-        "of tree, means and transitions. The smallest node holds 32 frames: the paper does not give "
-        "its value, and this one leads to about its number of nodes.",
+        "memory. The posture graph [Yamane2009] is built off-line from the positions and "
+        "velocities of key points, which it must all hold. Its nodes are the leaves, its graph's "
+        "memory that of tree, means and transitions. The smallest node holds 32 frames: the paper "
+        "does not give its value, and this one leads to about its number of nodes.",
     )
 
 

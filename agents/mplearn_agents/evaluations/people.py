@@ -1,0 +1,131 @@
+"""Experiments on people's takes, each of which repeats one movement, with labelled repetitions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from mplearn.errors import InvalidValueError
+
+from .setting import Setting
+
+if TYPE_CHECKING:
+    from mplearn.evaluation import Table
+
+
+def boundaries(setting: Setting) -> Iterator[Table]:
+    """Boundaries between repetitions, in the takes as they are."""
+    from mplearn.evaluation.experiments import boundary_table
+
+    yield boundary_table(setting.takes)
+
+
+def learning(setting: Setting) -> Iterator[Table]:
+    """First presentation, one person at a time."""
+    from mplearn.evaluation.experiments import learning_table
+
+    yield learning_table("Sessions made of each person's takes", setting.people_outcomes)
+
+
+def presentations(setting: Setting) -> Iterator[Table]:
+    """Presented once, twice, by halves and all at once."""
+    import numpy as np
+
+    from mplearn.evaluation import make_session
+    from mplearn.evaluation.experiments import Seen, by_person, presentation_table
+
+    yield presentation_table(
+        (person or "unnamed", Seen.of(make_session(own, np.random.default_rng(order))))
+        for person, own in by_person(setting.takes).items()
+        for order in range(setting.orders)
+    )
+
+
+def together(setting: Setting) -> Iterator[Table]:
+    """All people in one stream, the person unknown: block-wise and interleaved."""
+    from mplearn.evaluation.experiments import learn_together, people_table
+
+    if len({take.person for take in setting.takes}) > 1:
+        yield people_table(list(learn_together(setting.takes, setting.orders)))
+
+
+def prediction(setting: Setting) -> Iterator[Table]:
+    """What comes next, against perfect labels: each repetition once, then four times."""
+    from mplearn.evaluation.experiments import foretell_people, prediction_table
+
+    for executions in (1, 4):
+        yield prediction_table(
+            f"The next primitive, in sessions made of each person's takes ({executions} executions "
+            "of each repetition)",
+            foretell_people(setting.takes, min(setting.orders, 2), executions),
+        )
+
+
+def anomaly(setting: Setting) -> Iterator[Table]:
+    """Planted wrong motions and orders, and motions performed wrongly on purpose."""
+    from mplearn.evaluation.experiments import anomaly_table, judge_people
+
+    yield anomaly_table(judge_people(setting.takes, setting.wrong_takes))
+
+
+def scaffolding(setting: Setting) -> Iterator[Table]:
+    """Boundaries with and without what is known."""
+    from mplearn.evaluation.experiments import scaffolding_table
+
+    yield scaffolding_table(setting.takes)
+
+
+def generation(setting: Setting) -> Iterator[Table]:
+    """Generated motions against repetitions kept back."""
+    from mplearn.evaluation.experiments import generation_table
+
+    yield generation_table(setting.takes)
+
+
+def chains(setting: Setting) -> Iterator[Table]:
+    """Factorial models against longer chains."""
+    from mplearn.evaluation.experiments import factorial_table
+
+    yield factorial_table(setting.takes)
+
+
+def inverse_kinematics(setting: Setting) -> Iterator[Table]:
+    """Distance of the body's markers from the measured ones."""
+    from mplearn.evaluation.experiments import marker_residual_table
+
+    yield marker_residual_table(setting.takes)
+
+
+def walks(setting: Setting) -> Iterator[Table]:
+    """The robot walks at random on what was learned."""
+    from mplearn.learner import LearnerConfig, MotionLearner
+
+    from ..walk_table import walk_table
+
+    takes = setting.takes
+    if not takes:
+        raise InvalidValueError(f"{setting.data} holds no takes")
+    learner = MotionLearner(LearnerConfig(takes[0].channels, takes[0].rate_hz))
+    for take in takes:
+        for _ in learner.learn_recording(take):
+            pass
+    walked = [("all takes", learner.snapshot())]
+    walked += [
+        (name, each.learner.snapshot()) for name, each in setting.people_outcomes[:: setting.orders]
+    ]
+    yield walk_table(walked, setting.seeds)
+
+
+EVALUATIONS = {
+    "boundaries": boundaries,
+    "learning": learning,
+    "presentations": presentations,
+    "together": together,
+    "prediction": prediction,
+    "anomaly": anomaly,
+    "generation": generation,
+    "inverse-kinematics": inverse_kinematics,
+    "scaffolding": scaffolding,
+    "chains": chains,
+    "walks": walks,
+}
