@@ -6,8 +6,11 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from . import people, robot, synthetic
+from .activities import EVALUATIONS as ACTIVITIES
+from .people import EVALUATIONS as PEOPLE
+from .robot import EVALUATIONS as ROBOT
 from .setting import Setting
+from .synthetic import EVALUATIONS as SYNTHETIC
 
 if TYPE_CHECKING:
     from mplearn.evaluation import Table
@@ -15,18 +18,11 @@ if TYPE_CHECKING:
 Evaluation: TypeAlias = Callable[[Setting], "Iterator[Table]"]
 
 #: Sources of data that need no file.
-BUILT_IN: Mapping[str, Mapping[str, Evaluation]] = {
-    "paper-session": synthetic.EVALUATIONS,
-    "robot": robot.EVALUATIONS,
-}
+BUILT_IN: Mapping[str, Mapping[str, Evaluation]] = {"paper-session": SYNTHETIC, "robot": ROBOT}
 
 
 def evaluations_for(data: str) -> Mapping[str, Evaluation]:
     """Return the experiments on a source of data, by name, in the order they are run."""
     if data in BUILT_IN:
         return BUILT_IN[data]
-    if any(Path(data).glob("*labels*.json")):
-        from . import activities
-
-        return activities.EVALUATIONS
-    return people.EVALUATIONS
+    return ACTIVITIES if any(Path(data).glob("*labels*.json")) else PEOPLE
