@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
-from ..recording import FloatArray, IntArray
+from ..recording import BoolArray, FloatArray, IntArray
 from .config import PeopleConfig
 from .shapes import Shape, distances
 
@@ -92,34 +93,50 @@ def agglomerate(matrix: FloatArray, people: IntArray, config: PeopleConfig) -> I
     Returns:
         The group of each leaf, named by its first one, shape (n,).
     """
+    own = (people[:, None] == people) & (matrix > config.link_own)
+    return np.asarray(_agglomerate(matrix, own, config.link, config.reach))
+
+
+@njit(cache=True)
+def _agglomerate(matrix: FloatArray, barred: BoolArray, link: float, reach: float) -> IntArray:
     n = len(matrix)
     groups = np.arange(n)
-    if n < 2:
-        return groups
-    itself = np.eye(n, dtype=np.bool_)
-    barred = ((people[:, None] == people) & (matrix > config.link_own)) | itself
-    total, sizes = matrix.copy(), np.ones(n)
-    np.fill_diagonal(total, 0.0)
-    mean = np.where(itself, np.inf, matrix)
+    total, sizes, alive = matrix.copy(), np.ones(n), np.ones(n, dtype=np.bool_)
+    barred = barred.copy()
+    mean = matrix.copy()
+    nearest, second = np.empty(n), np.empty(n)
     while True:
-        two = np.partition(mean, 1, axis=1)[:, :2]
-        other = np.where(mean <= two[:, :1], two[:, 1:], two[:, :1])  # nearest but for the partner
-        doubt = tension(mean, np.minimum(other, other.T), config.reach)
-        doubt[barred] = np.inf
-        i, j = sorted(divmod(int(doubt.argmin()), n))
-        if not doubt[i, j] <= config.link:
+        for i in range(n):
+            nearest[i] = second[i] = np.inf
+            for j in range(n):
+                if j != i and alive[i] and alive[j]:
+                    if mean[i, j] < nearest[i]:
+                        nearest[i], second[i] = mean[i, j], nearest[i]
+                    elif mean[i, j] < second[i]:
+                        second[i] = mean[i, j]
+        best, first, other = np.inf, -1, -1
+        for i in range(n):
+            for j in range(i + 1, n):
+                if alive[i] and alive[j] and not barred[i, j]:
+                    d = mean[i, j]
+                    next_i = second[i] if d <= nearest[i] else nearest[i]
+                    next_j = second[j] if d <= nearest[j] else nearest[j]
+                    doubt = d * d / max(min(next_i, next_j, reach), 1e-12)
+                    if doubt < best:
+                        best, first, other = doubt, i, j
+        if first < 0 or not best <= link:
             return groups
-        total[i] += total[j]
-        total[:, i] += total[:, j]
-        sizes[i] += sizes[j]
-        barred[i] |= barred[j]
-        barred[:, i] = barred[i]
-        mean[i] = np.where(np.isinf(mean[j]), np.inf, total[i] / (sizes[i] * sizes))
-        mean[i, i] = np.inf
-        mean[:, i] = mean[i]
-        mean[j] = mean[:, j] = np.inf
-        barred[j] = barred[:, j] = True
-        groups[groups == j] = i
+        sizes[first] += sizes[other]
+        alive[other] = False
+        for k in range(n):
+            total[first, k] += total[other, k]
+            barred[first, k] |= barred[other, k]
+            if groups[k] == other:
+                groups[k] = first
+        for k in range(n):
+            total[k, first] = total[first, k]
+            barred[k, first] = barred[first, k]
+            mean[first, k] = mean[k, first] = total[first, k] / (sizes[first] * sizes[k])
 
 
 def offsets_of(
