@@ -1,5 +1,5 @@
 # The commands of mplearn. `make demo` and `make test` set up what they need.
-.PHONY: demo test setup check format bench evaluate build clean clean-cache
+.PHONY: demo test setup check format bench evaluate compare build clean clean-cache
 .DEFAULT_GOAL := demo
 
 PYTHON ?= python3
@@ -32,13 +32,19 @@ format: setup                       ## format and mend what can be mended
 bench: setup                        ## timings, as ratios against named peers, interleaved in one run
 	$(BIN)/python -m benchmarks
 
-evaluate: setup                     ## the paper's experiments: tables on synthetic and real motion
+evaluate: setup                     ## the paper's experiments and ours: tables on synthetic and real motion, and the robot
 	$(BIN)/mplearn evaluate paper-session --out $(OUT)/evaluate
-	@if [ -d "$(MPLEARN_DATA)/ui_prmd" ]; then \
-	    $(BIN)/mplearn evaluate "$(MPLEARN_DATA)/ui_prmd" --out $(OUT)/evaluate; \
-	else \
-	    echo "no ui_prmd in $(MPLEARN_DATA): the tables on real motion are left out (set MPLEARN_DATA)"; \
-	fi
+	$(BIN)/mplearn evaluate robot --out $(OUT)/evaluate
+	@for data in ui_prmd cmu; do \
+	    if [ -d "$(MPLEARN_DATA)/$$data" ]; then \
+	        $(BIN)/mplearn evaluate "$(MPLEARN_DATA)/$$data" --out $(OUT)/evaluate || exit 1; \
+	    else \
+	        echo "no $$data in $(MPLEARN_DATA): its tables are left out (set MPLEARN_DATA)"; \
+	    fi; \
+	done
+
+compare: setup                      ## train agents, compare all policies on all tasks
+	$(BIN)/mplearn compare --out $(OUT)/compare
 
 build: setup                        ## wheel and sdist, each installed in isolation and smoke-tested
 	rm -rf dist
