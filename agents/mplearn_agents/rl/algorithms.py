@@ -29,7 +29,7 @@ ON_POLICY = {
     "n_epochs": 6,
     "learning_rate": 7e-4,
     "gae_lambda": 0.95,
-    "ent_coef": 0.01,
+    "ent_coef": 0.03,
 }
 OFF_POLICY = {
     "learning_rate": 5e-4,

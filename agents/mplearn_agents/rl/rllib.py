@@ -211,7 +211,7 @@ def algorithm(options: Mapping[str, Any], workers: int = 2, seed: int = 0) -> Al
             train_batch_size_per_learner=2048,
             minibatch_size=256,
             num_epochs=6,
-            entropy_coeff=0.01,
+            entropy_coeff=0.03,
             vf_clip_param=np.inf,
         )
         .debugging(seed=seed, log_level="ERROR")
