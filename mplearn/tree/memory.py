@@ -85,7 +85,7 @@ class SegmentMemory:
 
     def variances(self) -> FloatArray:
         """Return the variance of each channel over all motion, shape (D,)."""
-        return self._spread.variances()
+        return self._spread.own_variances()
 
     def state(self) -> dict[str, Any]:
         """Return everything as plain values and arrays, but for who holds what."""

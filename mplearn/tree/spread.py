@@ -38,6 +38,11 @@ class ChannelSpread:
         self._mean += np.where(count > 0, step * share, 0.0)
         self._count = total
 
+    def own_variances(self) -> FloatArray:
+        """Return each channel's own variance, shape (D,)."""
+        variance = self._squares / np.maximum(self._count, 1)
+        return np.asarray(np.maximum(variance, max(1e-6 * float(variance.max()), 1e-18)))
+
     def variances(self) -> FloatArray:
         """Return the mean variance of each channel's group, shape (D,)."""
         variance = self._squares / np.maximum(self._count, 1)
