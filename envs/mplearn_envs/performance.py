@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
-from mplearn.recording import BoolArray, FloatArray
+from mplearn.recording import FloatArray
 
 from .control.guide import support
 from .control.momentum import ground_reaction, momenta
@@ -85,18 +86,21 @@ def _feet(soles: FloatArray) -> FloatArray:
     return np.concatenate((soles[..., :2].mean(axis=2), yaw[..., None]), axis=-1)
 
 
-def fallen_at(q: FloatArray, wanted: FloatArray) -> BoolArray:
-    """Return whether the base is far from upright, from its height, or not finite, shape (S,).
+@njit(cache=True, nogil=True)
+def has_fallen(q: FloatArray, wanted: FloatArray) -> bool:
+    """Return whether the base is far from upright, from its height, or not finite.
 
     Args:
-        q: Actual postures, shape (S, 7 + n).
-        wanted: Wanted postures, shape (S, 7 + n).
+        q: Actual posture, shape (7 + n,).
+        wanted: Wanted posture, shape (7 + n,).
     """
-    upright = np.sum(_up(q) * _up(wanted), axis=1) > np.cos(FALL_TILT_RAD)
-    return np.asarray(~(upright & (q[:, 2] > wanted[:, 2] - FALL_DROP_M)))
+    up, wanted_up = _up(q), _up(wanted)
+    cosine = up[0] * wanted_up[0] + up[1] * wanted_up[1] + up[2] * wanted_up[2]
+    return not (cosine > np.cos(FALL_TILT_RAD) and q[2] > wanted[2] - FALL_DROP_M)
 
 
-def _up(q: FloatArray) -> FloatArray:
-    """Return the vertical in the base's frame, shape (S, 3)."""
-    w, x, y, z = q[:, 3:7].T
-    return np.stack((2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)), axis=1)
+@njit(cache=True, nogil=True)
+def _up(q: FloatArray) -> tuple[float, float, float]:
+    """Return the vertical in the base's frame."""
+    w, x, y, z = q[3], q[4], q[5], q[6]
+    return 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)

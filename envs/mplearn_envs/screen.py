@@ -51,9 +51,7 @@ class Screen:
         if self._drawer is None:
             from .rendering import Renderer
 
-            self._drawer = Renderer(
-                simulation.model, self.width, self.height, balance=self.balance
-            )
+            self._drawer = Renderer(simulation.model, self.width, self.height, balance=self.balance)
         picture: NDArray[np.uint8] = self._drawer.render(simulation.data)
         return picture
 

@@ -13,26 +13,21 @@ from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray
 
 from .control.gravity import standing_commands
-from .control.guide import Guide
+from .control.guide import make_guide
 from .control.plan import Plan
 from .control.reference import rest_reference, sole_corners
 from .performance import Performance as Performance
-from .performance import assess, fallen_at
+from .performance import assess
 from .robot import Robot
+from .servo_loop import Views, send
 
 Feedback: TypeAlias = Literal["steps", "always", "never"]
 SETTLE_S = 1.0
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
-_PHYSICS = mujoco.mjtState.mjSTATE_FULLPHYSICS
-_INPUTS = int(
-    mujoco.mjtState.mjSTATE_CTRL
-    | mujoco.mjtState.mjSTATE_QFRC_APPLIED
-    | mujoco.mjtState.mjSTATE_XFRC_APPLIED
-)
 
 
 class Simulation:
-    """One robot on a floor.
+    """One robot on a floor. A deep copy shares the model; one that was pickled has its own.
 
     Args:
         robot: The robot.
@@ -54,7 +49,8 @@ class Simulation:
         self.model = mujoco.MjModel.from_xml_string(robot.xml)
         self.data = mujoco.MjData(self.model)
         self._corners = sole_corners(robot)
-        self._feet = [self.model.body(name).id for name in robot.feet]
+        self._feet = np.array([self.model.body(name).id for name in robot.feet])
+        self._views = Views.of(self.data)
 
     @cached_property
     def _settled(self) -> FloatArray:
@@ -94,72 +90,24 @@ class Simulation:
                 take pictures; without it all is simulated in one go, with the same result.
             frame_steps: See there.
         """
-        nq, nv = self.model.nq, self.model.nv
         n_knots = len(plan.q) - 1
         n_steps = len(plan.commands) // n_knots
         at_once = n_knots if on_frame is None else -(-frame_steps // n_steps)
         guided = self.feedback == "always" or (self.feedback == "steps" and plan.steps)
-        guide = Guide(self.robot, plan) if guided else None
-        state = np.empty((n_knots + 1, mujoco.mj_stateSize(self.model, _PHYSICS)))
-        mujoco.mj_getState(self.model, self.data, state[0], _PHYSICS)
+        guide = make_guide(self.robot, plan, guided)
+        addresses = self.model._address, self.data._address
+        q, v = np.empty((n_knots + 1, self.model.nq)), np.empty((n_knots + 1, self.model.nv))
+        q[0], v[0] = self.data.qpos, self.data.qvel
         done, fallen = 0, False
         while done < n_knots and not fallen:
             last = min(done + at_once, n_knots)
-            before = self.state()
-            first = done * n_steps
-            states = self._send(plan.commands[first : last * n_steps], guide, first)
-            state[done + 1 : last + 1] = states[n_steps - 1 :: n_steps]
-            q = state[done + 1 : last + 1, 1 : 1 + nq]
-            down = np.flatnonzero(fallen_at(q, plan.q[done + 1 : last + 1]))
-            if fallen := len(down) > 0:
-                last = done + 1 + int(down[0])
-                mujoco.mj_setState(self.model, self.data, before, _STATE)
-                self._send(plan.commands[first : last * n_steps], guide, first)
-            done = last
+            done, fallen = send(
+                *addresses, self._views, self._feet, plan.commands, guide, plan.q, done, last, q, v
+            )
             self._update_positions()
             if on_frame is not None:
                 on_frame()
-        q, v = state[: done + 1, 1 : 1 + nq], state[: done + 1, 1 + nq : 1 + nq + nv]
-        return assess(self.robot, plan, q, v, fallen)
-
-    def _send(self, commands: FloatArray, guide: Guide | None, first: int) -> FloatArray:
-        """Simulate some steps; return the states after each, shape (N, n_state)."""
-        return self._roll_out(commands) if guide is None else self._step(commands, guide, first)
-
-    def _roll_out(self, commands: FloatArray) -> FloatArray:
-        from mujoco.rollout import rollout
-
-        model, data = self.model, self.data
-        start = np.empty(mujoco.mj_stateSize(model, _PHYSICS))
-        mujoco.mj_getState(model, data, start, _PHYSICS)
-        applied = np.concatenate((data.qfrc_applied, data.xfrc_applied.ravel()))
-        control = np.empty((1, len(commands), model.nu + len(applied)))
-        control[..., : model.nu], control[..., model.nu :] = commands, applied
-        states, _ = rollout(
-            model,
-            data,
-            start,
-            control,
-            control_spec=_INPUTS,
-            initial_warmstart=data.qacc_warmstart.copy(),
-        )
-        return np.asarray(states[0])
-
-    def _step(self, commands: FloatArray, guide: Guide, first: int) -> FloatArray:
-        model, data = self.model, self.data
-        step, measure, control = mujoco.mj_step, mujoco.mj_subtreeVel, data.ctrl
-        cog, velocity, axes = data.subtree_com[1], data.subtree_linvel[1], data.xaxis
-        left, right = self._feet
-        feet = slice(left, right + 1, right - left)  # views, not copies
-        places, turns = data.xpos[feet], data.xmat[feet]
-        states = np.empty((len(commands), mujoco.mj_stateSize(model, _PHYSICS)))
-        for i, command in enumerate(commands):
-            measure(model, data)
-            control[:] = command
-            guide.correct(first + i, control, cog, velocity, places, turns, axes)
-            step(model, data)
-            mujoco.mj_getState(model, data, states[i], _PHYSICS)
-        return states
+        return assess(self.robot, plan, q[: done + 1], v[: done + 1], fallen)
 
     def soles(self) -> FloatArray:
         """Return the lower corners of both soles, shape (2, 4, 3) [m]."""
@@ -178,6 +126,16 @@ class Simulation:
         out = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, data, out, _STATE)
         return out
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Simulation:
+        """Return a copy that shares the model."""
+        copied = object.__new__(Simulation)
+        memo[id(self)] = copied
+        copied.__dict__.update(self.__dict__)
+        copied.data = mujoco.MjData(self.model)
+        copied._views = Views.of(copied.data)
+        copied.load_state(self.state())
+        return copied
 
     def __getstate__(self) -> dict[str, Any]:
         return {"robot": self.robot, "feedback": self.feedback, "state": self.state()}

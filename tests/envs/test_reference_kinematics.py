@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mplearn_envs.control.kinematics import forward, mass_tree, rotate_quaternion, rotation_error
 from mplearn_envs.control.footwork import sole_heights
+from mplearn_envs.control.kinematics import forward, mass_tree, rotate_quaternion, rotation_error
 from mplearn_envs.control.reference import base_rotation, reference_robot
 from mplearn_envs.control.velocity_ik import (
     add_leg_columns,

@@ -1,6 +1,9 @@
 """The simulation: what it does is MuJoCo's, bit for bit, however it is cut up."""
 
+import copy
 import pickle
+import sys
+import threading
 
 import mujoco
 import numpy as np
@@ -9,6 +12,7 @@ from standing_library import BOW, RATE_HZ, sweep
 
 from mplearn_envs.control import Motion, Planner, rest_reference
 from mplearn_envs.control.controller import tracked_columns
+from mplearn_envs.control.guide import correct, make_guide
 from mplearn_envs.robot import humanoid
 from mplearn_envs.simulation import Simulation
 
@@ -74,3 +78,68 @@ def test_applied_forces_go_on_acting(simulation):
     expected = step_by_step(simulation, PLAN.commands)
     simulation.perform(PLAN)
     assert simulation.state().tobytes() == expected.tobytes()
+
+
+def test_guided_steps_are_mujocos_with_the_guides_corrections(simulation):
+    simulation.feedback = "always"
+    model, data = simulation.model, mujoco.MjData(simulation.model)
+    mujoco.mj_setState(model, data, simulation.state(), STATE)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    guide = make_guide(HUMANOID, PLAN)
+    feet = [model.body(name).id for name in HUMANOID.feet]
+    seen = [data.xpos[feet[0]], data.xpos[feet[1]], data.xmat[feet[0]], data.xmat[feet[1]]]
+    changed = 0
+    for step, command in enumerate(PLAN.commands):
+        mujoco.mj_subtreeVel(model, data)
+        data.ctrl[:] = command
+        correct(
+            guide, step, data.ctrl, data.subtree_com[1], data.subtree_linvel[1], *seen, data.xaxis
+        )
+        changed += (data.ctrl != command).any()
+        mujoco.mj_step(model, data)
+    expected = np.empty(mujoco.mj_stateSize(model, STATE))
+    mujoco.mj_getState(model, data, expected, STATE)
+    simulation.perform(PLAN)
+    assert simulation.state().tobytes() == expected.tobytes()
+    assert changed > 0.9 * len(PLAN.commands)
+
+
+@pytest.mark.parametrize("feedback", ["always", "never"])
+def test_other_threads_go_on_meanwhile(simulation, feedback):
+    simulation.feedback = feedback
+    plan = Planner(HUMANOID).hold(rest_reference(HUMANOID), 20.0)
+    simulation.perform(PLAN)  # compiled by now
+    simulation.reset()
+    begun, over = threading.Event(), threading.Event()
+
+    def work():
+        begun.set()
+        assert not simulation.perform(plan).fallen
+        over.set()
+
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1000.0)  # who has Python's lock keeps it until it gives it away
+    try:
+        worker = threading.Thread(target=work)
+        worker.start()
+        begun.wait()
+        went_on = not over.is_set()
+        worker.join()
+    finally:
+        sys.setswitchinterval(interval)
+    assert went_on
+
+
+def test_a_copy_shares_the_model_and_goes_on_bit_for_bit(simulation):
+    simulation.perform(PLAN)
+    copied = copy.deepcopy(simulation)
+    assert copied.model is simulation.model and copied.data is not simulation.data
+    before = simulation.state().tobytes()
+    copied.perform(PLAN)
+    assert simulation.state().tobytes() == before
+    simulation.perform(PLAN)
+    assert copied.state().tobytes() == simulation.state().tobytes()
+    copied.reset()
+    simulation.reset()
+    assert copied.state().tobytes() == simulation.state().tobytes()

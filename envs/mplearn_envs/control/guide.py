@@ -57,72 +57,71 @@ def support(share: FloatArray, feet: FloatArray) -> Support:
     return Support(share, place, np.arctan2(ahead[:, 1], ahead[:, 0]))
 
 
-class Guide:
-    """Corrects the commands of one plan, step by step.
+class Guide(NamedTuple):
+    """What corrects the commands of one plan, step by step.
+
+    Attributes:
+        wanted: DCM seen from the feet (x, y) [m] and the left foot's share of the weight after
+            each command, shape (N, 3); nothing is corrected where there is none.
+        rate: Of the pendulum [1/s].
+        gain: Shift of the zero-moment point per error of the DCM.
+        largest_m: Largest shift [m].
+        ankles: Hinges between shanks and feet, shape (A,).
+        sides: Side of each, 0 left, 1 right, shape (A,).
+        softness: Change of their commands per shift, shape (A,) [rad/m].
+        limits: Limits of their commands, shape (A, 2) [rad].
+    """
+
+    wanted: FloatArray
+    rate: float
+    gain: float
+    largest_m: float
+    ankles: IntArray
+    sides: IntArray
+    softness: FloatArray
+    limits: FloatArray
+
+
+def make_guide(
+    robot: Robot,
+    plan: Plan,
+    corrects: bool = True,
+    gain: float = GAIN,
+    largest_m: float = LARGEST_M,
+) -> Guide:
+    """Return what corrects the commands of a plan.
 
     Args:
         robot: The robot.
         plan: What it performs.
+        corrects: Whether anything shall be corrected at all.
         gain: Shift of the zero-moment point per error of the DCM.
         largest_m: Largest shift [m].
     """
+    ref = reference_robot(robot)
+    hinges, sides = ankles(robot)
+    weight = float(ref.tree.mass.sum()) * GRAVITY
+    return Guide(
+        _wanted(plan) if corrects else np.empty((0, 3)),
+        pendulum_rate(float(plan.cog[:, 2].mean())),
+        gain,
+        largest_m,
+        hinges,
+        sides,
+        weight / robot.per_joint("stiffness")[hinges],
+        robot.position_limits[hinges],
+    )
 
-    def __init__(
-        self, robot: Robot, plan: Plan, gain: float = GAIN, largest_m: float = LARGEST_M
-    ) -> None:
-        ref = reference_robot(robot)
-        share = plan.share
-        seen = support(share, plan.ground)
-        self.rate = pendulum_rate(float(plan.cog[:, 2].mean()))
-        cog = plan.cog[:, :2]
-        dcm = seen.see(cog + np.gradient(cog, plan.knot_s, axis=0) / self.rate)
-        n_knots = len(plan.q) - 1
-        at = np.arange(1.0, len(plan.commands) + 1.0) * (n_knots / len(plan.commands))
-        knots = np.arange(n_knots + 1.0)
-        self.wanted = np.stack([np.interp(at, knots, x) for x in (*dcm.T, share)], axis=1)
-        self.gain, self.largest_m = gain, largest_m
-        self._ankles, self._sides = ankles(robot)
-        weight = float(ref.tree.mass.sum()) * GRAVITY
-        self._softness = weight / robot.per_joint("stiffness")[self._ankles]
-        self._limits = robot.position_limits[self._ankles]
 
-    def correct(
-        self,
-        step: int,
-        command: FloatArray,
-        cog: FloatArray,
-        velocity: FloatArray,
-        feet: FloatArray,
-        turns: FloatArray,
-        axes: FloatArray,
-    ) -> None:
-        """Change the ankles' commands in place.
-
-        Args:
-            step: Which of the plan's commands comes next.
-            command: It, shape (n,) [rad].
-            cog: Measured COG, shape (3,) [m].
-            velocity: Its velocity, shape (3,) [m/s].
-            feet: Positions of the feet, shape (2, 3) [m].
-            turns: Their orientations, rows of matrices, shape (2, 9).
-            axes: Axes of all joints, the free one first, shape (1 + n, 3).
-        """
-        _correct(
-            self.wanted[step],
-            command,
-            cog,
-            velocity,
-            feet,
-            turns,
-            axes,
-            self.rate,
-            self.gain,
-            self.largest_m,
-            self._ankles,
-            self._sides,
-            self._softness,
-            self._limits,
-        )
+def _wanted(plan: Plan) -> FloatArray:
+    """Return DCM [m] and share of the weight that a plan wants after each command, (N, 3)."""
+    cog, rate = plan.cog[:, :2], pendulum_rate(float(plan.cog[:, 2].mean()))
+    seen = support(plan.share, plan.ground)
+    dcm = seen.see(cog + np.gradient(cog, plan.knot_s, axis=0) / rate)
+    n_knots = len(plan.q) - 1
+    at = np.arange(1.0, len(plan.commands) + 1.0) * (n_knots / len(plan.commands))
+    knots = np.arange(n_knots + 1.0)
+    return np.stack([np.interp(at, knots, x) for x in (*dcm.T, plan.share)], axis=1)
 
 
 def ankles(robot: Robot) -> tuple[IntArray, IntArray]:
@@ -135,39 +134,51 @@ def ankles(robot: Robot) -> tuple[IntArray, IntArray]:
     return np.array(hinges, np.int64), np.array(sides, np.int64)
 
 
-@njit(cache=True)
-def _correct(
-    wanted: FloatArray,
+@njit(cache=True, nogil=True)
+def correct(
+    guide: Guide,
+    step: int,
     command: FloatArray,
     cog: FloatArray,
     velocity: FloatArray,
-    feet: FloatArray,
-    turns: FloatArray,
+    left_foot: FloatArray,
+    right_foot: FloatArray,
+    left_turn: FloatArray,
+    right_turn: FloatArray,
     axes: FloatArray,
-    rate: float,
-    gain: float,
-    largest: float,
-    ankles: IntArray,
-    sides: IntArray,
-    softness: FloatArray,
-    limits: FloatArray,
 ) -> None:
+    """Change the ankles' commands in place.
+
+    Args:
+        guide: What is wanted.
+        step: Which of the plan's commands comes next.
+        command: It, shape (n,) [rad].
+        cog: Measured COG, shape (3,) [m].
+        velocity: Its velocity, shape (3,) [m/s].
+        left_foot: Position of the left foot, shape (3,) [m].
+        right_foot: Of the right foot.
+        left_turn: Orientation of the left foot, rows of its matrix, shape (9,).
+        right_turn: Of the right foot.
+        axes: Axes of all joints, the free one first, shape (1 + n, 3).
+    """
+    wanted = guide.wanted[step]
     left = wanted[2]
     right = 1.0 - left
-    c = left * turns[0, 0] + right * turns[1, 0]
-    s = left * turns[0, 3] + right * turns[1, 3]
+    c = left * left_turn[0] + right * right_turn[0]
+    s = left * left_turn[3] + right * right_turn[3]
     length = np.sqrt(c * c + s * s)
     c, s = c / length, s / length
-    x = cog[0] + velocity[0] / rate - left * feet[0, 0] - right * feet[1, 0]
-    y = cog[1] + velocity[1] / rate - left * feet[0, 1] - right * feet[1, 1]
-    x = gain * (x - c * wanted[0] + s * wanted[1])
-    y = gain * (y - s * wanted[0] - c * wanted[1])
+    x = cog[0] + velocity[0] / guide.rate - left * left_foot[0] - right * right_foot[0]
+    y = cog[1] + velocity[1] / guide.rate - left * left_foot[1] - right * right_foot[1]
+    x = guide.gain * (x - c * wanted[0] + s * wanted[1])
+    y = guide.gain * (y - s * wanted[0] - c * wanted[1])
     size = np.sqrt(x * x + y * y)
-    if size > largest:
-        x, y = x * largest / size, y * largest / size
-    for k in range(ankles.shape[0]):
-        j = ankles[k]
+    if size > guide.largest_m:
+        x, y = x * guide.largest_m / size, y * guide.largest_m / size
+    for k in range(guide.ankles.shape[0]):
+        j = guide.ankles[k]
         axis = axes[j + 1]
-        carried = left if sides[k] == 0 else right
-        change = carried * softness[k] * (axis[1] * x - axis[0] * y)
-        command[j] = min(max(command[j] + change, limits[k, 0]), limits[k, 1])
+        carried = left if guide.sides[k] == 0 else right
+        change = carried * guide.softness[k] * (axis[1] * x - axis[0] * y)
+        low, high = guide.limits[k]
+        command[j] = min(max(command[j] + change, low), high)
