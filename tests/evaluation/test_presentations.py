@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mplearn.demonstrator import demonstrate
-from mplearn.evaluation.experiments.activities import find_activities, true_activities
+from mplearn.evaluation.experiments.activities import activities_in, true_activities
 from mplearn.evaluation.experiments.presentations import (
     Seen,
     all_at_once,
@@ -16,7 +16,6 @@ from mplearn.evaluation.experiments.presentations import (
     presentation_table,
     second_presentation,
 )
-from mplearn.evaluation.observing import observe
 from mplearn.evaluation.partitions import agreement
 from mplearn.tree import TreeConfig
 
@@ -66,7 +65,7 @@ def test_activities_are_what_recurs_together():
     names = true_activities(labels, len(demonstration.recording))
     kind = np.where(np.isin(names, ["BAR", "BAL"]), "arms", "bow")
     kind[names == ""] = ""
-    found = find_activities(observe(demonstration.recording))
+    found = activities_in(demonstration.recording)
     known = kind != ""
     result = agreement(kind[known], found[known])
     assert result.nmi > 0.7 and result.n_found == 2

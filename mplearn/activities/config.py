@@ -1,0 +1,45 @@
+"""What is assumed of activities, in seconds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..errors import InvalidValueError
+from ..segmentation.base import check_positive
+
+
+@dataclass(frozen=True)
+class ActivityConfig:
+    """Settings of `find_activities`.
+
+    Attributes:
+        step_s: Postures are averaged over steps of this length [s].
+        apart_s: Nearer in time than this, postures are alike because little time has passed; they
+            are no neighbours [s].
+        reach_s: Within this time an activity comes back to its postures [s].
+        least_s: Shortest stretch of an activity [s].
+        linked_s: Number of neighbours that a posture is linked to, as a time [s].
+        mixed_s: Number of neighbours that say whether two stretches mix, as a time [s].
+        recurrence: Links that a stretch must hold, as a share of those that it would hold if they
+            were spread evenly over `reach_s`.
+        mixing: Two stretches are one activity if neighbours lie in the other one at least at this
+            share of what they would if both were mixed evenly.
+    """
+
+    step_s: float = 0.1
+    apart_s: float = 0.8
+    reach_s: float = 8.0
+    least_s: float = 2.0
+    linked_s: float = 1.0
+    mixed_s: float = 2.0
+    recurrence: float = 0.9
+    mixing: float = 0.5
+
+    def __post_init__(self) -> None:
+        times = ("step_s", "apart_s", "reach_s", "least_s", "linked_s", "mixed_s")
+        check_positive(self, *times, "recurrence", "mixing")
+        if not self.step_s <= self.apart_s < self.reach_s:
+            raise InvalidValueError(
+                f"step_s, apart_s and reach_s must increase, not {self.step_s}, {self.apart_s} and "
+                f"{self.reach_s}"
+            )
