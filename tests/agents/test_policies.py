@@ -214,16 +214,20 @@ def test_imitation_draws_from_the_longer_history():
     policy.act(None, make_info([0, 0, 1, 1]) | {"primitive": -1})  # a new episode: by the prior
 
 
-def test_mirroring_weighs_what_is_predicted_by_the_time_left():
-    n, info = 4, make_info([0, 1, 1, 0], legal=[1, 1, 1, 0])
-    now, then = np.array([0.0, 0.8, 0.2, 0.0]), np.array([0.0, 0.1, 0.3, 0.6])
+def test_a_mirror_does_what_is_recognised_and_waits_where_it_may_not():
+    info = {"action_mask": np.array([1, 1, 0, 1])}
 
-    def seen(tau):
-        return {"task": np.concatenate((np.zeros(n), now, then, [tau]))}
+    def seen(slot, elapsed):
+        task = np.full(13, 0.25)
+        task[:4] = np.arange(4) == slot
+        task[-1] = elapsed
+        return {"task": task}
 
-    assert Mirror().act(seen(0.0), info) == 1  # what is done now
-    assert Mirror().act(seen(1.0), info) == 2  # the likeliest next that is legal
-    with pytest.raises(InvalidValueError, match="shows 13 numbers, not 5"):
+    assert Mirror().act(seen(None, 0.5), info) == 0  # nothing is recognised yet
+    assert Mirror().act(seen(3, 0.5), info) == 3
+    assert Mirror().act(seen(3, 1.1), info) == 0  # it should be over
+    assert Mirror().act(seen(2, 0.5), info) == 0  # not legal here
+    with pytest.raises(InvalidValueError, match="follow"):
         Mirror().act({"task": np.zeros(5)}, info)
 
 

@@ -289,6 +289,7 @@ def test_a_goal_that_cannot_be_reached_is_told_at_reset(task, error, message):
         lambda: ReciteTask(deadline_s=-1.0),
         lambda: FollowTask(pace=0.0),
         lambda: FollowTask(variation=np.nan),
+        lambda: FollowTask(recognised_after=1.1),
         lambda: FollowTask(deadline_s=np.inf),
     ],
 )
@@ -377,8 +378,9 @@ def test_agreement_is_paid_while_both_do_the_same():
             time_s = end_s
 
 
-def test_what_was_recognised_is_shown_after_the_delay_and_predicts():
-    task = FollowTask(delay_s=0.3)
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+def test_a_motion_is_shown_after_a_share_of_it_and_predicts(share):
+    task = FollowTask(recognised_after=share)
     env = make(task)
     repertoire = env.unwrapped.repertoire
     observation, _ = env.reset(seed=4)
@@ -388,15 +390,36 @@ def test_what_was_recognised_is_shown_after_the_delay_and_predicts():
         observation, *_, info = env.step(0)
         time_s += info["duration_s"]
         shown = observation["task"]
-        known = [id for id, end_s in schedule(task) if end_s <= time_s - 0.3]
-        expected = [repertoire.slots[id] for id in known[-1:]]
-        assert np.flatnonzero(shown[:32]).tolist() == expected
-        now, after = shown[32:64], shown[64:96]
-        assert now.sum() == pytest.approx(1.0) and after.sum() == pytest.approx(1.0)
-        following = schedule(task)[len(known)][0]
-        assert now[repertoire.slots[following]] > 0.0
-        if known and repertoire.after(known[-1]).mask.sum() == 2:
-            assert now.argmax() == repertoire.slots[following]
+        began_s, known = 0.0, []
+        for id, end_s in schedule(task):
+            if began_s + share * (end_s - began_s) <= time_s:
+                known.append((id, began_s))
+            began_s = end_s
+        assert np.flatnonzero(shown[:32]).tolist() == [repertoire.slots[id] for id, _ in known[-1:]]
+        after, later = shown[32:64], shown[64:96]
+        assert after.sum() == pytest.approx(1.0) and later.sum() == pytest.approx(1.0)
+        following = schedule(task)[len(known) :]
+        assert not following or after[repertoire.slots[following[0][0]]] > 0.0
+        if known:
+            id, began_s = known[-1]
+            usual_s = repertoire.duration_s(id) / task.pace
+            assert shown[96] == pytest.approx(min((time_s - began_s) / usual_s, 3.0))
+            if repertoire.after(id).mask.sum() == 2 and following:
+                assert after.argmax() == repertoire.slots[following[0][0]]
+
+
+def test_the_demonstrator_takes_his_time():
+    for pace in (0.5, 1.0):
+        task = FollowTask(pace=pace, variation=0.0, deadline_s=30.0)
+        env = make(task)
+        env.reset(seed=2)
+        while not env.step(0)[2]:
+            pass
+        began_s = 0.0
+        for id, end_s in schedule(task):
+            usual_s = env.unwrapped.repertoire.duration_s(id)
+            assert end_s - began_s == pytest.approx(usual_s / pace)
+            began_s = end_s
 
 
 def test_who_knows_the_demonstrator_agrees_more_than_who_does_not():

@@ -1,4 +1,4 @@
-"""Does what the demonstrator most likely does meanwhile."""
+"""Does what the demonstrator is recognised doing."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from typing import Any
 import numpy as np
 
 from mplearn.errors import InvalidValueError
+from mplearn_envs.choices import HOLD
 
 from .base import Policy, legal_actions
 
 
 class Mirror(Policy):
-    """For the task ``follow``: weighs what is predicted for now and for next by the time left.
+    """For the task ``follow``: performs the motion recognised last, and holds where it may not.
 
-    The demonstrator is tau typical durations into his motion; a primitive begun now agrees with it
-    for the rest, and then with the next: P(now) max(1 - tau, 0) + P(next) min(tau, 1).
+    It guesses nothing: so it comes late to every motion, and is never led elsewhere.
     """
 
     def act(self, observation: Any, info: Mapping[str, Any]) -> int:
-        """Return the legal action that agrees longest, as far as can be said.
+        """Return the motion that is under way, if it is legal and not over; else hold.
 
         Raises:
             InvalidValueError: The observation is not that of the task ``follow``.
@@ -32,6 +32,7 @@ class Mirror(Policy):
                 f"this policy needs the task 'follow', which shows {3 * mask.size + 1} numbers, "
                 f"not {len(seen)}"
             )
-        _, now, then = np.split(seen[:-1], 3)
-        tau = min(float(seen[-1]), 1.0)
-        return int(np.argmax(np.where(mask, now * (1.0 - tau) + then * tau, -1.0)))
+        recognised = seen[: mask.size]
+        slot = int(np.argmax(recognised))
+        under_way = recognised[slot] > 0 and seen[-1] < 1.0
+        return slot if under_way and mask[slot] else HOLD

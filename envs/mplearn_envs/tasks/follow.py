@@ -17,7 +17,7 @@ from mplearn_envs.repertoire import Repertoire
 
 from .base import Choice, Scene, Task
 
-_LONGEST_TIME = 3.0  # of the time since the last recognition, in typical durations
+_LONGEST_TIME = 3.0  # of the time since a motion began, as a share of its usual duration
 
 
 @dataclass
@@ -25,9 +25,11 @@ class FollowTask(Task):
     """Mirror a demonstrator who moves on while the robot acts.
 
     The demonstrator performs primitives that the robot can perform too, in an order drawn from the
-    library's transitions, at the ``pace`` of the robot, each a little faster or slower than usual.
-    A motion is recognised ``delay_s`` after its end, so what the demonstrator is doing now must be
-    predicted from what was recognised.
+    library's transitions, at ``pace`` times the robot's speed, each a little faster or slower than
+    usual. A motion is recognised under way, after the share ``recognised_after`` of its duration.
+    Who waits until then is late by that much, and never by more: a slower demonstrator can be
+    caught up with. Who guesses right is in time; who guesses wrong is led elsewhere, and must find
+    a place where the demonstrator comes by.
 
     ======== ============================================== =========== ====================
     term     formula                                        paid        extremes
@@ -45,39 +47,39 @@ class FollowTask(Task):
     =========== =========================================================== ========
     num         meaning                                                     bounds
     =========== =========================================================== ========
-    0..C-1      1 at the slot of what was recognised last                   0, 1
-    C..2C-1     how likely the demonstrator is doing each primitive now     0 .. 1
-    2C..3C-1    how likely each primitive comes next, after this one        0 .. 1
-    3C          time since what is done now began, in typical durations     0 .. 3
-                of a primitive
+    0..C-1      1 at the slot of the motion recognised last                 0, 1
+    C..2C-1     how likely each primitive comes after that                  0 .. 1
+    2C..3C-1    how likely each primitive comes after this one              0 .. 1
+    3C          time since the recognised motion began, as a share of how   0 .. 3
+                long it usually takes the demonstrator
     =========== =========================================================== ========
 
-    "Now" is the primitive after the one recognised last: in the first ``delay_s`` of a motion it
-    is still the one before.
+    Before anything is recognised, there is no 1, and the time is that since the start, as a share
+    of a median motion.
 
     Attributes:
-        pace: Speed of the demonstrator as a share of the human's; None is the robot's.
+        pace: Speed of the demonstrator as a share of the robot's.
         variation: Standard deviation of the logarithm of how long a motion takes.
-        delay_s: Time from a motion's end until it is recognised [s].
+        recognised_after: Share of a motion after which it is recognised; with 1 it is at its end.
         deadline_s: When the episode ends [s].
         agree: Reward of a second in agreement.
         fallen: Price of a fall.
     """
 
-    pace: float | None = None
+    pace: float = 0.8
     variation: float = 0.1
-    delay_s: float = 0.2
+    recognised_after: float = 0.3
     deadline_s: float = 60.0
     agree: float = 1.0
     fallen: float = 10.0
 
     def __post_init__(self) -> None:
-        if self.pace is not None and not (np.isfinite(self.pace) and self.pace > 0):
+        if not (np.isfinite(self.pace) and self.pace > 0):
             raise InvalidValueError(f"pace must be positive and finite, not {self.pace}")
-        for name in ("variation", "delay_s"):
+        for name, most in (("variation", 10), ("recognised_after", 1)):
             value = getattr(self, name)
-            if not (np.isfinite(value) and 0 <= value <= 10):
-                raise InvalidValueError(f"{name} must lie in [0, 10], not {value}")
+            if not (np.isfinite(value) and 0 <= value <= most):
+                raise InvalidValueError(f"{name} must lie in [0, {most}], not {value}")
         if not (np.isfinite(self.deadline_s) and self.deadline_s > 0):
             raise InvalidValueError(f"deadline_s must be positive, not {self.deadline_s}")
         self._library: PrimitiveLibrary | None = None
@@ -102,11 +104,13 @@ class FollowTask(Task):
             if self._first.dead_end:
                 raise NoPathError("the demonstrator can begin with nothing that the robot can do")
             self._predicted: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
-            self._typical_s = float(
-                np.median([repertoire.duration_s(id) for id in repertoire.feasible_ids])
-            )
+            self._usual_s = {
+                id: repertoire.duration_s(id) / self.pace for id in repertoire.feasible_ids
+            }
+            self._median_s = float(np.median(list(self._usual_s.values())))
         self._ids: list[int] = []
         self._ends_s: list[float] = []
+        self._known_s: list[float] = []  # when each motion is recognised
         self._n_recognised = 0
         self._doing: int | None = None
         self._time_s, self._agreed_s = 0.0, 0.0
@@ -116,11 +120,13 @@ class FollowTask(Task):
         """Return what was recognised, what is predicted, and since when, see the table."""
         n, capacity = self._n_recognised, self._repertoire.capacity
         out = np.zeros(3 * capacity + 1)
+        usual_s = self._median_s
         if n:
             out[self._repertoire.slots[self._ids[n - 1]]] = 1.0
+            usual_s = self._usual_s[self._ids[n - 1]]
         out[capacity : 2 * capacity], out[2 * capacity : -1] = self._prediction()
-        began_s = self._ends_s[n - 1] if n else 0.0
-        out[-1] = min((self._time_s - began_s) / self._typical_s, _LONGEST_TIME)
+        began_s = self._ends_s[n - 2] if n > 1 else 0.0
+        out[-1] = min((self._time_s - began_s) / usual_s, _LONGEST_TIME)
         return out
 
     def bonuses(self, choice: Choice) -> dict[str, float]:
@@ -148,8 +154,7 @@ class FollowTask(Task):
         """Let time pass: more is recognised."""
         self._time_s = scene.time_s
         self._go_on(scene.time_s)
-        known = np.searchsorted(self._ends_s, scene.time_s - self.delay_s, side="right")
-        self._n_recognised = int(known)
+        self._n_recognised = int(np.searchsorted(self._known_s, scene.time_s, side="right"))
         return {}
 
     @property
@@ -170,20 +175,18 @@ class FollowTask(Task):
     def _go_on(self, time_s: float) -> None:
         """Perform until after a time."""
         repertoire = self._repertoire
-        pace = repertoire.speed if self.pace is None else self.pace
         while not self._ends_s or self._ends_s[-1] <= time_s:
             prior = self._following(self._ids[-1] if self._ids else None).prior
             slot = int(np.searchsorted(np.cumsum(prior), self._rng.random(), side="right"))
             id = repertoire.primitive(min(slot, int(np.flatnonzero(prior)[-1])))
             assert id is not None  # `_following` never leaves hold alone
-            usual_s = self._library_duration_s(id) / pace
-            lasts_s = usual_s * float(np.exp(self.variation * self._rng.standard_normal()))
-            self._ends_s.append((self._ends_s[-1] if self._ends_s else 0.0) + lasts_s)
+            lasts_s = self._usual_s[id] * float(
+                np.exp(self.variation * self._rng.standard_normal())
+            )
+            began_s = self._ends_s[-1] if self._ends_s else 0.0
+            self._known_s.append(began_s + self.recognised_after * lasts_s)
+            self._ends_s.append(began_s + lasts_s)
             self._ids.append(id)
-
-    def _library_duration_s(self, id: int) -> float:
-        frames, rate_hz = self._repertoire.frames(id)
-        return (len(frames) - 1) / rate_hz
 
     def _following(self, id: int | None) -> Choices:
         """Return what the demonstrator may do next; at a dead end he begins anew."""
@@ -195,16 +198,16 @@ class FollowTask(Task):
     # ---- the prediction
 
     def _prediction(self) -> tuple[FloatArray, FloatArray]:
-        """Return how likely each slot is now, and after that, shape (capacity,) each."""
+        """Return how likely each slot is next, and after that, shape (capacity,) each."""
         n = self._n_recognised
         library = self._repertoire.library
         history = tuple(self._ids[max(0, n - library.graph.order) : n])
         if history not in self._predicted:
-            now = self._predict(history)
-            after = np.zeros_like(now)
-            for slot in np.flatnonzero(now > 0.01).tolist():
-                after += now[slot] * self._predict((*history, self._repertoire.primitive(slot)))
-            self._predicted[history] = now, after / max(after.sum(), 1e-300)
+            then = self._predict(history)
+            after = np.zeros_like(then)
+            for slot in np.flatnonzero(then > 0.01).tolist():
+                after += then[slot] * self._predict((*history, self._repertoire.primitive(slot)))
+            self._predicted[history] = then, after / max(after.sum(), 1e-300)
         return self._predicted[history]
 
     def _predict(self, history: tuple[int | None, ...]) -> FloatArray:
