@@ -11,3 +11,4 @@ from .events import Recognised as Recognised
 from .events import SegmentClosed as SegmentClosed
 from .events import TransitionSeen as TransitionSeen
 from .learner import MotionLearner as MotionLearner
+from .merge import merge as merge

@@ -24,12 +24,14 @@ class Link:
         primitive: What it was recognised as; None for nothing.
         follows: Whether it came right after the one before it.
         segment: Where it lies.
+        nearest: The primitive that it was nearest to, recognised or not; None for none.
     """
 
     number: int
     primitive: int | None
     follows: bool
     segment: Segment
+    nearest: int | None = None
 
 
 class Chain:
@@ -63,13 +65,27 @@ class Chain:
         """Take note that what comes next does not follow what came."""
         self._broken = True
 
-    def follow(self, segment: Segment, placement: Placement, surprise: float) -> list[Event]:
+    def latest(self) -> list[int]:
+        """Return the latest primitives that what comes next depends on, oldest first.
+
+        Where the last motion was not recognised, the nearest primitive stands in for it: it tells
+        more of what comes next than nothing does.
+        """
+        if self._broken or not self._links:
+            return []
+        last = self._links[-1]
+        id = last.nearest if last.primitive is None else last.primitive
+        if id is None or id not in self.graph:
+            return []
+        return [*self._run(len(self._links) - 1), id]
+
+    def follow(self, segment: Segment, placement: Placement, false_alarms: float) -> list[Event]:
         """Take the next segment, count what is known by it, and say what is surprising.
 
         Args:
             segment: The segment.
             placement: Where the tree put it, and what else changed there.
-            surprise: Transitions less likely than exp(-surprise) are anomalies [nats].
+            false_alarms: Share of usual transitions that may be reported as an anomaly.
         """
         if placement.refused:  # no motion at all
             self.paused(segment)
@@ -77,11 +93,12 @@ class Chain:
         known = placement.node_id if placement.node_id in placement.born else None
         if placement.recognised and not placement.splits:
             known = placement.node_id
-        self._links.append(Link(placement.number, known, not self._broken, segment))
+        link = Link(placement.number, known, not self._broken, segment, placement.nearest)
+        self._links.append(link)
         self._paused_frames, self._broken = 0, False
         events: list[Event] = []
         if known is not None and not placement.born:
-            events += self._surprised(surprise)
+            events += self._surprised(false_alarms)
             events += self._count(len(self._links) - 1)
         moved = dict(placement.moved)
         if placement.number not in moved and placement.node_id in placement.born:
@@ -123,6 +140,8 @@ class Chain:
         for link in self._links:
             if link.primitive in ids:
                 link.primitive = to
+            if link.nearest in ids:
+                link.nearest = to
 
     def _run(self, i: int) -> list[int]:
         """Return the primitives before link i, oldest first, as far as nothing breaks them off."""
@@ -146,20 +165,23 @@ class Chain:
         count = self.graph.count(run[-1], link.primitive)
         return [TransitionSeen(link.segment, run[-1], link.primitive, count)]
 
-    def _surprised(self, surprise: float) -> list[Event]:
+    def _surprised(self, false_alarms: float) -> list[Event]:
         """Return the anomaly of the newest transition, if it is one; before it is counted."""
         link, run = self._links[-1], self._run(len(self._links) - 1)
         if not run or link.primitive is None:
             return []
-        p = self.graph.probabilities(run)[self.graph.ids.index(link.primitive)]
-        score = -math.log(p)
-        return [Anomaly(link.segment, "order", score)] if score > surprise else []
+        sequence = [*run, link.primitive]
+        score = float(self.graph.surprises(sequence)[-1])
+        if score <= -math.log(false_alarms):  # as likely as that is no alarm
+            return []
+        p_value = float(self.graph.p_values(sequence)[-1])
+        return [Anomaly(link.segment, "order", score, p_value)] if p_value <= false_alarms else []
 
     def state(self) -> dict[str, Any]:
         """Return everything as plain values."""
         return {
             "links": [
-                (link.number, link.primitive, link.follows, astuple(link.segment))
+                (link.number, link.primitive, link.follows, astuple(link.segment), link.nearest)
                 for link in self._links
             ],
             "paused_frames": self._paused_frames,
@@ -169,8 +191,8 @@ class Chain:
     def load_state(self, state: dict[str, Any]) -> None:
         """Resume from what `state` returned."""
         self._links = [
-            Link(number, primitive, follows, Segment(*segment))
-            for number, primitive, follows, segment in state["links"]
+            Link(number, primitive, follows, Segment(*segment), nearest)
+            for number, primitive, follows, segment, nearest in state["links"]
         ]
         self._paused_frames = int(state["paused_frames"])
         self._broken = bool(state["broken"])

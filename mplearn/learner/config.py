@@ -26,9 +26,8 @@ class LearnerConfig:
         people: What makes motions of different people one primitive.
         longest_pause_s: Two primitives with a longer pause between them do not count as
             consecutive [s].
-        order_surprise: A transition less likely than ``exp(-order_surprise)`` is an anomaly [nats].
-        motion_radius: A motion farther from every primitive than this multiple of the nearest
-            one's radius is an anomaly.
+        false_alarms: Share of the motions, and of the transitions, like those learned that may be
+            reported as an anomaly, in (0, 1). Before 1 / false_alarms were seen, none is.
     """
 
     channels: tuple[str, ...]
@@ -38,8 +37,7 @@ class LearnerConfig:
     tree: TreeConfig = field(default_factory=TreeConfig)
     people: PeopleConfig = field(default_factory=PeopleConfig)
     longest_pause_s: float = 2.0
-    order_surprise: float = 4.0
-    motion_radius: float = 2.0
+    false_alarms: float = 0.01
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", tuple(self.channels))
@@ -49,6 +47,7 @@ class LearnerConfig:
             raise InvalidValueError(f"rate_hz must lie in [20, 250], not {self.rate_hz}")
         if self.observe not in ("robot", "markers"):
             raise InvalidValueError(f"observe must be 'robot' or 'markers', not {self.observe!r}")
-        for name in ("longest_pause_s", "order_surprise", "motion_radius"):
-            if not getattr(self, name) > 0:
-                raise InvalidValueError(f"{name} must be positive, not {getattr(self, name)}")
+        if not self.longest_pause_s > 0:
+            raise InvalidValueError(f"longest_pause_s must be positive, not {self.longest_pause_s}")
+        if not 0 < self.false_alarms < 1:
+            raise InvalidValueError(f"false_alarms must lie in (0, 1), not {self.false_alarms}")

@@ -126,13 +126,15 @@ class Anomaly:
         segment: Where.
         kind: ``"motion"``: unlike every known primitive; ``"order"``: known motions, but in an
             unusual order.
-        score: How far out: the distance to the nearest primitive over that primitive's radius,
-            or the surprise of the transition [nats].
+        score: How far out: the distance to the nearest primitive over what is usual there
+            (`mplearn.library.MotionNovelty`), or the surprise of the transition [nat].
+        p_value: Share of what was learned that is at least as far out, in (0, 1].
     """
 
     segment: Segment
     kind: Literal["motion", "order"]
     score: float
+    p_value: float
 
 
 Event: TypeAlias = (

@@ -14,12 +14,12 @@ import numpy as np
 
 from ..body import BodyView, MotionObserver, view_of
 from ..errors import BodyError, FrameError
-from ..graph import TransitionGraph
-from ..library import PrimitiveLibrary
+from ..graph import Prediction, TransitionGraph
+from ..library import MotionNovelty, PrimitiveLibrary
 from ..people import PeopleConfig, PeopleTree
 from ..recording import FloatArray, Recording, Segment, are_markers
 from ..segmentation import make_segmenter
-from ..tree import Change, FormConfig, TreeConfig
+from ..tree import Change, FormConfig, Placement, TreeConfig
 from .buffer import FrameBuffer
 from .chain import Chain
 from .config import LearnerConfig
@@ -173,6 +173,17 @@ class MotionLearner:
 
     # ---- what was learned
 
+    def predict_next(self, k: int = 3) -> tuple[Prediction, ...]:
+        """Return the ``k`` primitives most likely to come next, the most likely first.
+
+        They depend on the latest motions of the stream; where the last one was not recognised, its
+        nearest primitive stands in for it. Empty before a primitive is known.
+
+        Raises:
+            InvalidValueError: ``k`` is not positive.
+        """
+        return self.graph.predict(self._chain.latest(), k)
+
     def snapshot(self) -> PrimitiveLibrary:
         """Return what is known now, frozen."""
         return library_of(
@@ -317,16 +328,25 @@ class MotionLearner:
 
     def _place(self, segment: Segment, frames: FloatArray) -> list[Event]:
         """Learn from a segment in which something moves, as it is seen, shape (L, V)."""
-        known = len(self.tree.leaves)
         placement = self.tree.insert(frames, self.person)
         events: list[Event] = [SegmentClosed(segment, placement)]
         if placement.recognised:
             events.append(Recognised(segment, placement.node_id, placement.distance))
-        elif known and placement.ratio > self.config.motion_radius:
-            events.append(Anomaly(segment, "motion", placement.ratio))
+        elif not placement.born and not placement.refused:
+            events += self._unlike(segment, placement)
         events += [PrimitiveSplit(segment, each.node, each.into) for each in placement.splits]
         events += [PrimitiveMerged(segment, *each) for each in placement.merges]
         for id in placement.born:
             events += [PrimitiveBorn(segment, id, len(self.tree.node(id).members))]
-        events.extend(self._chain.follow(segment, placement, self.config.order_surprise))
+        events.extend(self._chain.follow(segment, placement, self.config.false_alarms))
         return events
+
+    def _unlike(self, segment: Segment, placement: Placement) -> list[Event]:
+        """Return the anomaly of a segment that was not recognised, if it is one."""
+        matrices, allowed = self.tree.matrices(self.person), self.config.false_alarms
+        if placement.nearest is None or (1 + sum(map(len, matrices.values()))) * allowed < 1:
+            return []
+        rules = self.config.tree
+        novelty = MotionNovelty(matrices, rules.n_nearest)
+        found = novelty.score([(placement.nearest, placement.distance**rules.power)])
+        return [Anomaly(segment, "motion", *found)] if found.p_value <= allowed else []

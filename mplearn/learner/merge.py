@@ -97,8 +97,8 @@ def _renamed(
 ) -> list[Any]:
     """Return the links of a chain, with other numbers, ids and frames."""
     out = []
-    for number, primitive, follows, (start, end, decided_at, *rest) in links:
+    for number, primitive, follows, (start, end, decided_at, *rest), nearest in links:
         segment = (start + frames, end + frames, decided_at + frames, *rest)
-        known = None if primitive is None else new_id[primitive]
-        out.append((number + n_before, known, follows, segment))
+        ids = [None if id is None else new_id.get(id) for id in (primitive, nearest)]
+        out.append((number + n_before, ids[0], follows, segment, ids[1]))
     return out

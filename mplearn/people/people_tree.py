@@ -120,6 +120,25 @@ class PeopleTree:
             return self._trees[person].model(leaf)
         return common_model([self._trees[p].model(leaf) for p, leaf in leaves], self.exemplars(id))
 
+    def matrices(self, person: int) -> dict[int, FloatArray]:
+        """Return the distances among a person's own exemplars of each primitive, shape (k, k).
+
+        They are those of `Placement.distance` to the configured power. Empty for a person of whom
+        nothing was seen; of several leaves in one primitive the fullest counts.
+        """
+        if person not in self._trees:
+            return {}
+        tree = self._trees[person]
+        if self._sharing is None:
+            return {id: tree.node(id).matrix for id in tree.leaves}
+        found: dict[int, FloatArray] = {}
+        for leaf in self._sharing.leaves:
+            if leaf.person == person:
+                own = tree.node(leaf.local).matrix
+                if len(own) > len(found.get(leaf.primitive, ())):
+                    found[leaf.primitive] = own
+        return found
+
     def recogniser(self) -> Recogniser:
         """Return what would be recognised now, whoever moves, frozen."""
         if self._sharing is None:

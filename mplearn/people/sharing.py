@@ -145,13 +145,14 @@ class Sharing:
         numbers = self._numbers.setdefault(person, {})
         numbers[placement.number] = number
         shape = shape_of([frames], self.config.form)
-        joined, ratio = (ROOT, np.inf)
-        if not placement.recognised:
-            joined, ratio = self._nearest(person, shape)
-            if joined != ROOT:
-                self._joined[number] = joined
         before = {(leaf.person, leaf.local): leaf.primitive for leaf in self.leaves}
-        said = joined
+        said, ratio = ROOT, float("inf")
+        nearest = before.get((person, placement.nearest or ROOT))
+        if not placement.recognised:
+            other, ratio = self._nearest(person, shape)
+            nearest = other if nearest is None else nearest
+            if other is not None and ratio <= 1:
+                self._joined[number] = said = nearest = other
         if placement.recognised:
             said = before.get((person, _recognised_as(placement)), ROOT)
         changed = self._take_up(person, tree, placement)
@@ -168,6 +169,7 @@ class Sharing:
             splits,
             merges,
             tuple(move for move in moved if move[0] != number),
+            nearest=nearest,
         )
 
     def edited(self, person: int, change: Change) -> Change:
@@ -182,16 +184,16 @@ class Sharing:
         gone -= {merge.absorbed for merge in merges} | {split.node for split in splits}
         return Change(born, splits, merges, moved, removed=tuple(sorted(gone)))
 
-    def _nearest(self, person: int, shape: Shape) -> tuple[int, float]:
-        """Return the primitive that a segment joins, or `ROOT`; and how far out it lies."""
+    def _nearest(self, person: int, shape: Shape) -> tuple[int | None, float]:
+        """Return the nearest primitive, and how far out a segment lies: up to 1 it joins it."""
         if not np.isfinite(self._unit):
-            return ROOT, float("inf")
+            return None, float("inf")
         ids, matrix = self._to_primitives(person, shape)
         at = int(matrix.argmin())
         nearest = matrix[at] / self._unit
         second = np.delete(matrix, at).min(initial=np.inf) / self._unit
         ratio = float(tension(nearest, second, self.rules.reach)) / self.rules.join
-        return (ids[at], ratio) if ratio <= 1 else (ROOT, ratio)
+        return ids[at], ratio
 
     def _to_primitives(self, person: int, shape: Shape) -> tuple[list[int], FloatArray]:
         """Return the distance from a shape to each primitive, averaged over its leaves."""

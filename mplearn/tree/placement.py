@@ -104,6 +104,8 @@ class Placement(NamedTuple):
         refused: Why it was not taken up at all; empty where it was.
         reparented: Nodes that its arrival hung below another.
         removed: Inner nodes that are gone, for they held nothing else.
+        nearest: The primitive that it was nearest to when it came, within its radius or not; None
+            where there was none.
     """
 
     number: int
@@ -118,3 +120,4 @@ class Placement(NamedTuple):
     refused: str = ""
     reparented: tuple[Reparent, ...] = ()
     removed: tuple[int, ...] = ()
+    nearest: int | None = None

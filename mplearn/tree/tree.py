@@ -182,6 +182,7 @@ class PrimitiveTree:
             distance,
             ratio,
             **change._replace(moved=others)._asdict(),
+            nearest=matches[0].node if matches else None,
         )
 
     # ---- learning by hand
