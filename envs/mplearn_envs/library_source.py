@@ -6,15 +6,21 @@ from collections.abc import Callable
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import TypeAlias
+from typing import Protocol, TypeAlias, runtime_checkable
 
 from mplearn.errors import LibraryError
-from mplearn.learner import MotionLearner
 from mplearn.library import PrimitiveLibrary
 
-Source: TypeAlias = (
-    PrimitiveLibrary | str | Path | MotionLearner | Callable[[], PrimitiveLibrary] | None
-)
+
+@runtime_checkable
+class Learner(Protocol):
+    """What goes on learning: a `mplearn.MotionLearner`, or what acts like one."""
+
+    def snapshot(self) -> PrimitiveLibrary:
+        """Return the library of now."""
+
+
+Source: TypeAlias = PrimitiveLibrary | str | Path | Learner | Callable[[], PrimitiveLibrary] | None
 
 
 class LibrarySource:
@@ -32,7 +38,7 @@ class LibrarySource:
 
     def __init__(self, source: Source) -> None:
         self.source = source
-        self.live = isinstance(source, MotionLearner) or (
+        self.live = isinstance(source, Learner) or (
             callable(source) and not isinstance(source, PrimitiveLibrary)
         )
         self._fixed = None if self.live else _opened(source)
@@ -45,7 +51,7 @@ class LibrarySource:
         """
         if self._fixed is not None:
             return self._fixed
-        if isinstance(self.source, MotionLearner):
+        if isinstance(self.source, Learner):
             return self.source.snapshot()
         library = self.source()  # type: ignore[operator,misc]
         if not isinstance(library, PrimitiveLibrary):
