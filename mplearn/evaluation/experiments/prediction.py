@@ -12,7 +12,7 @@ from ...demonstrator import paper_session
 from ...graph import TransitionGraph
 from ...learner import LearnerConfig, MotionLearner, SegmentClosed
 from ...recording import BoolArray, LabelledSegment, Recording
-from ...tree import ROOT, Placement
+from ...tree import Placement
 from ..matching import match_segments
 from ..observing import observe
 from ..sessions import SessionConfig, make_session
@@ -43,7 +43,7 @@ class Foretold:
 def foretell(features: Recording, truth: Sequence[LabelledSegment]) -> Foretold:
     """Learn a stream on-line and foretell each motion from those before it."""
     learner = MotionLearner(LearnerConfig(features.channels, features.rate_hz))
-    follower = _Follower(learner)
+    homes = _Homes()
     found, numbers, foretold = [], [], []
     likely: list[list[int]] = []  # the primitives foretold, as the segments that are in each
     for events in learner.learn_recording(features):
@@ -51,10 +51,10 @@ def foretell(features: Recording, truth: Sequence[LabelledSegment]) -> Foretold:
             if isinstance(event, SegmentClosed):
                 found.append(event.segment)
                 foretold.append(likely)
-                numbers.append(follower.take(event.placement, event.segment.length_frames))
+                numbers.append(homes.take(event.placement))
                 likely = []
         if any(isinstance(event, SegmentClosed) for event in events):
-            likely = follower.foretell()
+            likely = [homes.inside(each.id) for each in learner.predict_next(TOP)]
     matching = match_segments(truth, found, features.rate_hz)
     shows = dict(zip(numbers, matching.labels, strict=True))
     said = np.zeros((len(truth), 2), dtype=np.bool_)
@@ -112,41 +112,25 @@ def prediction_table(title: str, outcomes: Iterable[tuple[str, Foretold]]) -> Ta
     )
 
 
-class _Follower:
-    """Keeps what a learner's latest segments are known as by now, and what is in each primitive."""
+class _Homes:
+    """Keeps which primitive each segment is in by now."""
 
-    def __init__(self, learner: MotionLearner) -> None:
-        self.learner = learner
-        self._home: dict[int, int] = {}  # the node that each segment is in, by number
-        self._latest: list[int | None] = []  # numbers of segments; None where the order breaks off
-        self._still_frames = 0
+    def __init__(self) -> None:
+        self._home: dict[int, int] = {}
 
-    def take(self, placement: Placement | None, n_frames: int) -> int:
+    def take(self, placement: Placement | None) -> int:
         """Take what was said of one segment; return its number, -1 for a pause."""
-        config = self.learner.config
         if placement is None or placement.refused:
-            self._still_frames += n_frames
-            if self._still_frames > config.longest_pause_s * config.rate_hz:
-                self._latest.append(None)
             return -1
-        self._still_frames = 0
-        number = placement.number
-        self._home[number] = placement.node_id
+        self._home[placement.number] = placement.node_id
         self._home.update(placement.moved)
         for merge in placement.merges:
             self._home |= {n: merge.kept for n, id in self._home.items() if id == merge.absorbed}
-        self._latest.append(number)
-        del self._latest[: -self.learner.graph.order]
-        return number
+        return placement.number
 
-    def foretell(self) -> list[list[int]]:
-        """Return the primitives most likely to come next, as the segments that are in each."""
-        graph = self.learner.graph
-        if not len(graph):
-            return []
-        at = [ROOT if number is None else self._home[number] for number in self._latest]
-        predictions = graph.predict([id if id in graph else None for id in at], TOP)
-        return [[n for n, home in self._home.items() if home == each.id] for each in predictions]
+    def inside(self, primitive: int) -> list[int]:
+        """Return the numbers of the segments in a primitive."""
+        return [number for number, home in self._home.items() if home == primitive]
 
 
 def _perfect(truth: Sequence[LabelledSegment]) -> BoolArray:
