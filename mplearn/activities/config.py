@@ -31,7 +31,7 @@ class ActivityConfig:
     reach_s: float = 8.0
     least_s: float = 2.0
     linked_s: float = 1.0
-    mixed_s: float = 2.0
+    mixed_s: float = 1.5
     recurrence: float = 0.9
     mixing: float = 0.5
 

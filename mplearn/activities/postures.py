@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from ..body import view_of
-from ..body.view import LEVER_M
 from ..recording import FloatArray
 
 _PLACE = ("tx", "ty", "rx", "ry", "rz")  # of a skeleton's root; its angles depend on the heading
+_LEVER_M = 0.2  # an angle counts as the way of a point this far from its joint
+_SMALL = ("wrist", "hand", "finger", "thumb", "toe")  # these joints move little but themselves
 
 
 def postures_of(frames: FloatArray, channels: tuple[str, ...]) -> FloatArray:
@@ -14,8 +15,8 @@ def postures_of(frames: FloatArray, channels: tuple[str, ...]) -> FloatArray:
 
     Args:
         frames: Shape (T, D): the features of a `MotionObserver`; or the joint angles [rad] of a
-            skeletal file, of which the height of the root is kept and its place and rotation are
-            left out; other channels are kept as they are.
+            skeletal file, of which the height of the root is kept, its place and rotation are left
+            out, and so are hands and toes; other channels are kept as they are.
         channels: Their names.
 
     Returns:
@@ -25,6 +26,10 @@ def postures_of(frames: FloatArray, channels: tuple[str, ...]) -> FloatArray:
     if not {f"{root}.{axis}" for axis in (*_PLACE, "tz")} <= set(channels):
         return view_of(channels).see(frames)
     place = {f"{root}.{axis}" for axis in _PLACE}
-    kept = [i for i, channel in enumerate(channels) if channel not in place]
+    kept = [i for i, name in enumerate(channels) if name not in place and not _is_small(name)]
     turning = [channels[i].rpartition(".")[2].startswith("r") for i in kept]
-    return frames[:, kept] * [LEVER_M if turns else 1.0 for turns in turning]
+    return frames[:, kept] * [_LEVER_M if turns else 1.0 for turns in turning]
+
+
+def _is_small(channel: str) -> bool:
+    return any(part in channel.lower() for part in _SMALL)

@@ -103,4 +103,4 @@ def _covering(truth: NDArray[np.int64], found: NDArray[np.int64], n: int) -> flo
         common = np.minimum(end, stretches[1][:, 1]) - np.maximum(start, stretches[1][:, 0])
         union = np.maximum(end, stretches[1][:, 1]) - np.minimum(start, stretches[1][:, 0])
         total += (end - start) * float((np.maximum(common, 0) / union).max())
-    return total / n
+    return float(total / n)

@@ -135,8 +135,8 @@ def test_stretches_of_one_distribution_mix():
 
 def test_a_skeleton_keeps_its_height_and_loses_its_place():
     root = tuple(f"hips.{axis}" for axis in ("tx", "tz", "ty", "rz", "rx", "ry"))
-    frames = np.arange(16.0).reshape(2, 8)
-    postures = postures_of(frames, (*root, "knee.rx", "spine.tz"))
+    frames = np.arange(18.0).reshape(2, 9)
+    postures = postures_of(frames, (*root, "knee.rx", "spine.tz", "LeftHand.rz"))
     np.testing.assert_allclose(postures, frames[:, [1, 6, 7]] * [1.0, 0.2, 1.0])
 
 
