@@ -18,7 +18,7 @@ from .features import feature_channels
 from .keypoints import keypoint_channels, keypoints_of
 from .robot import robot_body
 
-LEVER_M = 0.2
+LEVER_M = 0.02
 
 
 class View(Protocol):
