@@ -7,14 +7,12 @@ performed.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mplearn.errors import BodyError
-from mplearn.recording import BoolArray, FloatArray, IntArray
+from mplearn.recording import FloatArray
 
 from .body import Body
-from .gauss_newton import Linkage
-from .kinematics import forward_kinematics
+from .points import points_of
 from .robot import robot_body
 
 BASE_CHANNELS = ("base_height", "base_roll", "base_pitch")
@@ -41,11 +39,13 @@ def features_of(q: FloatArray, body: Body | None = None) -> FloatArray:
     body = body or robot_body()
     if q.shape[-1] != body.nq:
         raise BodyError(f"a posture of {body.name!r} has {body.nq} values, not {q.shape[-1]}")
-    w, x, y, z = np.moveaxis(q[..., 3:7], -1, 0)
-    roll = np.arcsin(np.clip(2 * (y * z + w * x), -1.0, 1.0))
-    pitch = np.arctan2(2 * (w * y - x * z), 1 - 2 * (x * x + y * y))
-    base = np.stack((q[..., 2], roll, pitch), axis=-1)
-    return np.concatenate((base, q[..., 7 + body.driven]), axis=-1)
+    w, x, y, z = q[..., 3], q[..., 4], q[..., 5], q[..., 6]
+    features = np.empty((*q.shape[:-1], 3 + len(body.driven)))
+    features[..., 0] = q[..., 2]
+    features[..., 1] = np.arcsin(np.minimum(np.maximum(2 * (y * z + w * x), -1.0), 1.0))
+    features[..., 2] = np.arctan2(2 * (w * y - x * z), 1 - 2 * (x * x + y * y))
+    features[..., 3:] = q[..., 7 + body.driven]
+    return features
 
 
 def posture_of(
@@ -97,45 +97,8 @@ def foot_clearance(features: FloatArray, body: Body | None = None) -> FloatArray
     tree = body.tree
     soles = [i for i, site in enumerate(tree.site_names) if site.startswith("sole_")]
     left = np.array([tree.site_names[i].endswith("_l") for i in soles])
-    lowest = _lowest_corners(
-        posture_of(np.atleast_2d(features), body=body),
-        Linkage.of(tree),
-        tree.site_body[soles],
-        tree.site_offset[soles],
-        left,
-    )
+    features = np.ascontiguousarray(np.atleast_2d(features), dtype=np.float64)
+    heights = points_of(features, body, tree.site_body[soles], tree.site_offset[soles])[..., 2]
+    lowest = np.stack((heights[:, left].min(axis=1), heights[:, ~left].min(axis=1)), axis=1)
     clearance: FloatArray = lowest - lowest.min(axis=1, keepdims=True)
     return clearance
-
-
-@njit(cache=True)
-def _lowest_corners(
-    postures: FloatArray, linkage: Linkage, bodies: IntArray, offsets: FloatArray, left: BoolArray
-) -> FloatArray:
-    n_bodies, n = len(linkage.parent), len(linkage.axis)
-    pos, mat = np.empty((n_bodies, 3)), np.empty((n_bodies, 3, 3))
-    axes, anchors = np.empty((n, 3)), np.empty((n, 3))
-    lowest = np.full((len(postures), 2), np.inf)
-    for t in range(len(postures)):
-        forward_kinematics(
-            postures[t],
-            linkage.parent,
-            linkage.offset,
-            linkage.rotation,
-            linkage.joint_body,
-            linkage.axis,
-            linkage.anchor,
-            pos,
-            mat,
-            axes,
-            anchors,
-            linkage.slides,
-        )
-        for s in range(len(bodies)):
-            b = bodies[s]
-            height = pos[b, 2]
-            for k in range(3):
-                height += mat[b, 2, k] * offsets[s, k]
-            side = 0 if left[s] else 1
-            lowest[t, side] = min(lowest[t, side], height)
-    return lowest

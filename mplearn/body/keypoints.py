@@ -12,15 +12,13 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numba import njit
 
 from mplearn.errors import BodyError
 from mplearn.recording import FloatArray, IntArray
 
 from .body import Body
-from .gauss_newton import Linkage
+from .points import points_of
 from .robot import robot_body
-from .tree import forward_kinematics
 
 # point -> (part of the body, place in the part's frame as a share of the body's height)
 _SIDED = {
@@ -64,56 +62,13 @@ def keypoints_of(features: FloatArray, body: Body | None = None) -> FloatArray:
             f"features of {body.name!r} have shape (T, {3 + len(body.driven)}), "
             f"not {features.shape}"
         )
-    points = _points(features, body.driven, *_places(body))
+    points = points_of(features, body, *_places(body))
     return np.concatenate((points.reshape(len(features), -1), features[:, :1]), axis=1)
 
 
 @cache
-def _places(body: Body) -> tuple[Linkage, IntArray, FloatArray]:
-    """Return a body's linkage, and part and place of each key point."""
+def _places(body: Body) -> tuple[IntArray, FloatArray]:
+    """Return part and place of each key point."""
     bodies = np.array([body.tree.body(part) for part, _ in KEYPOINTS.values()])
     places = np.array([place for _, place in KEYPOINTS.values()]) * body.height_m
-    return Linkage.of(body.tree), bodies, places
-
-
-@njit(cache=True)
-def _points(
-    features: FloatArray,
-    driven: IntArray,
-    linkage: Linkage,
-    bodies: IntArray,
-    places: FloatArray,
-) -> FloatArray:
-    n_bodies, n = len(linkage.parent), len(linkage.axis)
-    posture = np.zeros(7 + n)
-    pos, mat = np.empty((n_bodies, 3)), np.empty((n_bodies, 3, 3))
-    axes, anchors = np.empty((n, 3)), np.empty((n, 3))
-    points = np.empty((len(features), len(bodies), 3))
-    for t in range(len(features)):
-        cr, sr = np.cos(features[t, 1] / 2), np.sin(features[t, 1] / 2)
-        cp, sp = np.cos(features[t, 2] / 2), np.sin(features[t, 2] / 2)
-        posture[3], posture[4], posture[5], posture[6] = cr * cp, sr * cp, cr * sp, sr * sp
-        for j in range(len(driven)):
-            posture[7 + driven[j]] = features[t, 3 + j]
-        forward_kinematics(
-            posture,
-            linkage.parent,
-            linkage.offset,
-            linkage.rotation,
-            linkage.joint_body,
-            linkage.axis,
-            linkage.anchor,
-            pos,
-            mat,
-            axes,
-            anchors,
-            linkage.slides,
-        )
-        for p in range(len(bodies)):
-            b = bodies[p]
-            for i in range(3):
-                value = pos[b, i]
-                for k in range(3):
-                    value += mat[b, i, k] * places[p, k]
-                points[t, p, i] = value
-    return points
+    return bodies, places
