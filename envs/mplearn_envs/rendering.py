@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
+from functools import cache
 from typing import TYPE_CHECKING, Any
+from weakref import WeakSet
 
 import mujoco
 import numpy as np
@@ -15,6 +18,29 @@ from .overlay import BalanceMeter, draw_balance
 
 if TYPE_CHECKING:
     import mujoco.viewer
+
+_open: WeakSet[Any] = WeakSet()
+
+
+def close_at_exit(renderer: Any) -> None:
+    """Have a `mujoco.Renderer` closed before the interpreter ends, while its graphics still live.
+
+    Args:
+        renderer: It. One that is not needed before may be closed, or forgotten.
+    """
+    _open.add(renderer)
+    _register()
+
+
+@cache
+def _register() -> None:
+    """Go ahead of the end of EGL, which MuJoCo registered when it made the first renderer."""
+    atexit.register(_close_all)
+
+
+def _close_all() -> None:
+    for renderer in list(_open):
+        renderer.close()
 
 
 class Renderer:
@@ -54,6 +80,7 @@ class Renderer:
             raise InvalidValueError(
                 f"pictures of {width} x {height} cannot be drawn: {error}"
             ) from error
+        close_at_exit(self._renderer)
         self._meter = BalanceMeter(model) if balance else None
         self.camera = mujoco.MjvCamera()
         self.camera.azimuth = azimuth_deg

@@ -53,15 +53,38 @@ def test_rendering_needs_a_mode_and_a_screen(monkeypatch):
         PrimitiveHumanoidEnv(standing_library(), render_mode="ascii")
 
 
-def test_importing_the_package_is_light():
-    heavy = ("mujoco", "numba", "dm_control", "scipy", "torch")
-    code = f"import sys, mplearn_envs; print([m for m in {heavy} if m in sys.modules])"
+def run(code):
     path = os.pathsep.join(p for p in sys.path if p)
-    done = subprocess.run(
+    return subprocess.run(
         [sys.executable, "-c", code],
         capture_output=True,
         text=True,
         check=True,
         env={**os.environ, "PYTHONPATH": path},
+    )
+
+
+def test_a_renderer_that_is_left_open_ends_in_silence(renderer):
+    left = run(
+        "import numpy as np; from mplearn_envs.rendering import Renderer;"
+        "from mplearn_envs.robot import humanoid; import mujoco; model = humanoid().model();"
+        "data = mujoco.MjData(model); mujoco.mj_forward(model, data);"
+        "first, second = Renderer(model, 32, 24), Renderer(model, 32, 24);"
+        "print(first.render(data).shape, np.std(second.render(data)) > 1)"
+    )
+    assert left.stdout == "(24, 32, 3) True\n" and left.stderr == ""
+
+
+def test_importing_the_package_is_light():
+    heavy = ("mujoco", "numba", "dm_control", "scipy", "torch")
+    done = run(f"import sys, mplearn_envs; print([m for m in {heavy} if m in sys.modules])")
+    assert done.stdout.strip() == "[]"
+
+
+def test_making_an_environment_is_light():
+    unwanted = ("mplearn_envs.online", "mplearn_envs.rendering", "scipy.signal", "torch")
+    done = run(
+        "import sys, gymnasium, mplearn_envs; gymnasium.make('mplearn/PrimitiveHumanoid-v0');"
+        f"print([m for m in {unwanted} if m in sys.modules])"
     )
     assert done.stdout.strip() == "[]"
