@@ -18,8 +18,7 @@ class ActivityConfig:
             are no neighbours [s].
         reach_s: Within this time an activity comes back to its postures [s].
         least_s: Shortest stretch of an activity [s].
-        linked_s: Number of neighbours that a posture is linked to, as a time [s].
-        mixed_s: Number of neighbours that say whether two stretches mix, as a time [s].
+        neighbours_s: Number of neighbours that are looked at, as the time that they fill [s].
         recurrence: Links that a stretch must hold, as a share of those that it would hold if they
             were spread evenly over `reach_s`.
         mixing: Two stretches are one activity if neighbours lie in the other one at least at this
@@ -30,13 +29,12 @@ class ActivityConfig:
     apart_s: float = 0.8
     reach_s: float = 8.0
     least_s: float = 2.0
-    linked_s: float = 1.0
-    mixed_s: float = 1.5
+    neighbours_s: float = 1.0
     recurrence: float = 0.9
     mixing: float = 0.5
 
     def __post_init__(self) -> None:
-        times = ("step_s", "apart_s", "reach_s", "least_s", "linked_s", "mixed_s")
+        times = ("step_s", "apart_s", "reach_s", "least_s", "neighbours_s")
         check_positive(self, *times, "recurrence", "mixing")
         if not self.step_s <= self.apart_s < self.reach_s:
             raise InvalidValueError(

@@ -54,10 +54,10 @@ def find_activities(
     least, apart = steps(config.least_s), steps(config.apart_s)
     if len(points) < 2 * least:
         return np.zeros(len(frames), np.int64)
-    reach, linked = steps(config.reach_s), steps(config.linked_s)
-    band = band_of_links(points, apart, reach, linked, config.recurrence)
+    reach, count = steps(config.reach_s), steps(config.neighbours_s)
+    band = band_of_links(points, apart, reach, count, config.recurrence)
     starts = best_stretches(band, least)
-    activities = group(points, starts, apart, steps(config.mixed_s), config.mixing)
+    activities = group(points, starts, apart, count, config.mixing)
     return activities[np.repeat(np.arange(len(starts)), np.diff([*starts, len(points)]))][
         step_of_frame
     ]

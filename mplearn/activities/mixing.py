@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..recording import FloatArray, IntArray
+from ..recording import BoolArray, FloatArray, IntArray
 
 _ROWS = 256
 
@@ -41,7 +41,7 @@ def group(
     mixed = np.full((m, m), -np.inf)
     for a in range(m):
         for b in range(a):
-            mixed[a, b] = mixed[b, a] = _mixed(near, of_point, a, b)
+            mixed[a, b] = mixed[b, a] = _mixed(near, of_point, apart, a, b)
     while m > 1 and mixed.max() >= mixing:
         b, a = sorted(int(i) for i in np.unravel_index(mixed.argmax(), mixed.shape))
         both = np.concatenate((near[:, a], near[:, b]), axis=1)
@@ -51,7 +51,7 @@ def group(
         mixed[a] = mixed[:, a] = -np.inf
         for other in np.unique(of_stretch):
             if other != b:
-                mixed[other, b] = mixed[b, other] = _mixed(near, of_point, int(other), b)
+                mixed[other, b] = mixed[b, other] = _mixed(near, of_point, apart, int(other), b)
     return np.unique(of_stretch, return_inverse=True)[1]
 
 
@@ -77,16 +77,28 @@ def nearest_in_each(
     return near
 
 
-def _mixed(near: NDArray[np.float32], of_point: IntArray, a: int, b: int) -> float:
+def _mixed(near: NDArray[np.float32], of_point: IntArray, apart: int, a: int, b: int) -> float:
     """Return how far the points of a and b are mixed: 0 not at all, 1 evenly; the lesser side."""
-    n_a, n_b = int((of_point == a).sum()), int((of_point == b).sum())
-    count = min(near.shape[2], n_a, n_b)
-    sides = []
-    for own, other, n_other in ((a, b, n_b), (b, a, n_a)):
-        mine, theirs = near[of_point == own, own], near[of_point == own, other]
-        kth = np.sort(np.concatenate((mine, theirs), axis=1), axis=1)[:, count - 1 : count]
-        nearer, tied = (theirs < kth).sum(axis=1), (theirs == kth).sum(axis=1)
-        left = count - nearer - (mine < kth).sum(axis=1)
-        share = (nearer + left * tied / (tied + (mine == kth).sum(axis=1))).mean() / count
-        sides.append(float(share) * (n_a + n_b) / n_other)
-    return min(sides)
+    return min(_strayed(near, of_point, apart, a, b), _strayed(near, of_point, apart, b, a))
+
+
+def _strayed(
+    near: NDArray[np.float32], of_point: IntArray, apart: int, own: int, other: int
+) -> float:
+    """Return the share of the neighbours of a stretch that lie in another, over the even one."""
+    rows = np.flatnonzero(of_point == own)
+    n_own, n_other = (_eligible(of_point == each, rows, apart) for each in (own, other))
+    count = max(1, min(near.shape[2], int((n_own + n_other).min())))
+    mine, theirs = near[rows, own], near[rows, other]
+    kth = np.sort(np.concatenate((mine, theirs), axis=1), axis=1)[:, count - 1 : count]
+    nearer, tied = (theirs < kth).sum(axis=1), (theirs == kth).sum(axis=1)
+    left = count - nearer - (mine < kth).sum(axis=1)
+    found = (nearer + left * tied / (tied + (mine == kth).sum(axis=1))).sum() / count
+    return float(found / (n_other / np.maximum(n_own + n_other, 1)).sum())
+
+
+def _eligible(members: BoolArray, rows: IntArray, apart: int) -> IntArray:
+    """Return how many members are far enough in time from each of the rows."""
+    before = np.concatenate(([0], members.cumsum()))
+    near = before[np.minimum(rows + apart + 1, len(members))] - before[np.maximum(rows - apart, 0)]
+    return np.asarray(before[-1] - near)
