@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..body import BodyView, MotionObserver, view_of
-from ..errors import BodyError, FrameError
+from ..errors import BodyError
 from ..graph import Prediction, TransitionGraph
 from ..library import MotionNovelty, PrimitiveLibrary
 from ..people import PeopleConfig, PeopleTree
@@ -22,6 +22,7 @@ from ..segmentation import make_segmenter
 from ..tree import Change, FormConfig, Placement, TreeConfig
 from .buffer import FrameBuffer
 from .chain import Chain
+from .checks import StreamChecks
 from .config import LearnerConfig
 from .events import (
     Anomaly,
@@ -38,7 +39,6 @@ from .snapshot import library_of
 STILL_M = (
     0.02  # a segment in which no part of the body, and no joint's lever, goes farther: a pause
 )
-CLOCK_TOLERANCE = 0.5  # of a sampling interval: beyond it, a time stamp does not fit the rate
 
 
 class MotionLearner:
@@ -61,6 +61,7 @@ class MotionLearner:
     def __init__(self, config: LearnerConfig) -> None:
         self.config = config
         self._watches = config.observe == "robot" and are_markers(config.channels)
+        self._checks = StreamChecks(config.channels, config.rate_hz, gaps=self._watches)
         self._observer = self._new_observer()
         self.channels = config.channels if self._observer is None else self._observer.channels
         self._view = view_of(self.channels)
@@ -98,9 +99,9 @@ class MotionLearner:
             FrameError: The frame has the wrong width, is not finite, or its time does not fit;
                 nothing has changed then.
         """
-        frame = self._checked(frame)
+        frame = self._checks.frame(frame)
         if time_s is not None:
-            self._check_clock(time_s)
+            self._checks.clock(self._clock_s, time_s)
         features = frame[None] if self._observer is None else self._observer.update(frame)
         self._clock_s = time_s
         return self._take(features)
@@ -121,17 +122,7 @@ class MotionLearner:
         Raises:
             FrameError: The recording has other channels, or another rate.
         """
-        if recording.channels != self.config.channels:
-            raise FrameError(
-                f"recording {recording.name!r} has {len(recording.channels)} channels "
-                f"({', '.join(recording.channels[:3])}, ...); the learner was made for "
-                f"{len(self.config.channels)} ({', '.join(self.config.channels[:3])}, ...)"
-            )
-        if abs(recording.rate_hz - self.config.rate_hz) > 1e-3 * self.config.rate_hz:
-            raise FrameError(
-                f"recording {recording.name!r} has {recording.rate_hz:g} Hz, the learner was made "
-                f"for {self.config.rate_hz:g} Hz; open it with rate_hz={self.config.rate_hz:g}"
-            )
+        self._checks.recording(recording)
         if self.n_frames > self._stream_start:
             yield self.end_stream()
         for frame in recording.frames:
@@ -243,37 +234,6 @@ class MotionLearner:
             return None
         names = tuple(channel[:-2] for channel in self.config.channels[::3])
         return MotionObserver(names, self.config.rate_hz)
-
-    def _checked(self, frame: FloatArray) -> FloatArray:
-        try:
-            frame = np.asarray(frame, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise FrameError(f"a frame must hold numbers, not {frame!r:.60}") from error
-        if frame.shape != (len(self.config.channels),):
-            raise FrameError(
-                f"a frame must have shape ({len(self.config.channels)},), not {frame.shape}"
-            )
-        wrong = np.isinf(frame) if self._watches else ~np.isfinite(frame)
-        if wrong.any():
-            channel = int(np.argmax(wrong))
-            raise FrameError(
-                f"channel {self.config.channels[channel]!r} is {frame[channel]}; "
-                + ("a missing marker is NaN" if self._watches else "a frame must be finite")
-            )
-        return frame
-
-    def _check_clock(self, time_s: float) -> None:
-        step_s = 1.0 / self.config.rate_hz
-        if not np.isfinite(time_s):
-            raise FrameError(f"time_s must be finite, not {time_s}")
-        if self._clock_s is None:
-            return
-        passed_s = time_s - self._clock_s
-        if abs(passed_s - step_s) > CLOCK_TOLERANCE * step_s:
-            raise FrameError(
-                f"frames must be {step_s:.4g} s apart ({self.config.rate_hz:g} Hz), not "
-                f"{passed_s:.4g} s; after a gap, end the stream or fill it with NaN"
-            )
 
     def _take(self, features: FloatArray) -> list[Event]:
         """Take features that are ready, shape (k, D), all of one person."""

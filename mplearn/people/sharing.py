@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,29 +11,11 @@ import numpy as np
 from ..recording import FloatArray, IntArray
 from ..tree import ROOT, Change, Merge, Node, Placement, PrimitiveTree, Split, TreeConfig
 from .config import PeopleConfig
+from .identities import executions_held, identities, recognised_as, split_into
+from .leaf import Leaf, stacked
 from .links import corrected, solve, tension
+from .nodes import nodes_of
 from .shapes import Shape, distances, shape_of
-
-
-@dataclass
-class Leaf:
-    """A leaf of a person's tree, and the primitive that it belongs to.
-
-    Attributes:
-        person: Whose it is.
-        local: Its id in that person's tree.
-        id: Its id among all nodes; that of its primitive, as long as it was never joined by others.
-        primitive: Id of the primitive; `ROOT` before it is known.
-        founded: Id of the primitive that was born with this leaf; `ROOT` if none was.
-        shape: Its mean trajectory.
-    """
-
-    person: int
-    local: int
-    id: int
-    primitive: int
-    founded: int
-    shape: Shape
 
 
 class Sharing:
@@ -101,39 +82,8 @@ class Sharing:
     @property
     def nodes(self) -> tuple[Node, ...]:
         """All nodes, by id: the root, what was split, primitives, and leaves below those."""
-        nodes = {ROOT: Node(ROOT, None, 0)}
-        for id, node in self._above.items():
-            nodes[id] = Node(id, self._parents[id], node.born_at, history=list(node.history))
-        for id in self.primitives:
-            nodes[id] = Node(id, self._parents[id], self._n_seen)
-        for person, tree in self._trees.items():
-            waiting = tree.node(ROOT)
-            nodes[ROOT].members += [self._numbers[person][n] for n in waiting.members]
-            nodes[ROOT].n_placed += waiting.n_placed
-            nodes[ROOT].n_frames += waiting.n_frames
-        for leaf in self.leaves:
-            own = self._trees[leaf.person].node(leaf.local)
-            numbers = [self._numbers[leaf.person][n] for n in own.members]
-            node = nodes[leaf.primitive]
-            node.members += numbers
-            node.n_placed += own.n_placed
-            node.n_frames += own.n_frames
-            node.born_at = min(node.born_at, own.born_at)
-            if leaf.id != leaf.primitive:
-                nodes[leaf.id] = Node(
-                    leaf.id,
-                    leaf.primitive,
-                    own.born_at,
-                    numbers,
-                    own.matrix,
-                    own.n_placed,
-                    own.n_frames,
-                    history=list(own.history),
-                )
-        for node in nodes.values():
-            if node.parent is not None:
-                nodes[node.parent].children.append(node.id)
-        return tuple(nodes[id] for id in sorted(nodes))
+        above, parents = self._above, self._parents
+        return nodes_of(self.leaves, self._trees, self._numbers, above, parents, self._n_seen)
 
     # ---- learning
 
@@ -154,7 +104,7 @@ class Sharing:
             if other is not None and ratio <= 1:
                 self._joined[number] = said = nearest = other
         if placement.recognised:
-            said = before.get((person, _recognised_as(placement)), ROOT)
+            said = before.get((person, recognised_as(placement)), ROOT)
         changed = self._take_up(person, tree, placement)
         born, splits, merges, moved = self._solve(before, person, placement) if changed else _NONE
         self._tidy(person, tree)
@@ -220,12 +170,22 @@ class Sharing:
         self, before: Mapping[tuple[int, int], int], person: int, placement: Placement
     ) -> tuple[tuple[int, ...], tuple[Split, ...], tuple[Merge, ...], tuple[tuple[int, int], ...]]:
         """Find again which leaves are one primitive, and say what changed by it."""
-        groups, offsets, self._unit = self._solved()
+        found, offsets, self._unit = self._solved()
+        groups: list[int] = found.tolist()
         self._offsets = dict(zip(self._trees, offsets, strict=True))
-        held = self._held(groups, before, person, placement)
-        ids = _identities(held)
+        held = executions_held(
+            self.leaves,
+            groups,
+            before,
+            self._trees,
+            self._numbers,
+            self._joined,
+            person,
+            placement,
+        )
+        ids = identities(held)
         born, merges, splits = [], [], []
-        for group in dict.fromkeys(groups.tolist()):
+        for group in dict.fromkeys(groups):
             if group not in ids:
                 ids[group] = self._next_id
                 self._next_id += 1
@@ -235,7 +195,7 @@ class Sharing:
         gone = set(before.values()) - set(ids.values())
         for id in sorted(gone):
             heirs = Counter({g: counts[id] for g, counts in held.items() if counts[id]})
-            into = self._split_into(id, before, person, placement, groups, ids)
+            into = split_into(id, self.leaves, groups, ids, before, person, placement)
             if into:
                 splits.append(Split(id, into))
                 self._above[id] = Node(id, None, self._n_seen, history=[("split", self._n_seen)])
@@ -246,7 +206,7 @@ class Sharing:
                 merges.append(Merge(ids[heirs.most_common(1)[0][0]], id))
         moved: list[tuple[int, int]] = []
         absorbed = {merge.absorbed: merge.kept for merge in merges}
-        for leaf, group in zip(self.leaves, groups.tolist(), strict=True):
+        for leaf, group in zip(self.leaves, groups, strict=True):
             old = before.get((leaf.person, leaf.local), ROOT)
             leaf.primitive = ids[group]
             if absorbed.get(old, old) != leaf.primitive:
@@ -259,60 +219,6 @@ class Sharing:
         }
         self._name_leaves()
         return tuple(born), tuple(splits), tuple(merges), tuple(moved)
-
-    def _held(
-        self,
-        groups: IntArray,
-        before: Mapping[tuple[int, int], int],
-        person: int,
-        placement: Placement,
-    ) -> dict[int, Counter[int]]:
-        """Return how many executions of each old primitive are in each group of leaves.
-
-        The group of the leaf that a primitive was born with counts for as many as all others.
-        """
-        held: dict[int, Counter[int]] = {}
-        founders: dict[int, int] = {}
-        for leaf, group in zip(self.leaves, groups.tolist(), strict=True):
-            counts = held.setdefault(group, Counter())
-            node = self._trees[leaf.person].node(leaf.local)
-            old = before.get((leaf.person, leaf.local))
-            if old is not None:
-                counts[old] += node.n_placed
-                if leaf.founded == old:
-                    founders[old] = group
-                continue
-            for n in node.members:
-                joined = self._joined.get(self._numbers[leaf.person][n])
-                if joined is not None:
-                    counts[joined] += 1
-        for merge in placement.merges:  # what was absorbed counts where it went
-            lost = before.get((person, merge.absorbed))
-            for leaf, group in zip(self.leaves, groups.tolist(), strict=True):
-                if lost is not None and (leaf.person, leaf.local) == (person, merge.kept):
-                    held[group][lost] += 1
-        for old, group in founders.items():
-            held[group][old] += sum(counts[old] for counts in held.values())
-        return held
-
-    def _split_into(
-        self,
-        id: int,
-        before: Mapping[tuple[int, int], int],
-        person: int,
-        placement: Placement,
-        groups: IntArray,
-        ids: Mapping[int, int],
-    ) -> tuple[int, ...]:
-        """Return what a primitive was split into by its only person's tree; empty if it was not."""
-        for split in placement.splits:
-            if before.get((person, split.node)) == id:
-                return tuple(
-                    ids[group]
-                    for leaf, group in zip(self.leaves, groups.tolist(), strict=True)
-                    if leaf.person == person and leaf.local in split.into
-                )
-        return ()
 
     def _name_leaves(self) -> None:
         """Give a leaf an id of its own as soon as it shares its primitive."""
@@ -333,9 +239,7 @@ class Sharing:
             "next_id": self._next_id,
             "n_seen": self._n_seen,
             "unit": self._unit,
-            "leaves": [
-                [*(getattr(leaf, name) for name in _IDS), *leaf.shape] for leaf in self.leaves
-            ],
+            "leaves": [leaf.state() for leaf in self.leaves],
             "numbers": [
                 [person, [list(pair) for pair in numbers.items()]]
                 for person, numbers in self._numbers.items()
@@ -350,13 +254,7 @@ class Sharing:
         """Resume from what `state` returned, with the same trees."""
         self._next_id, self._n_seen = int(state["next_id"]), int(state["n_seen"])
         self._unit = float(state["unit"])
-        self.leaves = [
-            Leaf(
-                **dict(zip(_IDS, map(int, ids), strict=True)),
-                shape=Shape(np.array(posture), np.array(movement)),
-            )
-            for *ids, posture, movement in state["leaves"]
-        ]
+        self.leaves = [Leaf.from_state(leaf) for leaf in state["leaves"]]
         self._numbers = {
             int(person): {int(there): int(here) for there, here in pairs}
             for person, pairs in state["numbers"]
@@ -370,7 +268,7 @@ class Sharing:
     # ---- inside
 
     def _solved(self) -> tuple[IntArray, FloatArray, float]:
-        return solve(self._stacked(), self._whose(), len(self._trees), self.rules)
+        return solve(stacked(self.leaves), self._whose(), len(self._trees), self.rules)
 
     def _seen(self, tree: PrimitiveTree, leaf: int) -> Shape:
         return shape_of(tree.exemplars(leaf), self.config.form)
@@ -385,14 +283,9 @@ class Sharing:
         known = self._offsets.get(person)
         return np.zeros(self.leaves[0].shape.posture.shape) if known is None else known
 
-    def _stacked(self) -> Shape:
-        return Shape(
-            *(np.array(part) for part in zip(*(leaf.shape for leaf in self.leaves), strict=True))
-        )
-
     def _corrected(self) -> Shape:
         offsets = np.array([self._offset(person) for person in self._trees])
-        return corrected(self._stacked(), self._whose(), offsets)
+        return corrected(stacked(self.leaves), self._whose(), offsets)
 
     def _whose(self) -> IntArray:
         places = {person: place for place, person in enumerate(self._trees)}
@@ -409,23 +302,4 @@ class Sharing:
 
 
 TIDY = 32  # segments after which those are forgotten that the tree has forgotten
-_IDS = ("person", "local", "id", "primitive", "founded")
 _NONE: tuple[tuple[()], tuple[()], tuple[()], tuple[()]] = ((), (), (), ())
-
-
-def _identities(held: Mapping[int, Counter[int]]) -> dict[int, int]:
-    """Return which group keeps the id of which primitive: most executions first."""
-    pairs = [(-count, id, group) for group, ids in held.items() for id, count in ids.items()]
-    kept: dict[int, int] = {}
-    for _, id, group in sorted(pairs):
-        if group not in kept and id not in kept.values():
-            kept[group] = id
-    return kept
-
-
-def _recognised_as(placement: Placement) -> int:
-    """Return the leaf that a segment was recognised as, which it may have split or merged."""
-    for split in placement.splits:
-        if placement.node_id in split.into:
-            return split.node
-    return placement.node_id

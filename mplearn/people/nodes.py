@@ -1,0 +1,61 @@
+"""The nodes of all people's trees as one tree: primitives, and a leaf a person below each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ..tree import ROOT, Node, PrimitiveTree
+from .leaf import Leaf
+
+
+def nodes_of(
+    leaves: Sequence[Leaf],
+    trees: Mapping[int, PrimitiveTree],
+    numbers: Mapping[int, Mapping[int, int]],
+    above: Mapping[int, Node],
+    parents: Mapping[int, int],
+    n_seen: int,
+) -> tuple[Node, ...]:
+    """Return all nodes, by id: the root, what was split, primitives, and leaves below those.
+
+    Args:
+        leaves: Of all people.
+        trees: Each person's tree.
+        numbers: Number here of each segment of a person's tree, by person.
+        above: Nodes above primitives: what was split.
+        parents: The node above each of those and each primitive.
+        n_seen: Segments seen, of all people.
+    """
+    nodes = {ROOT: Node(ROOT, None, 0)}
+    for id, node in above.items():
+        nodes[id] = Node(id, parents[id], node.born_at, history=list(node.history))
+    for id in sorted({leaf.primitive for leaf in leaves}):
+        nodes[id] = Node(id, parents[id], n_seen)
+    for person, tree in trees.items():
+        waiting = tree.node(ROOT)
+        nodes[ROOT].members += [numbers[person][n] for n in waiting.members]
+        nodes[ROOT].n_placed += waiting.n_placed
+        nodes[ROOT].n_frames += waiting.n_frames
+    for leaf in leaves:
+        own = trees[leaf.person].node(leaf.local)
+        members = [numbers[leaf.person][n] for n in own.members]
+        node = nodes[leaf.primitive]
+        node.members += members
+        node.n_placed += own.n_placed
+        node.n_frames += own.n_frames
+        node.born_at = min(node.born_at, own.born_at)
+        if leaf.id != leaf.primitive:
+            nodes[leaf.id] = Node(
+                leaf.id,
+                leaf.primitive,
+                own.born_at,
+                members,
+                own.matrix,
+                own.n_placed,
+                own.n_frames,
+                history=list(own.history),
+            )
+    for node in nodes.values():
+        if node.parent is not None:
+            nodes[node.parent].children.append(node.id)
+    return tuple(nodes[id] for id in sorted(nodes))
