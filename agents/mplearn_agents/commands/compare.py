@@ -23,13 +23,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--policies", nargs="+", help="names of policies (default: all)")
     parser.add_argument("--algorithms", nargs="*", default=["maskable-ppo"])
-    parser.add_argument("--priors", nargs="+", default=["logits"], help="see `mplearn train`")
+    parser.add_argument("--priors", nargs="+", help="see `mplearn train` (default: by task)")
     parser.add_argument("--seeds", type=int, default=5, help="number of seeds (default: 5)")
-    parser.add_argument("--episodes", type=int, default=100, help="kinematic episodes a seed")
+    parser.add_argument("--first-seed", type=int, default=100, help="the first (default: 100)")
+    parser.add_argument("--episodes", type=int, default=50, help="kinematic episodes a seed")
     parser.add_argument(
-        "--simulated-episodes", type=int, default=10, help="simulated episodes a seed"
+        "--simulated-episodes", type=int, default=2, help="simulated episodes a seed"
     )
-    parser.add_argument("--steps", type=int, default=40_000, help="macro steps of a training")
+    parser.add_argument("--steps", type=int, default=20_000, help="macro steps of a training")
 
 
 def run(args: argparse.Namespace) -> None:
@@ -46,8 +47,8 @@ def run(args: argparse.Namespace) -> None:
         dynamics=tuple(args.dynamics),
         policies=tuple(args.policies or POLICIES),
         algorithms=tuple(args.algorithms),
-        priors=tuple(args.priors),
-        seeds=tuple(range(args.seeds)),
+        priors=tuple(args.priors) if args.priors else None,
+        seeds=tuple(range(args.first_seed, args.first_seed + args.seeds)),
         episodes=args.episodes,
         simulated_episodes=args.simulated_episodes,
         steps=args.steps,

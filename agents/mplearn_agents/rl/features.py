@@ -76,3 +76,12 @@ def features_of(observation_space: spaces.Dict, capacity: int) -> list[Feature]:
         out += [Feature(f"{key} {k // capacity}", None, k % capacity) for k in range(n_slots)]
         out += [Feature(key, k, None) for k in range(spaces.flatdim(part) - n_slots)]
     return out + [Feature("log prior", None, slot) for slot in range(capacity)]
+
+
+def blocks_of(observation_space: spaces.Dict, capacity: int) -> list[list[int]]:
+    """Return the places of each block of slots, but for the log prior, shape (B, capacity)."""
+    blocks: dict[str, list[int]] = {}
+    for place, feature in enumerate(features_of(observation_space, capacity)):
+        if feature.slot is not None:
+            blocks.setdefault(feature.part, []).append(place)
+    return list(blocks.values())[:-1]

@@ -44,8 +44,9 @@ def grow(agent: TrainedPolicy, env: gymnasium.Env[Any, Any]) -> TrainedPolicy:
         for name, old in known.items():
             new = grown[name]
             if name.endswith(("policy_net.0.weight", "value_net.0.weight")):
-                inputs = {here: there for here, there in columns.items() if here < new.shape[1]}
-                new[:, list(inputs)] = old[:, list(inputs.values())]
+                new[:, list(columns)] = old[:, list(columns.values())]
+                n_common = old.shape[1] - _n_inputs(agent.model)
+                new[:, -n_common:] = old[:, -n_common:]  # of blocks, whatever their slots
             elif name.startswith("action_net."):
                 _copy_actions(old, new, moved)
             elif not name.startswith(("features_extractor.", "pi_features", "vf_features")):
@@ -54,9 +55,12 @@ def grow(agent: TrainedPolicy, env: gymnasium.Env[Any, Any]) -> TrainedPolicy:
 
 
 def _columns(old: Any, new: Any, moved: Mapping[int, int]) -> dict[int, int]:
-    """Return for the features of the new model where they were in the old one, as far as known."""
-    before = features_of(old.observation_space, int(old.action_space.n))
-    after = features_of(new.observation_space, int(new.action_space.n))
+    """Return for the features of the new model where they were in the old one, as far as known.
+
+    The log prior is left out.
+    """
+    before = features_of(old.observation_space, int(old.action_space.n))[: _n_inputs(old)]
+    after = features_of(new.observation_space, int(new.action_space.n))[: _n_inputs(new)]
     if {each.part for each in before} != {each.part for each in after}:
         raise InvalidValueError(
             f"the agent sees {sorted({each.part for each in before})}, the environment shows "
@@ -70,13 +74,20 @@ def _columns(old: Any, new: Any, moved: Mapping[int, int]) -> dict[int, int]:
     return {place: now[each] for place, each in enumerate(after) if each in now}
 
 
+def _n_inputs(model: Any) -> int:
+    """Return the number of features but for the log prior."""
+    return int(model.policy.features_dim - model.action_space.n)
+
+
 def _copy_actions(old: Tensor, new: Tensor, moved: Mapping[int, int]) -> None:
-    """Copy the rows of known actions; the last columns of a matrix are about slots, too."""
+    """Copy the rows of known actions; a matrix ends with two blocks of columns about slots."""
     there, here = torch.tensor(list(moved)), torch.tensor(list(moved.values()))
     if old.ndim == 1:
         new[here] = old[there]
         return
-    hidden = old.shape[1] - old.shape[0]
+    hidden = old.shape[1] - 2 * old.shape[0]
     new[here, :hidden] = old[there, :hidden]
-    new[here, hidden:] = 0.0  # what a known action makes of the prior of new ones
-    new[here[:, None], hidden + here] = old[there[:, None], hidden + there]
+    new[here, hidden:] = 0.0  # what a known action makes of what is said of new ones
+    for block in range(2):
+        first, then = hidden + block * old.shape[0], hidden + block * new.shape[0]
+        new[here[:, None], then + here] = old[there[:, None], first + there]

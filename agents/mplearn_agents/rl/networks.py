@@ -11,36 +11,66 @@ from stable_baselines3.common.torch_layers import MlpExtractor
 from torch import nn
 
 from .config import PriorUse
-from .features import log_prior
+from .features import blocks_of, log_prior
 
 
 class Trunk(nn.Module):
-    """Two multilayer perceptrons; the actor's keeps the logarithm of the prior beside its output.
+    """Two multilayer perceptrons that see what blocks of slots have in common; gates over slots.
+
+    What matters is often whether two blocks speak of the same slot (what was recognised is legal;
+    the current primitive is the one asked for), whichever it is: so both perceptrons get, beside
+    the features, the scalar product of each pair of the B blocks. And what a block says of a slot
+    matters to the action of the same slot: so the actor has for each the sum of what the blocks say
+    of it, weighted by gates that its perceptron opens and closes (they start closed), and the
+    logarithm of its prior.
 
     Args:
-        mlp: The perceptrons, over all features but the log prior.
-        n_actions: Number of actions A.
+        net_arch: Widths of the perceptrons' layers.
+        activation_fn: Between them.
+        n_features: Number of features F, log prior included.
+        blocks: Which features are about which slot, shape (B, A).
     """
 
-    def __init__(self, mlp: MlpExtractor, n_actions: int) -> None:
+    blocks: torch.Tensor
+    one: torch.Tensor
+    other: torch.Tensor
+
+    def __init__(
+        self,
+        net_arch: list[int],
+        activation_fn: type[nn.Module],
+        n_features: int,
+        blocks: torch.Tensor,
+    ) -> None:
         super().__init__()
-        self.mlp = mlp
-        self.n_actions = n_actions
-        self.latent_dim_pi = mlp.latent_dim_pi + n_actions
-        self.latent_dim_vf = mlp.latent_dim_vf
+        n_blocks, self.n_actions = blocks.shape
+        one, other = torch.triu_indices(n_blocks, n_blocks, 1)
+        n_inputs = n_features - self.n_actions + len(one)
+        self.mlp = MlpExtractor(n_inputs, net_arch, activation_fn, "cpu")
+        self.gates = nn.Linear(self.mlp.latent_dim_pi, n_blocks)
+        self.register_buffer("blocks", blocks, persistent=False)
+        self.register_buffer("one", blocks[one], persistent=False)
+        self.register_buffer("other", blocks[other], persistent=False)
+        self.latent_dim_pi = self.mlp.latent_dim_pi + 2 * self.n_actions
+        self.latent_dim_vf = self.mlp.latent_dim_vf
 
     def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Return what actor and critic make of the features."""
         return self.forward_actor(features), self.forward_critic(features)
 
     def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
-        """Return the actor's latent, shape (N, H + A)."""
-        prior = features[:, -self.n_actions :]
-        return torch.cat((self.mlp.forward_actor(features[:, : -self.n_actions]), prior), dim=1)
+        """Return the actor's latent, shape (N, H + 2 A)."""
+        latent = self.mlp.forward_actor(self._inputs(features))
+        gated = torch.einsum("nb,nba->na", self.gates(latent), features[:, self.blocks])
+        return torch.cat((latent, gated, features[:, -self.n_actions :]), dim=1)
 
     def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
         """Return the critic's latent, shape (N, H)."""
-        return self.mlp.forward_critic(features[:, : -self.n_actions])
+        return self.mlp.forward_critic(self._inputs(features))
+
+    def _inputs(self, features: torch.Tensor) -> torch.Tensor:
+        common = (features[:, self.one] * features[:, self.other]).sum(dim=2)
+        return torch.cat((features[:, : -self.n_actions], common), dim=1)
 
 
 class _WithPrior:
@@ -57,20 +87,18 @@ class _WithPrior:
 
     def _build_mlp_extractor(self: Any) -> None:
         n_actions = int(self.action_space.n)
-        mlp = MlpExtractor(
-            self.features_dim - n_actions,
-            net_arch=self.net_arch,
-            activation_fn=self.activation_fn,
-            device=self.device,
-        )
-        self.mlp_extractor = Trunk(mlp, n_actions)
+        blocks = torch.tensor(blocks_of(self.observation_space, n_actions))
+        self.mlp_extractor = Trunk(self.net_arch, self.activation_fn, self.features_dim, blocks)
 
     def _build(self, lr_schedule: Any) -> None:
         super()._build(lr_schedule)  # type: ignore[misc]
         net: nn.Linear = self.action_net  # type: ignore[attr-defined]
         n = net.out_features
         with torch.no_grad():
+            net.weight[:, -2 * n : -n] = torch.eye(n)
             net.weight[:, -n:] = torch.eye(n) if self.prior == "logits" else 0.0
+            for parameter in self.mlp_extractor.gates.parameters():
+                parameter.zero_()
 
     def evaluate_actions(
         self: Any, obs: Any, actions: torch.Tensor, **masks: Any
