@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mplearn.errors import MissingDependencyError
 from mplearn.recording import FloatArray
+from mplearn_envs.rendering import close_at_exit
 
 if TYPE_CHECKING:
     import mujoco
@@ -59,6 +60,7 @@ class Stage:
                 "there is no off-screen renderer here: install libegl1 and libgl1-mesa-dri, or "
                 "libosmesa6, and set MUJOCO_GL to 'egl' or 'osmesa'"
             ) from error
+        close_at_exit(self._renderer)
         # shadows and reflections take three quarters of the time where there is no graphics card
         for effect in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
             self._renderer.scene.flags[effect] = 0
