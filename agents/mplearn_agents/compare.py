@@ -58,8 +58,8 @@ class Comparison:
     priors: tuple[PriorUse, ...] | None = None
     seeds: tuple[int, ...] = (100, 101, 102, 103, 104)
     episodes: int = 50
-    simulated_episodes: int = 2
-    steps: int = 20_000
+    simulated_episodes: int = 4
+    steps: int = 40_000
     library: str | None = None
 
     def __post_init__(self) -> None:

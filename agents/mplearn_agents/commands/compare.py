@@ -28,9 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--first-seed", type=int, default=100, help="the first (default: 100)")
     parser.add_argument("--episodes", type=int, default=50, help="kinematic episodes a seed")
     parser.add_argument(
-        "--simulated-episodes", type=int, default=2, help="simulated episodes a seed"
+        "--simulated-episodes", type=int, default=4, help="simulated episodes a seed"
     )
-    parser.add_argument("--steps", type=int, default=20_000, help="macro steps of a training")
+    parser.add_argument("--steps", type=int, default=40_000, help="macro steps of a training")
 
 
 def run(args: argparse.Namespace) -> None:
