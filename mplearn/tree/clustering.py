@@ -74,9 +74,13 @@ def _members(merges: FloatArray, cluster: int) -> IntArray:
 
 
 def separation(matrix: FloatArray, first: IntArray, second: IntArray) -> float:
-    """Return the mean distance between two groups over that inside them."""
+    """Return the mean distance between two groups over that inside them.
+
+    Copies, where a recording is seen twice, say nothing of how much executions vary.
+    """
     inside = np.concatenate([pairs(matrix[np.ix_(group, group)]) for group in (first, second)])
     between = float(matrix[np.ix_(first, second)].mean())
+    inside = inside[inside > 1e-6 * between]
     return between / max(float(inside.mean()), 1e-300) if len(inside) else float("inf")
 
 

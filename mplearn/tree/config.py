@@ -95,7 +95,7 @@ class TreeConfig:
     reach_limit: float = 1.0
     n_nearest: int = 2
     split_ratio: float = 2.0
-    split_gap: float = 1.45
+    split_gap: float = 1.5
     split_scale: float = 0.9
     min_branch: int = 4
     merge_ratio: float = 1.4
