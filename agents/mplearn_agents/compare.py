@@ -19,7 +19,7 @@ from mplearn.recording import FloatArray
 from .episodes import Episode, play
 from .policies import NEEDS_TASK, POLICIES, Policy
 from .rl import TrainedPolicy, TrainingConfig
-from .rl.config import AlgorithmName, PriorUse
+from .rl.config import AlgorithmName, PriorUse, usual_prior
 from .rl.train import train
 from .rl.trained import CONFIG, POLICY
 
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 COLUMNS = ("task", "dynamics", "policy", "return", "success", "falls", "time")
 CONFIDENCE = 0.95
-PRIORS: dict[str, PriorUse] = {"follow": "feature"}  # see `Comparison.priors`
 SLOW = ("search",)  # plays as few episodes as the simulated robot does
 
 
@@ -42,8 +41,8 @@ class Comparison:
         policies: Names of policies; those that do not suit a task are left out there, as is
             "search" in "follow", where it foresees the demonstrator.
         algorithms: What agents are trained with.
-        priors: What the transition prior is to them; "dqn" knows "feature" only. None: "feature"
-            in "follow", where they must learn to wait, which has prior 0; else "logits".
+        priors: What the transition prior is to them; "dqn" knows "feature" only. None: what
+            suits the task, see `usual_prior`.
         seeds: Of the episodes, and of the trainings: one agent a seed.
         episodes: Episodes a seed, kinematic.
         simulated_episodes: Episodes a seed, simulated; and of policies that think long.
@@ -81,7 +80,7 @@ def compare(
         console: Where the progress of trainings is shown; None is silent.
     """
     for task in comparison.tasks:
-        priors = comparison.priors or (PRIORS.get(task, "logits"),)
+        priors = comparison.priors or (usual_prior(task),)
         trained = {
             f"{algorithm}, prior as {prior}": [
                 _trained(comparison, task, algorithm, prior, seed, agents, console)

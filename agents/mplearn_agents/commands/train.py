@@ -30,8 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--prior",
         choices=get_args(PriorUse),
-        default=default["prior"],
-        help="what the transition prior is to the policy (default: its initial logits)",
+        help="what the transition prior is to the policy (default: a feature in 'follow', initial "
+        "logits elsewhere)",
     )
     for name, what in (
         ("steps", "macro steps to train for"),
@@ -61,10 +61,12 @@ def run(args: argparse.Namespace) -> None:
     from rich.console import Console
 
     from mplearn_agents.rl import TrainingConfig
+    from mplearn_agents.rl.config import usual_prior
     from mplearn_agents.rl.train import train
 
     given = {f.name: getattr(args, f.name) for f in fields(TrainingConfig) if hasattr(args, f.name)}
     given["library"] = None if args.library is None else str(args.library)
+    given["prior"] = args.prior or usual_prior(args.task)
     console = Console()
     config = TrainingConfig(**given)
     start = None if args.start is None else _taken_along(args.start, config)

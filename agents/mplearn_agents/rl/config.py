@@ -15,6 +15,15 @@ AlgorithmName: TypeAlias = Literal["maskable-ppo", "ppo", "dqn"]
 PriorUse: TypeAlias = Literal["feature", "logits", "regulariser"]
 
 
+def usual_prior(task: str) -> PriorUse:
+    """Return the use of the prior that suits a task.
+
+    Where an agent must learn to wait, which has prior 0, the prior is a feature; initial logits
+    else.
+    """
+    return "feature" if task == "follow" else "logits"
+
+
 @dataclass(frozen=True)
 class TrainingConfig:
     """A training of one agent; the same configuration gives the same agent.
