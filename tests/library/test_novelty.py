@@ -1,7 +1,5 @@
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from library_examples import CHANNELS, RATE, demonstrations, example_library
 
 from mplearn.errors import InvalidValueError, UnknownPrimitiveError
@@ -36,19 +34,19 @@ def library():
     return PrimitiveLibrary(tuple(primitives), graph, CHANNELS, RATE, recogniser=tree.recogniser())
 
 
-@given(st.integers(0, 10_000))
-def test_p_values_of_a_like_motion_are_uniform_at_worst(seed):
-    rng = np.random.default_rng(seed)
-    clouds = {id: rng.normal(0, 0.5 + id, (10, 6)) for id in range(8)}
-    novelty = MotionNovelty({id: matrix_of(each) for id, each in clouds.items()}, 2)
+def test_p_values_of_a_like_motion_are_uniform_at_worst():
     p = []
-    for id, cloud in clouds.items():
-        for _ in range(15):
-            new = rng.normal(0, 0.5 + id, 6)
-            nearest = np.sort(np.linalg.norm(cloud - new, axis=1))[:2].mean()
-            p.append(novelty.score([(id, nearest)]).p_value)
-    assert np.mean(np.array(p) <= 0.2) <= 0.35  # 120 draws, ranks of 80 that hang together
-    assert np.mean(np.array(p) <= 0.6) >= 0.3  # nor is nothing ever unusual
+    for seed in range(40):  # the ranks of one library hang together
+        rng = np.random.default_rng(seed)
+        clouds = {id: rng.normal(0, 0.5 + id, (10, 6)) for id in range(8)}
+        novelty = MotionNovelty({id: matrix_of(each) for id, each in clouds.items()}, 2)
+        for id, cloud in clouds.items():
+            for _ in range(15):
+                new = rng.normal(0, 0.5 + id, 6)
+                nearest = np.sort(np.linalg.norm(cloud - new, axis=1))[:2].mean()
+                p.append(novelty.score([(id, nearest)]).p_value)
+    for rate in (0.05, 0.2, 0.6):
+        assert 0.5 * rate <= np.mean(np.array(p) <= rate) <= 1.1 * rate
 
 
 def test_scores_by_hand():
