@@ -22,7 +22,7 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
 
     The library holds the primitives and the graph of their observed transitions ([Kulic2012], 3).
     An action performs a whole primitive (a macro step of some seconds) on the simulated robot: the
-    upper body is tracked, the legs balance with both feet down (4.2.1).
+    upper body is tracked, the legs balance (4.2.1), and lift a foot where the motion does.
 
     ## Action space
 

@@ -210,8 +210,8 @@ def _walk(run: Run) -> Walk:
         summary=(
             f"A random walk of {len(walk.primitives)} primitives, each drawn as often as it "
             f"followed the one before: {walk.duration_s:.0f} seconds at half the person's speed, "
-            f"{_falls(walk.falls)}. Arms and trunk follow the primitives, the legs balance; "
-            "motions that lift a foot are left out."
+            f"{_falls(walk.falls)}. Arms and trunk follow the primitives, the legs balance "
+            "and lift a foot where the motion does."
         ),
         steps=tuple(Step(step.name, step.duration_s, step.fallen) for step in walk.steps),
         video=data_uri(film.video.read_bytes(), "video/mp4") if film else "",
