@@ -23,6 +23,7 @@ def pictured(renderer):
         ID, library=standing_library(), render_mode="rgb_array", width=160, height=120
     )
     env.reset(seed=0)
+    env.render()  # the driver rounds the first picture of a new context differently
     yield env
     env.close()
     env.close()  # a second time does nothing
@@ -33,7 +34,7 @@ def test_a_picture_shows_the_robot(pictured):
     standing = pictured.render()
     assert standing.shape == (120, 160, 3) and standing.dtype == np.uint8
     assert standing.std() > 10
-    np.testing.assert_allclose(pictured.render(), standing.astype(int), atol=2)  # nothing moved
+    np.testing.assert_array_equal(pictured.render(), standing)  # nothing moved
     pictured.step(3)
     assert (pictured.render() != standing).any(axis=2).mean() > 0.02  # it bows
 
