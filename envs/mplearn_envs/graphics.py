@@ -20,13 +20,15 @@ def choose_backend() -> bool:
     """Set ``MUJOCO_GL`` to the first graphics library that draws, where it is not set yet.
 
     Each is tried in a process of its own, since one that fails may take its process along. MuJoCo
-    reads the variable when it is imported: call this before.
+    reads the variable when it is imported: call this before. Afterwards only what MuJoCo has
+    already chosen is tried.
 
     Returns:
         Whether pictures can be drawn.
     """
     chosen = os.environ.get("MUJOCO_GL")
-    for backend in (chosen,) if chosen is not None or sys.platform != "linux" else _LINUX:
+    fixed = chosen is not None or "mujoco" in sys.modules or sys.platform != "linux"
+    for backend in (chosen,) if fixed else _LINUX:
         environment = {**os.environ, **({} if backend is None else {"MUJOCO_GL": backend})}
         trial = subprocess.run(
             [sys.executable, "-c", _TRIAL], env=environment, capture_output=True, check=False

@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 
 from mplearn.errors import MissingDependencyError
 from mplearn.recording import FloatArray
-from mplearn_envs.rendering import close_at_exit
 
 if TYPE_CHECKING:
     import mujoco
 
 #: Distance between neighbours on the stage [m].
 APART_M = 1.15
+#: The camera stands far off with a long lens, or neighbours would be seen from different sides.
+_DISTANCE_M = 7.0
+_HEIGHT_M = 2.6  # of what is seen at the bodies
 
 
 class Stage:
@@ -41,6 +43,7 @@ class Stage:
         import mujoco
 
         from mplearn_envs.overlay import BalanceMeter
+        from mplearn_envs.rendering import close_at_exit
 
         self.bodies, self.size, self.balance = tuple(bodies), size, balance
         self._model = _scene(self.bodies)
@@ -50,9 +53,9 @@ class Stage:
         self._starts = self._model.jnt_qposadr[self._starts]
         self._camera = mujoco.MjvCamera()
         self._camera.lookat[:] = (0.0, 0.0, 1.04)
-        self._camera.distance = 3.15
+        self._camera.distance = _DISTANCE_M
         self._camera.azimuth = 180.0 if len(self.bodies) > 1 else 165.0
-        self._camera.elevation = -26.0 if balance else -9.0  # the floor must be seen
+        self._camera.elevation = -26.0 if balance else -5.0  # the floor must be seen
         try:
             self._renderer = mujoco.Renderer(self._model, height=size[1], width=size[0])
         except Exception as error:  # what fails depends on the machine's graphics libraries
@@ -135,5 +138,6 @@ def _scene(bodies: Sequence[str]) -> mujoco.MjModel:
                 conaffinity=0,
             )
     model = scene.compile()
+    model.vis.global_.fovy = np.degrees(2 * np.arctan(0.5 * _HEIGHT_M / _DISTANCE_M))
     model.vis.quality.numslices, model.vis.quality.numstacks = 20, 10  # a third faster than 28, 16
     return model
