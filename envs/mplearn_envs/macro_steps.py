@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any, Literal, NamedTuple, SupportsFloat
+from typing import Any, Literal, SupportsFloat
 
 import gymnasium
 import mujoco
@@ -16,32 +16,15 @@ from numpy.typing import NDArray
 from mplearn.errors import InvalidValueError
 from mplearn.library import PrimitiveLibrary
 
-from .choices import HOLD, Choices
-from .measurement import Measured
+from .choices import HOLD
+from .episode import Episode, EpisodeState
 from .observation import Eyes, Observation
-from .performance import Performance
-from .performer import Dynamics, Performer, PerformerState, make_performer
+from .performer import Dynamics, Performer, make_performer
 from .repertoire import Repertoire
+from .rewards import add, earned_meanwhile
 from .screen import RENDER_MODES, Screen
 from .simulation import Simulation
 from .tasks import Choice, Scene, Task
-
-_HISTORY = 100  # primitives that tasks may look back
-
-
-class EpisodeState(NamedTuple):
-    """Where an episode is, all that its future depends on."""
-
-    performer: PerformerState
-    measured: Measured
-    current: int | None
-    history: tuple[int, ...]
-    time_s: float
-    n_steps: int
-    choices: Choices
-    task: Task
-    rng: np.random.Generator
-    running: bool
 
 
 class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
@@ -78,7 +61,7 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
         self._screen = screen
         self.render_mode = screen.mode
         self.frame_callback: Callable[[], object] | None = None
-        self._running = False
+        self._episode: Episode | None = None
 
     @cached_property
     def performer(self) -> Performer:
@@ -114,16 +97,12 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
             NoPathError: The task's goal cannot be reached.
         """
         super().reset(seed=seed)
-        self._running = False
+        self._episode = None
         self._begin()
-        self._measured: Measured = self.performer.reset()
-        self._current: int | None = None
-        self._history: tuple[int, ...] = ()
-        self._time_s = 0.0
-        self._n_steps = 0
-        self._choices: Choices = self.repertoire.entries(self.performer.reference)
-        self.task.reset(self._scene(options or {}))
-        self._running = True
+        measured = self.performer.reset()
+        episode = Episode(measured, self.repertoire.entries(self.performer.reference))
+        self.task.reset(self._scene(episode, options or {}))
+        self._episode = episode
         self._show()
         return self._observation(), self._info()
 
@@ -136,13 +115,13 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
             InvalidValueError: The action is no integer of the action space, or illegal with
                 ``illegal="raise"``; or the episode has not begun or is over.
         """
-        slot = self._slot(action)
-        legal = bool(self._choices.mask[slot])
-        novel = bool(self._choices.novel[slot])
+        before = self._running()
+        slot = self._slot(action, before.choices.mask)
+        legal = bool(before.choices.mask[slot])
+        novel = bool(before.choices.novel[slot])
         chosen = self.repertoire.primitive(slot) if legal else None
-        terms = self.task.bonuses(
-            Choice(chosen, legal, float(self._choices.prior[slot]), self._history)
-        )
+        probability = float(before.choices.prior[slot])
+        terms = self.task.bonuses(Choice(chosen, legal, probability, before.history))
         if not legal:
             terms["illegal"] = -self.illegal_penalty
         if novel:
@@ -151,18 +130,16 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
         outcome = self.performer.perform(
             chosen, self._frame if watched else None, self._frame_steps
         )
-        performance, self._measured = outcome.performance, outcome.measured
-        duration_s = performance.duration_s
-        self._time_s += duration_s
-        self._n_steps += 1
-        self._add_moments(terms, performance)
-        self._meanwhile(duration_s)
-        self._advance(chosen)
+        performance, duration_s = outcome.performance, outcome.performance.duration_s
         remaining = self.discount**duration_s
-        for name, value in self.task.arrive(self._scene({})).items():
-            terms[name] = terms.get(name, 0.0) + remaining * value
+        add(terms, earned_meanwhile(self.task, performance, self.discount))
+        self._meanwhile(duration_s)
+        episode = before.after(
+            chosen, outcome.measured, duration_s, self.repertoire, self.performer.reference
+        )
+        add(terms, self.task.arrive(self._scene(episode, {})), remaining)
         terminated = performance.fallen or self.task.done
-        self._running = not terminated
+        self._episode = episode._replace(running=not terminated)
 
         info = self._info()
         info["duration_s"] = duration_s
@@ -172,12 +149,12 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
         info["novel"] = novel
         info["fallen"] = performance.fallen
         info.update(outcome.figures)
-        truncated = self._n_steps >= self.max_steps
+        truncated = episode.n_steps >= self.max_steps
         return self._observation(), sum(terms.values()), terminated, truncated, info
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return which actions are legal, shape (capacity,): the convention of sb3-contrib."""
-        return self._choices.mask.astype(np.bool_)
+        return self._begun().choices.mask.astype(np.bool_)
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture, shape (height, width, 3), or show the window.
@@ -194,20 +171,8 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
 
     def state(self) -> EpisodeState:
         """Return where the episode is: with `load_state`, actions can be tried."""
-        shared = {id(part): part for part in (self.repertoire, self.library)}
-        task, rng = copy.deepcopy((self.task, self.np_random), shared)
-        return EpisodeState(
-            self.performer.state(),
-            self._measured,
-            self._current,
-            self._history,
-            self._time_s,
-            self._n_steps,
-            self._choices,
-            task,
-            rng,
-            self._running,
-        )
+        task, rng = copy.deepcopy((self.task, self.np_random), self._shared())
+        return EpisodeState(self.performer.state(), self._begun(), task, rng)
 
     def load_state(self, state: EpisodeState) -> tuple[Observation, dict[str, Any]]:
         """Go on from there, bit for bit; returns observation and info, as `reset` does.
@@ -220,13 +185,9 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
         """
         measured = self.performer.load_state(state.performer)
         same_kind = (state.performer.simulated is None) == (self.dynamics == "kinematic")
-        self._measured = state.measured if same_kind else measured
-        self._current, self._history = state.current, state.history
-        self._time_s, self._n_steps = state.time_s, state.n_steps
-        self._choices = state.choices
-        shared = {id(part): part for part in (self.repertoire, self.library)}
-        self.task, self.np_random = copy.deepcopy((state.task, state.rng), shared)
-        self._running = state.running
+        episode = state.episode
+        self._episode = episode if same_kind else episode._replace(measured=measured)
+        self.task, self.np_random = copy.deepcopy((state.task, state.rng), self._shared())
         return self._observation(), self._info()
 
     # ---- what others may look at
@@ -254,62 +215,54 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
 
     # ---- inside
 
-    def _slot(self, action: np.int64 | int) -> int:
-        if not self._running:
+    def _begun(self) -> Episode:
+        """Return the episode, over or not."""
+        if self._episode is None:
+            raise InvalidValueError("the episode has not begun: call reset first")
+        return self._episode
+
+    def _running(self) -> Episode:
+        """Return the episode, which goes on."""
+        if self._episode is None or not self._episode.running:
             raise InvalidValueError("the episode has not begun or is over: call reset first")
+        return self._episode
+
+    def _slot(self, action: np.int64 | int, mask: NDArray[np.int8]) -> int:
+        """Return a valid action as an integer."""
         value = np.asarray(action)
         if value.shape != () or value.dtype.kind not in "iu" or not 0 <= value < self.capacity:
             raise InvalidValueError(
                 f"an action is an integer in [0, {self.capacity}), not {action!r}"
             )
         slot = int(value)
-        if self.illegal == "raise" and not self._choices.mask[slot]:
-            allowed = np.flatnonzero(self._choices.mask).tolist()
+        if self.illegal == "raise" and not mask[slot]:
+            allowed = np.flatnonzero(mask).tolist()
             raise InvalidValueError(f"action {slot} is illegal here; legal are {allowed}")
         return slot
 
-    def _advance(self, chosen: int | None) -> None:
-        """Find out what may be done after an action; None is hold."""
-        if chosen is not None:
-            self._current = chosen
-            self._history = (*self._history[1 - _HISTORY :], chosen)
-        gone = self._current is not None and self._current not in self.repertoire.slots
-        if gone or (chosen is None and self._choices.dead_end):
-            self._current = None
-        if self._current is None:
-            self._choices = self.repertoire.entries(self.performer.reference)
-        else:
-            self._choices = self.repertoire.after(self._current)
+    def _shared(self) -> dict[int, Any]:
+        """Return what copies of a task share with it, for `copy.deepcopy`."""
+        return {id(part): part for part in (self.repertoire, self.library)}
 
-    def _add_moments(self, terms: dict[str, float], performance: Performance) -> None:
-        """Add the terms of a macro step's moments: the discounted integral of the rates."""
-        time_s = performance.time_s
-        weight = self.discount**time_s
-        weight[1:] *= time_s[1:] - time_s[:-1]
-        weight[0] *= time_s[0]
-        for name, rate in self.task.rates(performance).items():
-            terms[name] = terms.get(name, 0.0) + float(rate @ weight)
-        if performance.fallen:
-            terms["fall"] = self.task.fall() * self.discount**performance.duration_s
-
-    def _scene(self, options: Mapping[str, Any]) -> Scene:
+    def _scene(self, episode: Episode, options: Mapping[str, Any]) -> Scene:
         return Scene(
             self.repertoire,
-            self._measured,
+            episode.measured,
             self.performer.reference,
-            self._current,
-            self._history,
-            self._time_s,
+            episode.current,
+            episode.history,
+            episode.time_s,
             self.np_random,
             options,
         )
 
     def _observation(self) -> Observation:
-        slot = HOLD if self._current is None else self.repertoire.slots[self._current]
-        return self._eyes.see(self._measured, slot, self._choices, self.task.observe())
+        episode = self._begun()
+        slot = HOLD if episode.current is None else self.repertoire.slots[episode.current]
+        return self._eyes.see(episode.measured, slot, episode.choices, self.task.observe())
 
     def _info(self) -> dict[str, Any]:
-        choices, current = self._choices, self._current
+        choices, current = self._begun().choices, self._begun().current
         report = self.task.report()
         info = {
             "action_mask": choices.mask.copy(),

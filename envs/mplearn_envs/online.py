@@ -18,7 +18,7 @@ from mplearn.learner import (
 from mplearn.learner.events import Event
 
 from .demonstration import StreamLike, open_stream
-from .macro_steps import EpisodeState
+from .episode import EpisodeState
 from .primitive_humanoid import PrimitiveHumanoidEnv
 from .tasks import FollowTask
 

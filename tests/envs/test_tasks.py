@@ -198,7 +198,7 @@ def test_soonest_arrivals_are_those_of_all_ways():
     env = make("free")
     env.reset()
     repertoire = env.unwrapped.repertoire
-    found = soonest_arrivals(repertoire, env.unwrapped._choices)
+    found = soonest_arrivals(repertoire, repertoire.entries(env.unwrapped.performer.reference))
     best = {}
     rng = np.random.default_rng(0)
     for _ in range(60):
