@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mplearn_envs.control.balance import BalanceController
 from mplearn_envs.control.footwork import sole_heights
 from mplearn_envs.control.kinematics import forward, mass_tree, rotate_quaternion, rotation_error
-from mplearn_envs.control.reference import base_rotation, reference_robot
+from mplearn_envs.control.reference import base_rotation, reference_robot, rest_reference
 from mplearn_envs.control.velocity_ik import (
     add_leg_columns,
     errors,
@@ -165,6 +166,17 @@ def test_knees_never_get_straight():
     for height in np.linspace(0.80, 1.2, 9):
         q, _ = settled(np.zeros(len(ROBOT.upper)), height, 0.0, 0.3)
         assert (q[knees] > humanoid().guard_knee_rad - 1e-3).all()
+
+
+def test_knees_do_not_get_straight_while_the_hips_rise():
+    """A quick roll lifts one hip: what the guard allows moves, and must not be followed late."""
+    controller, here = BalanceController(humanoid()), rest_reference(humanoid())
+    knees = [7 + humanoid().joint_names.index(n) for n in humanoid().knees]
+    for x in np.linspace(0.0, 1.0, 100):
+        target = here.target.copy()
+        target[1] = 0.35 * x * x * (3.0 - 2.0 * x)
+        here = controller.update(here, target, 0.004)
+        assert here.q[knees].min() > humanoid().guard_knee_rad
 
 
 def test_the_height_is_reached_where_the_guard_is_far():

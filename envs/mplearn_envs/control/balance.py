@@ -14,7 +14,7 @@ import numpy as np
 from mplearn.recording import FloatArray
 from mplearn_envs.robot import Robot
 
-from .kinematics import forward
+from .kinematics import forward, rotate_quaternion
 from .reference import Reference, base_rotation, reference_robot
 from .velocity_ik import COG, FEET, HEIGHT, ORIENTATION, advance, errors, rates
 
@@ -57,13 +57,15 @@ class BalanceController:
             reference.target[0] + height_offset,
             base_rotation(reference.target[1], reference.target[2]),
         )
-        later = errors(
-            robot.stance, before, target[0] + height_offset, base_rotation(target[1], target[2])
-        )
+        height, upright = target[0] + height_offset, base_rotation(target[1], target[2])
+        later = errors(robot.stance, before, height, upright)
         rows = self._gains * now * period_s
         rows[COG] -= moved / pose.carried[0]
-        rows[HEIGHT] += later[HEIGHT] - now[HEIGHT]
         rows[ORIENTATION] += later[ORIENTATION] - now[ORIENTATION]
+        q[3:7] = rotate_quaternion(q[3:7], rows[ORIENTATION])  # it lifts the hips in a bow
+        bowed = errors(robot.stance, forward(robot.tree, q), height, upright)
+        q[3:7] = reference.q[3:7]
+        rows[HEIGHT] += bowed[HEIGHT] - now[HEIGHT]
         q = advance(robot.stance, q, rates(robot.tree, robot.stance, pose, rows))
         velocity = (target - reference.target) / period_s
         return reference._replace(target=target.copy(), velocity=velocity, q=q)

@@ -14,7 +14,7 @@ from mplearn_envs.control import Motion, Plan, Planner, reference_robot, rest_re
 from mplearn_envs.control.kinematics import places
 from mplearn_envs.feasibility import Feasibility, FeasibilityCheck
 from mplearn_envs.performance import Performance
-from mplearn_envs.robot import Robot, humanoid
+from mplearn_envs.robot import Retargeting, Robot, humanoid
 from mplearn_envs.simulation import Simulation
 
 from .model_error import disturb
@@ -66,11 +66,11 @@ class Walk:
 def skills(library: PrimitiveLibrary, planner: Planner, speed: float) -> dict[int, Skill]:
     """Judge all primitives of a library at a speed, as a share of the human's."""
     check = FeasibilityCheck(planner)
-    columns = [library.channels.index(name) for name in planner.robot.channels]
+    retargeting = Retargeting(library.channels, library.body, planner.robot)
     out = {}
     for id in library.ids:
         generated = library.generate([id])
-        frames = np.ascontiguousarray(generated.frames[:, columns])
+        frames = retargeting(generated.frames)
         if len(frames) == 1:
             frames = np.repeat(frames, 2, axis=0)
         motion = planner.motion(frames, generated.rate_hz)
@@ -93,7 +93,7 @@ def random_walks(
     robot can perform, any. The robot is never reset.
 
     Args:
-        library: The primitives; needs the robot's channels.
+        library: The primitives.
         seeds: One walk each; masses, gains and friction are drawn anew for each.
         n_primitives: Primitives in a row.
         speeds: Speeds, as shares of the human's.
