@@ -8,7 +8,8 @@ from mplearn.errors import BodyError
 from mplearn.recording import FloatArray, IntArray
 
 from .follower import Follower
-from .gauss_newton import Linkage, solve_frame
+from .gauss_newton import solve_frame
+from .linkage import Linkage
 from .tree import KinematicTree
 
 

@@ -20,7 +20,8 @@ from mplearn.recording import FloatArray
 from .body import Body
 from .calibration import Calibration, fit
 from .follower import follower
-from .gauss_newton import Linkage, solve_frame
+from .gauss_newton import solve_frame
+from .linkage import Linkage
 from .markers import MarkerSet, find_marker_set
 
 FEWEST_MARKERS = 3  # fewer do not say where a body is: the posture is held

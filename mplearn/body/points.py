@@ -10,8 +10,7 @@ from numba import njit
 from mplearn.recording import FloatArray, IntArray
 
 from .body import Body
-from .gauss_newton import Linkage
-from .kinematics import forward_kinematics
+from .linkage import Linkage, points_of_postures
 
 
 def points_of(features: FloatArray, body: Body, parts: IntArray, places: FloatArray) -> FloatArray:
@@ -26,7 +25,8 @@ def points_of(features: FloatArray, body: Body, parts: IntArray, places: FloatAr
     Returns:
         Shape (T, P, 3) [m].
     """
-    return np.asarray(_points(features, body.driven, _linkage(body), parts, places))
+    postures = _postures(features, body.driven, len(body.tree.axis))
+    return np.asarray(points_of_postures(postures, _linkage(body), parts, places))
 
 
 @cache
@@ -35,43 +35,14 @@ def _linkage(body: Body) -> Linkage:
 
 
 @njit(cache=True)
-def _points(
-    features: FloatArray,
-    driven: IntArray,
-    linkage: Linkage,
-    parts: IntArray,
-    places: FloatArray,
-) -> FloatArray:
-    n_bodies, n = len(linkage.parent), len(linkage.axis)
-    posture = np.zeros(7 + n)
-    pos, mat = np.empty((n_bodies, 3)), np.empty((n_bodies, 3, 3))
-    axes, anchors = np.empty((n, 3)), np.empty((n, 3))
-    points = np.empty((len(features), len(parts), 3))
+def _postures(features: FloatArray, driven: IntArray, n_joints: int) -> FloatArray:
+    """Return the postures at the origin, without heading, shape (T, 7 + n)."""
+    postures = np.zeros((len(features), 7 + n_joints))
     for t in range(len(features)):
         cr, sr = np.cos(features[t, 1] / 2), np.sin(features[t, 1] / 2)
         cp, sp = np.cos(features[t, 2] / 2), np.sin(features[t, 2] / 2)
-        posture[3], posture[4], posture[5], posture[6] = cr * cp, sr * cp, cr * sp, sr * sp
+        turn = postures[t, 3:7]
+        turn[0], turn[1], turn[2], turn[3] = cr * cp, sr * cp, cr * sp, sr * sp
         for j in range(len(driven)):
-            posture[7 + driven[j]] = features[t, 3 + j]
-        forward_kinematics(
-            posture,
-            linkage.parent,
-            linkage.offset,
-            linkage.rotation,
-            linkage.joint_body,
-            linkage.axis,
-            linkage.anchor,
-            pos,
-            mat,
-            axes,
-            anchors,
-            linkage.slides,
-        )
-        for p in range(len(parts)):
-            b = parts[p]
-            for i in range(3):
-                value = pos[b, i]
-                for k in range(3):
-                    value += mat[b, i, k] * places[p, k]
-                points[t, p, i] = value
-    return points
+            postures[t, 7 + driven[j]] = features[t, 3 + j]
+    return postures

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mplearn.body import KinematicTree, MarkerSet
-from mplearn.body.gauss_newton import Linkage, locate
-from mplearn.recording import FloatArray, IntArray
+from mplearn.body.linkage import Linkage, points_of_postures
+from mplearn.recording import FloatArray
 
 from .variability import Variability
 
@@ -70,17 +69,3 @@ class Cameras:
             return np.inf, np.inf
         start_s = after_s + self._hiding.exponential(self._seen_s)
         return start_s, start_s + self._hiding.uniform(*self._variability.occlusion_s)
-
-
-@njit(cache=True)
-def points_of_postures(
-    postures: FloatArray, linkage: Linkage, bodies: IntArray, offsets: FloatArray
-) -> FloatArray:
-    """Return the world positions (T, M, 3) [m] of body-fixed points at each posture (T, nq)."""
-    n_bodies, n_joints = len(linkage.parent), len(linkage.axis)
-    out = np.empty((len(postures), len(bodies), 3))
-    pos, mat = np.empty((n_bodies, 3)), np.empty((n_bodies, 3, 3))
-    axes, anchors = np.empty((n_joints, 3)), np.empty((n_joints, 3))
-    for t in range(len(postures)):
-        locate(postures[t], linkage, bodies, offsets, pos, mat, axes, anchors, out[t])
-    return out

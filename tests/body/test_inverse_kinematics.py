@@ -9,8 +9,9 @@ from mplearn.body import IKConfig, InverseKinematics, human_body, marker_set, ro
 from mplearn.body.bounded import bounded_solve, inverse_diagonal
 from mplearn.body.calibration import Calibration
 from mplearn.body.follower import follower
-from mplearn.body.gauss_newton import Linkage, solve_frame
+from mplearn.body.gauss_newton import solve_frame
 from mplearn.body.kinematics import integrate
+from mplearn.body.linkage import Linkage
 from mplearn.errors import BodyError, FrameError, InvalidValueError
 from mplearn.mocap import GapTracker
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mplearn.body import human_body, marker_set
-from mplearn.body.gauss_newton import Linkage
+from mplearn.body.linkage import Linkage, points_of_postures
 from mplearn.demonstrator import (
     PAPER_PRIMITIVES,
     PRIMITIVES,
@@ -23,7 +23,6 @@ from mplearn.demonstrator import (
     followers,
     markov_script,
 )
-from mplearn.demonstrator.cameras import points_of_postures
 from mplearn.errors import InvalidValueError
 
 # what the robot performs in the paper, section 4.2.2

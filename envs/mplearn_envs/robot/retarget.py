@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mplearn.body import human_body, posture_of, robot_body
-from mplearn.body.gauss_newton import Linkage, solve_frame
+from mplearn.body.gauss_newton import solve_frame
+from mplearn.body.linkage import Linkage
 from mplearn.body.tree import KinematicTree
 from mplearn.errors import RobotError
 from mplearn.recording import FloatArray, IntArray
