@@ -120,6 +120,7 @@ class Sharing:
             merges,
             tuple(move for move in moved if move[0] != number),
             nearest=nearest,
+            like=None if placement.like is None else numbers.get(placement.like),
         )
 
     def edited(self, person: int, change: Change) -> Change:

@@ -106,6 +106,8 @@ class Placement(NamedTuple):
         removed: Inner nodes that are gone, for they held nothing else.
         nearest: The primitive that it was nearest to when it came, within its radius or not; None
             where there was none.
+        like: Number of the segment that it is most like among those that wait to become a
+            primitive, where the two may show one motion; None where there is none.
     """
 
     number: int
@@ -121,3 +123,4 @@ class Placement(NamedTuple):
     reparented: tuple[Reparent, ...] = ()
     removed: tuple[int, ...] = ()
     nearest: int | None = None
+    like: int | None = None

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidValueError, UnknownPrimitiveError
-from ..hmm import LeftRightHMM, fit
+from ..hmm import FactorialHMM, LeftRightHMM
 from ..hmm.sequences import as_frames
 from ..recording import FloatArray
 from .births import form_primitives
 from .config import TreeConfig
 from .editing import chosen_groups, leaf_of, pair_of, place_below
 from .memory import SegmentMemory
+from .models import GroupModels
 from .node import Node
 from .placement import ROOT, Change, Placement
 from .recogniser import Recogniser, refusal
@@ -24,7 +25,7 @@ from .structure import Structure
 
 _SHORTEST_S = 0.1
 _LONGEST_S = 60.0
-_MODEL_FLOOR = 0.1  # smallest standard deviation of a primitive's model, as a share of all motion's
+_LIKENESS = 1.1  # largest distance over the tree's scale at which two segments may show one motion
 
 
 class PrimitiveTree:
@@ -65,7 +66,7 @@ class PrimitiveTree:
         self.n_seen = 0
         self._memory = SegmentMemory(config, numbers)
         self._structure = Structure(config, self._memory)
-        self._models: dict[int, tuple[tuple[int, ...], LeftRightHMM]] = {}
+        self._models = GroupModels(config, self._structure)
 
     # ---- looking
 
@@ -116,16 +117,26 @@ class PrimitiveTree:
     def model(self, id: int) -> LeftRightHMM:
         """Return a node's group model: fitted to its exemplars as they came, at their rate.
 
-        It has fewer states than configured where an exemplar is shorter than those.
+        It has fewer states than configured where an exemplar is shorter than those; where the
+        motion has more chains than one, it goes through the combinations that they visit.
+
+        Raises:
+            UnknownPrimitiveError: There is none of this id.
         """
-        members = tuple(self.node(id).members)
-        known = self._models.get(id)
-        if known is None or known[0] != members:
-            frames = self.exemplars(id)
-            n_states = min(self.config.n_states, *(len(each) for each in frames))
-            floor = _MODEL_FLOOR**2 * self._memory.variances()
-            self._models[id] = members, fit(frames, n_states, variance_floor=floor)
-        return self._models[id][1]
+        model = self.chains(id)
+        return model.left_right() if isinstance(model, FactorialHMM) else model
+
+    def chains(self, id: int) -> LeftRightHMM | FactorialHMM:
+        """Return a node's group model with all its chains.
+
+        There are more than one where ``max_chains`` allows it and a primitive cannot be told apart
+        from its neighbour by one [Kulic2008b].
+
+        Raises:
+            UnknownPrimitiveError: There is none of this id.
+        """
+        self.node(id)
+        return self._models.of(id)
 
     def recogniser(self) -> Recogniser:
         """Return what the tree would recognise now, frozen."""
@@ -161,6 +172,7 @@ class PrimitiveTree:
         if recognised and len(matches) > 1 and not self.config.local:
             structure.strangers.add(matches[1].ratio * structure.index.factor)
         structure.add(node, number)
+        like = self._waiting_like(node)
         if node.id == ROOT or self.config.local:
             change = form_primitives(structure, node, self.n_seen)
         else:
@@ -171,7 +183,7 @@ class PrimitiveTree:
         if self._memory.rescale():
             structure.remeasure()
         structure.tune()
-        self._forget_models()
+        self._models.forget()
         home = next((to for which, to in change.moved if which == number), node.id)
         home = next((merge.kept for merge in change.merges if merge.absorbed == home), home)
         others = tuple(move for move in change.moved if move[0] != number)
@@ -183,6 +195,7 @@ class PrimitiveTree:
             ratio,
             **change._replace(moved=others)._asdict(),
             nearest=matches[0].node if matches else None,
+            like=like,
         )
 
     # ---- learning by hand
@@ -241,7 +254,7 @@ class PrimitiveTree:
 
     def _edited(self, change: Change) -> Change:
         self._structure.tune()
-        self._forget_models()
+        self._models.forget()
         return change
 
     # ---- keeping
@@ -266,11 +279,16 @@ class PrimitiveTree:
         self._structure.strangers.load_state(state["strangers"])
         self._structure.nodes = {node.id: node for node in nodes}
         self._structure.reindex()
-        self._models = {}
+        self._models = GroupModels(self.config, self._structure)
 
-    def _forget_models(self) -> None:
-        for id in [id for id in self._models if id not in self._structure.nodes]:
-            del self._models[id]
+    def _waiting_like(self, node: Node) -> int | None:
+        """Return what the newest segment of the root is most like among those before it."""
+        if node.id != ROOT or len(node.members) < 2:
+            return None
+        row = node.matrix[-1, :-1]
+        nearest = int(row.argmin())
+        alike = row[nearest] <= _LIKENESS * self._memory.scale()
+        return node.members[nearest] if alike else None
 
     @property
     def _shortest_frames(self) -> int:
