@@ -12,13 +12,14 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import ModelError
-from ..recording import FloatArray
+from ..recording import FloatArray, IntArray
 from .factorial_posterior import Moments, exact_moments, variational_moments
 from .model import LeftRightHMM
 from .product_chain import ProductChain
 from .sequences import as_frames, as_weights
 
 MOST_COMBINATIONS = 1024  # up to here the E-step is exact
+_SHORTEST_STAY = 1.05  # frames: a state is never left for certain, or staying were impossible
 
 
 @dataclass(frozen=True)
@@ -132,7 +133,24 @@ class FactorialHMM:
 
         A chain that is through stays in its last state until the longest one is.
         """
-        motions = [chain.mean_motion() for chain in self.chains]
-        longest = max(len(motion) for motion in motions)
-        padded = [np.pad(m, ((0, longest - len(m)), (0, 0)), mode="edge") for m in motions]
-        return np.asarray(np.sum(padded, axis=0))
+        path = self._mean_path()
+        parts = [means[path[m]] for m, means in enumerate(self.means)]
+        return np.asarray(np.sum(parts, axis=0))
+
+    def left_right(self) -> LeftRightHMM:
+        """Return one chain through the combinations of states that the mean motion visits.
+
+        It generates and is kept as any other model, with the same mean motion but for rounding.
+        """
+        path = self._mean_path()
+        starts = np.flatnonzero(np.append(True, (np.diff(path, axis=1) != 0).any(axis=0)))
+        means = np.sum([own[path[m, starts]] for m, own in enumerate(self.means)], axis=0)
+        durations = np.diff(starts) + 0.0
+        stays = np.log1p(-1.0 / np.maximum(durations, _SHORTEST_STAY))
+        return LeftRightHMM(means, np.tile(self.variances, (len(means), 1)), np.append(stays, 0.0))
+
+    def _mean_path(self) -> IntArray:
+        """Return each chain's state at each frame of the mean motion, shape (M, T)."""
+        paths = [chain.mean_path() for chain in self.chains]
+        longest = max(len(path) for path in paths)
+        return np.stack([np.pad(path, (0, longest - len(path)), mode="edge") for path in paths])

@@ -99,8 +99,12 @@ class LeftRightHMM:
 
         The last state has no duration of its own: it is held as long as the others on average.
         """
+        return self.means[self.mean_path()]
+
+    def mean_path(self) -> IntArray:
+        """Return the state at each frame of `mean_motion`, shape (T,)."""
         last = self.durations_frames.mean() if self.n_states > 1 else 1.0
-        return self.means[held(np.append(self.durations_frames, last))]
+        return held(np.append(self.durations_frames, last))
 
     def score(
         self, frames: FloatArray, weights: FloatArray | None = None, *, complete: bool = True

@@ -46,6 +46,8 @@ class TreeConfig:
     Attributes:
         form: The form in which segments are compared.
         n_states: States of the models.
+        max_chains: Most chains of a primitive's model: one is added while it cannot be told apart
+            from its neighbour [Kulic2008b]; 1 for none.
         variance_floor: Smallest standard deviation of a model, as a share of that of all motion
             ever seen (of the channel's group).
         power: Power of the likelihood distance [nat] that everything below is measured in; 1 is
@@ -83,6 +85,7 @@ class TreeConfig:
 
     form: FormConfig = field(default_factory=FormConfig)
     n_states: int = 8
+    max_chains: int = 1
     variance_floor: float = 0.6
     power: float = 0.5
     local: bool = False
@@ -135,6 +138,7 @@ class TreeConfig:
                 raise InvalidValueError(f"{name} must be positive, not {getattr(self, name)}")
         lowest = {
             "n_states": 1,
+            "max_chains": 1,
             "min_exemplars": 2,
             "n_nearest": 1,
             "n_candidates": 0,

@@ -4,6 +4,8 @@ from itertools import product
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.special import logsumexp
 from scipy.stats import norm
 
@@ -229,3 +231,18 @@ def test_wrong_values_are_named():
         FactorialHMM(model.means, model.log_stays, np.ones((2, 2)))
     with pytest.raises(InvalidValueError, match="sizes"):
         fit_factorial([np.zeros((9, 2))], ())
+
+
+@given(st.integers(0, 10_000))
+def test_one_chain_through_the_combinations_generates_the_same_motion(seed):
+    rng = np.random.default_rng(seed)
+    sizes = tuple(int(size) for size in rng.integers(1, 5, rng.integers(1, 4)))
+    model = random_model(rng, sizes)
+    motion, one = model.mean_motion(), model.left_right()
+    changes = (np.diff(motion, axis=0) != 0).any(axis=1).sum()
+    assert one.n_states == changes + 1
+    assert np.allclose(one.means[0], motion[0]) and np.allclose(one.means[-1], motion[-1])
+    starts = np.flatnonzero(np.append(True, (np.diff(motion, axis=0) != 0).any(axis=1)))
+    assert np.allclose(one.durations_frames, np.maximum(np.diff(starts), 1.05))
+    assert np.allclose(one.means, motion[starts])
+    assert (one.variances == model.variances).all()

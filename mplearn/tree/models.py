@@ -1,0 +1,91 @@
+"""Group models: a model of each node's motions, with more chains where one does not tell apart."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..hmm import FactorialHMM, LeftRightHMM, add_chain, em_step, fit, needs_more_chains
+from ..recording import FloatArray
+from .config import TreeConfig
+from .node import Node
+from .placement import ROOT
+from .structure import Structure
+
+_FLOOR = 0.1  # smallest standard deviation of a model, as a share of all motion's
+_EM_STEPS = 5  # after each chain that is added
+_Members = tuple[int, ...]
+
+
+class GroupModels:
+    """Models of nodes, fitted when they are asked for and kept while their exemplars stay.
+
+    Args:
+        config: Rules of the tree.
+        structure: The nodes.
+    """
+
+    def __init__(self, config: TreeConfig, structure: Structure) -> None:
+        self._config = config
+        self._structure = structure
+        self._kept: dict[tuple[_Members, _Members], LeftRightHMM | FactorialHMM] = {}
+
+    def of(self, id: int) -> LeftRightHMM | FactorialHMM:
+        """Return a node's model: of one chain, or of as many as it needs to be told apart.
+
+        A motion starts as one chain. While it cannot be told apart from the leaf whose mean
+        trajectory is nearest, both get another one, fitted to what the others leave unexplained
+        [Kulic2008b].
+        """
+        node = self._structure.nodes[id]
+        neighbour = self._neighbour(node) if self._config.max_chains > 1 else None
+        key = tuple(node.members), tuple(neighbour.members) if neighbour else ()
+        if key not in self._kept:
+            self._kept[key] = self._apart(*key) if neighbour else self._single(key[0])
+        return self._kept[key]
+
+    def forget(self) -> None:
+        """Let the models of nodes that are gone, or have changed, go."""
+        held = {tuple(node.members) for node in self._structure.nodes.values()}
+        self._kept = {key: model for key, model in self._kept.items() if key[0] in held}
+
+    def _single(self, members: _Members) -> LeftRightHMM:
+        frames = self._frames(members)
+        return fit(frames, self._n_states(frames), variance_floor=self._floor())
+
+    def _apart(self, members: _Members, others: _Members) -> LeftRightHMM | FactorialHMM:
+        own, other = self._frames(members), self._frames(others)
+        model: LeftRightHMM | FactorialHMM = self._single(members)
+        rival: LeftRightHMM | FactorialHMM = self._single(others)
+        for _ in range(self._config.max_chains - 1):
+            if not needs_more_chains(model, own, rival, other):
+                break
+            model, rival = self._grown(model, own), self._grown(rival, other)
+        return model
+
+    def _grown(
+        self, model: LeftRightHMM | FactorialHMM, frames: tuple[FloatArray, ...]
+    ) -> FactorialHMM:
+        grown = add_chain(model, frames, self._n_states(frames))
+        for _ in range(_EM_STEPS):
+            grown = em_step(grown, frames, variance_floor=self._floor())
+        return grown
+
+    def _neighbour(self, node: Node) -> Node | None:
+        """Return the leaf whose mean trajectory is nearest to a leaf's; None for an inner node."""
+        bank, nodes = self._structure.memory.bank, self._structure.nodes.values()
+        leaves = [each for each in nodes if each.is_leaf and each.id not in (ROOT, node.id)]
+        if node.id == ROOT or not (node.is_leaf and leaves):
+            return None
+        own = bank.mean_profile(node.members)
+        away = [((bank.mean_profile(each.members) - own) ** 2).sum() for each in leaves]
+        return leaves[int(np.argmin(away))]
+
+    def _frames(self, members: _Members) -> tuple[FloatArray, ...]:
+        return tuple(self._structure.memory.frames[number] for number in members)
+
+    def _n_states(self, frames: tuple[FloatArray, ...]) -> int:
+        """As configured, or fewer where an exemplar is shorter."""
+        return min(self._config.n_states, *(len(each) for each in frames))
+
+    def _floor(self) -> FloatArray:
+        return _FLOOR**2 * self._structure.memory.variances()
