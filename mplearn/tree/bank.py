@@ -13,10 +13,11 @@ from ..hmm.kernels import log_densities, log_likelihood
 from ..recording import FloatArray, IntArray
 from . import form
 from .config import TreeConfig
+from .rows import Rows
 
 
 class Exemplar(NamedTuple):
-    """A segment in the form in which it is compared, and its model; or many of them, stacked.
+    """A segment in the form in which it is compared, and its model.
 
     Attributes:
         columns: Points, shape (D, P).
@@ -38,7 +39,7 @@ class Exemplar(NamedTuple):
 
 
 class ExemplarBank:
-    """Exemplars by number: points and a model each, in arrays that grow with need.
+    """Exemplars by number: points and a model each.
 
     Args:
         config: Rules of the tree.
@@ -53,8 +54,13 @@ class ExemplarBank:
         self._weights = form.weights(config.form)
         self._roots = np.sqrt(self._weights)
         self._slots: dict[int, int] = {}
-        self._free: list[int] = []
-        self._rows = _empty(config, n_channels, 0)
+        per_state, per_transition = (config.n_states, n_channels), (config.n_states,)
+        self._rows = Rows(
+            (n_channels, config.form.n_points),
+            *(per_state, per_state, per_state),
+            *(per_transition, per_transition),
+            (),
+        )
 
     def __contains__(self, number: int) -> bool:
         """Whether the exemplar is remembered."""
@@ -66,8 +72,7 @@ class ExemplarBank:
 
     def __getitem__(self, number: int) -> Exemplar:
         """Return an exemplar."""
-        slot = self._slots[number]
-        return Exemplar(*(rows[slot] for rows in self._rows))
+        return Exemplar(*self._rows.read(self._slots[number]))
 
     def model(self, points: FloatArray) -> Exemplar:
         """Model the points of a segment, shape (P, D); the bank does not remember it.
@@ -93,26 +98,18 @@ class ExemplarBank:
 
     def add(self, number: int, exemplar: Exemplar) -> None:
         """Remember an exemplar."""
-        if not self._free:
-            held = len(self._slots)
-            grown = _empty(self.config, self.n_channels, max(16, 2 * held))
-            for new, old in zip(grown, self._rows, strict=True):
-                new[:held] = old
-            self._rows = grown
-            self._free = list(range(len(grown.own) - 1, held - 1, -1))
-        slot = self._free.pop()
-        self._slots[number] = slot
-        self._write(slot, exemplar)
+        self._slots[number] = self._rows.take()
+        self._rows.write(self._slots[number], exemplar)
 
     def drop(self, number: int) -> None:
         """Forget an exemplar."""
-        self._free.append(self._slots.pop(number))
+        self._rows.release(self._slots.pop(number))
 
     def refit(self, floor: FloatArray) -> None:
         """Model all exemplars again, with another variance floor."""
         self.floor = np.array(floor, dtype=np.float64)
-        for slot in self._slots.values():
-            self._write(slot, self.model(self._rows.columns[slot].T))
+        for number, slot in self._slots.items():
+            self._rows.write(slot, self.model(self[number].columns.T))
 
     def profile(self, exemplar: Exemplar) -> FloatArray:
         """Return the points times the root of their weights, shape (D * P,); 0 where missing."""
@@ -123,17 +120,21 @@ class ExemplarBank:
 
     def mean_profile(self, numbers: Sequence[int]) -> FloatArray:
         """Return the mean profile of some exemplars, shape (D * P,)."""
-        columns = self._rows.columns[self._slots_of(numbers)].mean(axis=0)
-        if np.isnan(columns.sum()):
-            columns = np.nan_to_num(self._rows.columns[self._slots_of(numbers)]).mean(axis=0)
-        return np.asarray((columns * self._roots).ravel())
+        columns = self._rows.gather(self._slots_of(numbers), _COLUMNS)
+        mean = columns.mean(axis=0)
+        if np.isnan(mean.sum()):
+            mean = np.nan_to_num(columns).mean(axis=0)
+        return np.asarray((mean * self._roots).ravel())
 
     def distances(self, exemplar: Exemplar, others: Sequence[int]) -> FloatArray:
         """Return the distance from an exemplar to others of the bank, shape (k,).
 
         It is the symmetric likelihood distance [nat a frame] to the configured power.
         """
-        raw = _distances(exemplar, self._rows, self._slots_of(others), self._weights)
+        slots = self._slots_of(others)
+        raw = np.empty(len(slots))
+        for arrays, rows, here in self._rows.parted(slots):
+            raw[here] = _distances(exemplar, arrays, rows, self._weights)
         return np.asarray(np.maximum(raw, 0.0) ** self.config.power)
 
     def matrix(self, numbers: Sequence[int]) -> FloatArray:
@@ -150,7 +151,7 @@ class ExemplarBank:
     def points(self, numbers: Iterable[int] | None = None) -> dict[str, Any]:
         """Return what `from_points` needs of all exemplars, or of some; models follow from it."""
         numbers = sorted(self._slots if numbers is None else numbers)
-        columns = self._rows.columns[self._slots_of(numbers)]
+        columns = self._rows.gather(self._slots_of(numbers), _COLUMNS)
         return {
             "floor": self.floor.copy(),
             "numbers": np.array(numbers, np.int64),
@@ -170,39 +171,23 @@ class ExemplarBank:
         """Return all exemplars as plain arrays."""
         numbers = self.numbers()
         slots = self._slots_of(numbers)
-        rows = {name: rows[slots] for name, rows in self._rows._asdict().items()}
+        rows = {name: self._rows.gather(slots, k) for k, name in enumerate(Exemplar._fields)}
         return {"floor": self.floor.copy(), "numbers": np.array(numbers, np.int64), **rows}
 
     @classmethod
     def from_state(cls, config: TreeConfig, state: dict[str, Any]) -> ExemplarBank:
         """Return the bank that `state` described."""
         bank = cls(config, len(state["floor"]), state["floor"])
-        bank._rows = Exemplar(
-            *(np.array(state[name], dtype=np.float64) for name in Exemplar._fields)
-        )
-        bank._slots = {int(number): slot for slot, number in enumerate(state["numbers"])}
+        rows = (np.asarray(state[name], dtype=np.float64) for name in Exemplar._fields)
+        for number, *parts in zip(state["numbers"], *rows, strict=True):
+            bank.add(int(number), Exemplar(*parts))
         return bank
 
     def _slots_of(self, numbers: Sequence[int]) -> IntArray:
         return np.array([self._slots[number] for number in numbers], dtype=np.int64)
 
-    def _write(self, slot: int, exemplar: Exemplar) -> None:
-        for rows, value in zip(self._rows, exemplar, strict=True):
-            rows[slot] = value
 
-
-def _empty(config: TreeConfig, n_channels: int, n: int) -> Exemplar:
-    per_state = n, config.n_states, n_channels
-    per_transition = n, config.n_states
-    return Exemplar(
-        np.zeros((n, n_channels, config.form.n_points)),
-        np.zeros(per_state),
-        np.zeros(per_state),
-        np.zeros(per_state),
-        np.zeros(per_transition),
-        np.zeros(per_transition),
-        np.zeros(n),
-    )
+_COLUMNS = Exemplar._fields.index("columns")
 
 
 @njit(cache=True)
@@ -215,9 +200,9 @@ def _score(columns: FloatArray, model: Any, weights: FloatArray) -> float:
 
 
 @njit(cache=True)
-def _distances(exemplar: Any, rows: Any, others: IntArray, weights: FloatArray) -> FloatArray:
+def _distances(exemplar: Any, arrays: Any, others: IntArray, weights: FloatArray) -> FloatArray:
     """Return eq. 5 in both directions, averaged, per unit of weight."""
-    columns, means, variances, norms, stay, following, own = rows
+    columns, means, variances, norms, stay, following, own = arrays
     mine = exemplar[1:6]
     mass = weights.sum()
     out = np.empty(len(others))

@@ -109,7 +109,8 @@ def _index(
 ) -> tuple[ExemplarBank, NodeIndex]:
     """Return all primitives as they are in the channels that are looked at."""
     bank = ExemplarBank(tree.config, len(variances), tree.config.variance_floor**2 * variances)
-    nodes = []
+    index = NodeIndex(tree.config, bank)
+    index.limit = np.inf
     number = 0
     for leaf, group in points.items():
         node = Node(leaf, ROOT, 0)
@@ -118,5 +119,5 @@ def _index(
             node.members.append(number)
             number += 1
         node.matrix = bank.matrix(node.members)
-        nodes.append(node)
-    return bank, NodeIndex(tree.config, bank, nodes, np.inf)
+        index.put(node, bank)
+    return bank, index

@@ -2,68 +2,91 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
 from ..recording import FloatArray, IntArray
 from .bank import Exemplar, ExemplarBank
 from .config import TreeConfig
 from .node import Node
 from .placement import ROOT, Match
+from .rows import Rows
+
+_KNOWN = np.dtype(
+    [
+        ("id", np.int64),
+        ("parent", np.int64),
+        ("is_leaf", np.bool_),
+        ("diameter", np.float64),
+        ("slot", np.int64),
+    ]
+)
 
 
 class NodeIndex:
-    """What the search knows of the nodes below the root.
+    """What the search knows of the nodes below the root; one more costs as much as one less.
 
     Args:
         config: Rules of the tree.
         bank: Holds the exemplars of the nodes.
-        nodes: The nodes; the root among them is left out.
-        limit: Largest radius.
-        before: An index of the same bank; what it knows of nodes that have not changed is taken
-            over.
 
     Attributes:
+        limit: Largest radius.
         factor: Radii that are used over those of the rules.
+        members: Numbers of the exemplars of each node, in the order of the nodes' ids.
     """
 
-    def __init__(
-        self,
-        config: TreeConfig,
-        bank: ExemplarBank,
-        nodes: Iterable[Node],
-        limit: float,
-        before: NodeIndex | None = None,
-    ) -> None:
-        below = sorted((node for node in nodes if node.parent is not None), key=lambda n: n.id)
-        if config.n_candidates:
-            below = [node for node in below if node.is_leaf]
+    def __init__(self, config: TreeConfig, bank: ExemplarBank) -> None:
         self.config = config
-        self.limit = limit
-        self.factor: float = 1.0 if before is None else before.factor
-        self.ids = np.array([node.id for node in below], dtype=np.int64)
-        self.parents = np.array([node.parent for node in below], dtype=np.int64)
-        self.leaves = np.array([node.is_leaf for node in below], dtype=np.bool_)
-        self.members = [list(node.members) for node in below]
-        self.diameters = np.array([node.diameter for node in below])
-        n_features = bank.n_channels * config.form.n_points
-        self.means = np.zeros((len(below), n_features))
-        known = {} if before is None else {int(id): k for k, id in enumerate(before.ids)}
-        for k, (id, members) in enumerate(zip(self.ids, self.members, strict=True)):
-            old = known.get(int(id))
-            if before is not None and old is not None and before.members[old] == members:
-                self.means[k] = before.means[old]
-            else:
-                self.means[k] = bank.mean_profile(members)
+        self.limit = 0.0
+        self.factor = 1.0
+        self.members: list[list[int]] = []
+        self._known = np.zeros(0, _KNOWN)
+        self._means = Rows((bank.n_channels * config.form.n_points,))
 
-    def update(self, node: Node, bank: ExemplarBank) -> None:
-        """Take note of a node's new exemplars."""
-        k = int(np.searchsorted(self.ids, node.id))
-        self.members[k] = list(node.members)
-        self.diameters[k] = node.diameter
-        self.means[k] = bank.mean_profile(node.members)
+    @property
+    def ids(self) -> IntArray:
+        """Ids of the nodes, in order, shape (n,)."""
+        return np.asarray(self._known["id"])
+
+    @property
+    def leaves(self) -> NDArray[np.bool_]:
+        """Which of them are leaves, shape (n,)."""
+        return np.asarray(self._known["is_leaf"])
+
+    def put(self, node: Node, bank: ExemplarBank) -> None:
+        """Take note of a node: that it is there and is searched, or what has changed in it."""
+        if node.parent is None or (self.config.n_candidates and not node.is_leaf):
+            self.drop(node.id)
+        else:
+            facts = (node.id, node.parent, node.is_leaf, node.diameter)
+            self._enter(facts, node.members, bank)
+
+    def drop(self, id: int) -> None:
+        """Forget a node, if it is known."""
+        k = int(np.searchsorted(self.ids, id))
+        if id in self.ids[k : k + 1]:
+            self._means.release(int(self._known["slot"][k]))
+            self._known = np.delete(self._known, k)
+            del self.members[k]
+
+    def _enter(
+        self, facts: tuple[int, int, bool, float], members: Sequence[int], bank: ExemplarBank
+    ) -> None:
+        k = int(np.searchsorted(self.ids, facts[0]))
+        if facts[0] not in self.ids[k : k + 1]:
+            new = np.array([(*facts, self._means.take())], _KNOWN)
+            self._known = np.insert(self._known, k, new)
+            self.members.insert(k, [])
+        slot = int(self._known["slot"][k])
+        self._known[k] = (*facts, slot)
+        if self.members[k] != members:
+            self.members[k] = list(members)
+            self._means.write(slot, (bank.mean_profile(members),))
 
     def scale(self, but: int | None = None) -> float:
         """Return the median diameter of the leaves, but for one: how much executions vary.
@@ -71,11 +94,11 @@ class NodeIndex:
         It is 0 where there is no leaf.
         """
         chosen = self.leaves & (self.ids != but) if but is not None else self.leaves
-        return float(np.median(self.diameters[chosen])) if chosen.any() else 0.0
+        return float(np.median(self._known["diameter"][chosen])) if chosen.any() else 0.0
 
     def radii(self) -> FloatArray:
         """Return the radius of each node: eq. 6, capped by the scale that the leaves share."""
-        radii = self.config.reach * self.diameters
+        radii = self.config.reach * self._known["diameter"]
         if np.isfinite(self.config.reach_cap):
             radii = np.minimum(radii, min(self.config.reach_cap * self.scale(), self.limit))
         return np.asarray(self.factor * radii)
@@ -99,8 +122,10 @@ class NodeIndex:
         """Return the leaves nearest by mean trajectory."""
         if len(self.ids) <= self.config.n_candidates:
             return np.arange(len(self.ids))
-        offsets = self.means - bank.profile(exemplar)
-        nearness = np.einsum("kf,kf->k", offsets, offsets)
+        profile, slots = bank.profile(exemplar), self._known["slot"]
+        nearness = np.empty(len(slots))
+        for (means,), rows, here in self._means.parted(slots):
+            nearness[here] = _squared_offsets(means, rows, profile)
         return np.sort(np.argsort(nearness, kind="stable")[: self.config.n_candidates])
 
     def _compare(self, exemplar: Exemplar, bank: ExemplarBank, places: IntArray) -> list[Match]:
@@ -120,7 +145,7 @@ class NodeIndex:
         found: list[Match] = []
         level = ROOT
         while True:
-            places = np.flatnonzero(self.parents == level)
+            places = np.flatnonzero(self._known["parent"] == level)
             if not len(places):
                 return found
             matches = self._compare(exemplar, bank, places)
@@ -137,28 +162,44 @@ class NodeIndex:
             "limit": self.limit,
             "factor": self.factor,
             "ids": self.ids.copy(),
-            "parents": self.parents.copy(),
+            "parents": self._known["parent"].copy(),
             "leaves": self.leaves.copy(),
             "members": [list(group) for group in self.members],
-            "diameters": self.diameters.copy(),
+            "diameters": self._known["diameter"].copy(),
         }
 
     @classmethod
     def from_state(cls, config: TreeConfig, bank: ExemplarBank, state: dict[str, Any]) -> NodeIndex:
         """Return the index that `state` described."""
-        index = cls(config, bank, (), float(state["limit"]))
+        index = cls(config, bank)
+        index.limit = float(state["limit"])
         index.factor = float(state.get("factor", 1.0))
-        index.ids = np.array(state["ids"], dtype=np.int64)
-        index.parents = np.array(state["parents"], dtype=np.int64)
-        index.leaves = np.array(state["leaves"], dtype=np.bool_)
-        index.members = [[int(number) for number in group] for group in state["members"]]
-        index.diameters = np.array(state["diameters"], dtype=np.float64)
-        means: Sequence[FloatArray] = [bank.mean_profile(group) for group in index.members]
-        if means:
-            index.means = np.stack(means)
+        columns = (state[name] for name in ("ids", "parents", "leaves", "diameters", "members"))
+        for id, parent, is_leaf, diameter, members in zip(*columns, strict=True):
+            facts = (int(id), int(parent), bool(is_leaf), float(diameter))
+            index._enter(facts, [int(number) for number in members], bank)
         return index
 
 
 def mean_nearest(distances: FloatArray, n_nearest: int) -> FloatArray:
     """Return the mean of the smallest distances along the last axis, (..., k) -> (...)."""
     return np.asarray(np.sort(distances, axis=-1)[..., :n_nearest].mean(axis=-1))
+
+
+@njit(cache=True)
+def _squared_offsets(means: FloatArray, rows: IntArray, profile: FloatArray) -> FloatArray:
+    """Return the squared distance of some means (n, F) to a profile (F,), shape (k,)."""
+    out = np.empty(len(rows))
+    n = len(profile)
+    for k, row in enumerate(rows):
+        sums = np.zeros(4)  # four sums at once, in an order of their own
+        mean = means[row]
+        for f in range(0, n - n % 4, 4):
+            sums[0] += (mean[f] - profile[f]) ** 2
+            sums[1] += (mean[f + 1] - profile[f + 1]) ** 2
+            sums[2] += (mean[f + 2] - profile[f + 2]) ** 2
+            sums[3] += (mean[f + 3] - profile[f + 3]) ** 2
+        for f in range(n - n % 4, n):
+            sums[0] += (mean[f] - profile[f]) ** 2
+        out[k] = sums.sum()
+    return out

@@ -35,7 +35,7 @@ class Structure:
         self.nodes = {ROOT: Node(ROOT, None, 0)}
         self.next_id = ROOT + 1
         self.strangers = Strangers()
-        self.index = NodeIndex(config, memory.bank, (), 0.0)
+        self.index = NodeIndex(config, memory.bank)
 
     @property
     def root(self) -> Node:
@@ -43,10 +43,17 @@ class Structure:
         return self.nodes[ROOT]
 
     def reindex(self) -> None:
-        """Let the search know all nodes anew; what has not changed is taken over."""
-        limit = self.config.reach_limit * self.memory.scale()
-        known = self.nodes.values()
-        self.index = NodeIndex(self.config, self.memory.bank, known, limit, self.index)
+        """Let the search know all nodes anew."""
+        self.index = NodeIndex(self.config, self.memory.bank)
+        self._note(*self.nodes.values())
+
+    def _note(self, *changed: Node) -> None:
+        """Let the search know what has changed in some nodes, or that they are gone."""
+        for node in changed:
+            if node.id in self.nodes:
+                self.index.put(node, self.memory.bank)
+            else:
+                self.index.drop(node.id)
         self.tune()
 
     def tune(self) -> None:
@@ -73,8 +80,7 @@ class Structure:
             self.memory.release(*node.remove(list(range(excess))))
         else:
             self._thin(node)
-            if not self.config.n_candidates or node.is_leaf:
-                self.index.update(node, bank)
+            self.index.put(node, bank)
 
     def child(self, parent: Node, members: Sequence[int], when: int) -> Node:
         """Form a node below another from some of its exemplars."""
@@ -93,7 +99,7 @@ class Structure:
         self.nodes[child.id] = child
         parent.children.append(child.id)
         self._thin(child)
-        self.reindex()
+        self._note(parent, child)
         return child
 
     def take_in(self, leaf: Node, numbers: Sequence[int]) -> Change:
@@ -130,7 +136,7 @@ class Structure:
                 node.apart = (node.apart - {younger.id}) | {older.id}
         change = self._unhang(younger, when)
         self._thin(older)
-        self.reindex()
+        self._note(older)
         merged = Change(merges=(Merge(older.id, younger.id),))
         return merged.then(change._replace(removed=change.removed[1:]))
 
@@ -148,7 +154,7 @@ class Structure:
                 self.add(self.root, number)
             change = change._replace(moved=tuple((number, ROOT) for number in leaf.members))
         self.memory.release(*leaf.members)
-        self.reindex()
+        self.tune()
         return change
 
     def reparent(self, node: Node, parent: Node, when: int) -> Change:
@@ -171,7 +177,7 @@ class Structure:
             parent.settled.update(node.members)
             self._thin(parent)
         change = Change(reparented=(Reparent(node.id, parent.id),)).then(self._tidy(above, when))
-        self.reindex()
+        self._note(node, parent, above)
         return change
 
     def _unhang(self, leaf: Node, when: int) -> Change:
@@ -179,6 +185,7 @@ class Structure:
         del self.nodes[leaf.id]
         parent = self.nodes[leaf.parent if leaf.parent is not None else ROOT]
         parent.children.remove(leaf.id)
+        self._note(leaf, parent)
         return Change(removed=(leaf.id,)).then(self._tidy(parent, when))
 
     def _tidy(self, node: Node, when: int) -> Change:
@@ -196,6 +203,7 @@ class Structure:
             child.history.append(("moved", when))
             above.children.append(id)
             change = change.then(Change(reparented=(Reparent(id, above.id),)))
+        self._note(node, above, *(self.nodes[id] for id in node.children))
         return change.then(self._tidy(above, when))
 
     def _thin(self, node: Node) -> None:

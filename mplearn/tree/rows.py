@@ -1,0 +1,70 @@
+"""Arrays of which there is one a row, in blocks that never move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..recording import FloatArray, IntArray
+
+BLOCK = 512  # rows; the system gives their memory when they are first written
+
+
+class Rows:
+    """Arrays of fixed shapes by slot: one more costs the same, however many there are.
+
+    Args:
+        shapes: Shape of each array of a row.
+
+    Attributes:
+        blocks: The arrays of `BLOCK` rows each, stacked.
+        n_slots: Slots that were ever taken.
+    """
+
+    def __init__(self, *shapes: tuple[int, ...]) -> None:
+        self.shapes = shapes
+        self.blocks: list[tuple[FloatArray, ...]] = []
+        self.n_slots = 0
+        self._free: list[int] = []
+
+    def take(self) -> int:
+        """Return a slot that is free."""
+        if self._free:
+            return self._free.pop()
+        if self.n_slots == BLOCK * len(self.blocks):
+            self.blocks.append(tuple(np.zeros((BLOCK, *shape)) for shape in self.shapes))
+        self.n_slots += 1
+        return self.n_slots - 1
+
+    def release(self, slot: int) -> None:
+        """Make a slot free."""
+        self._free.append(slot)
+
+    def write(self, slot: int, values: Sequence[Any]) -> None:
+        """Write the arrays of a row."""
+        block, row = divmod(slot, BLOCK)
+        for stacked, value in zip(self.blocks[block], values, strict=True):
+            stacked[row] = value
+
+    def read(self, slot: int) -> tuple[FloatArray, ...]:
+        """Return the arrays of a row, which show what is written there later."""
+        block, row = divmod(slot, BLOCK)
+        return tuple(stacked[row] for stacked in self.blocks[block])
+
+    def gather(self, slots: IntArray, which: int) -> FloatArray:
+        """Return one array of some rows, copied, shape (k, ...)."""
+        out = np.empty((len(slots), *self.shapes[which]))
+        for arrays, rows, here in self.parted(slots):
+            out[here] = arrays[which][rows]
+        return out
+
+    def parted(
+        self, slots: IntArray
+    ) -> Iterator[tuple[tuple[FloatArray, ...], IntArray, IntArray]]:
+        """Yield the blocks that hold some slots: arrays, rows there, positions among the slots."""
+        block, row = np.divmod(slots, BLOCK)
+        for number in np.unique(block):
+            here = np.flatnonzero(block == number)
+            yield self.blocks[number], row[here], here
