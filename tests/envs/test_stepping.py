@@ -6,7 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from standing_library import KICK, RATE_HZ, posture, sweep
 
-from mplearn_envs.control import Motion, Planner, reference_robot, rest_reference
+from mplearn_envs.control import (
+    Motion,
+    Planner,
+    PlannerConfig,
+    reference_robot,
+    rest_reference,
+)
 from mplearn_envs.control.footwork import Footwork, Lift, read_footwork
 from mplearn_envs.control.gravity import holding_torques
 from mplearn_envs.control.kinematics import places
@@ -152,6 +158,19 @@ def test_where_another_foot_is_up_it_is_exchanged_first():
     simulation = started(seed=2)
     assert not simulation.perform(up).fallen
     assert not simulation.perform(plan).fallen
+
+
+def test_the_weight_takes_the_time_it_needs_from_where_it_rests():
+    """After a foot has landed quickly the weight is still over the other one."""
+    knee = {"hip_pitch_l": -1.2, "knee_l": 1.4}
+    other = PLANNER.motion(sweep({}, knee, 0.8), RATE_HZ)
+    here = PLANNER.plan(PLANNER.plan(REST, RAISE, 2.0).end, LOWER, 2.0).end
+    plan = PLANNER.plan(here, other, 2.0)
+    moving = np.linalg.norm(plan.zmp - plan.cog[:, :2], axis=1)
+    config = PLANNER.config
+    assert np.all(plan.zmp_margin_m > config.zmp_margin_m + config.model_error * moving - 2e-3)
+    bold = Planner(HUMANOID, PlannerConfig(zmp_margin_m=-1.0)).plan(here, other, 2.0)
+    assert bold.zmp_margin_m.min() < 0.0 and bold.duration_s < plan.duration_s < 2.0
 
 
 NARROW = [0.0, 0.18, 0.0]

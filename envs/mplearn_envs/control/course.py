@@ -49,12 +49,26 @@ class Course(NamedTuple):
         up: Side of the foot in the air at each knot, -1 for none, shape (K,).
         stretches: The parts.
         ends: Knot at which each part ends (the start is knot 0), same length.
+        patience: By how much least times are longer than they are.
     """
 
     progress: FloatArray
     up: IntArray
     stretches: tuple[Stretch, ...]
     ends: tuple[int, ...]
+    patience: float
+
+    def waits(self, knot: int, frame_s: float) -> bool:
+        """Return whether the motion waits for the feet or the weight in the part of a knot.
+
+        Args:
+            knot: Which knot, the start being 0.
+            frame_s: Time from frame to frame at the speed of performance [s].
+        """
+        part = self.stretches[int(np.searchsorted(self.ends[:-1], knot))]
+        return (
+            part.least_s > 0.0 and self.patience * part.least_s > (part.last - part.first) * frame_s
+        )
 
 
 def shift_time_s(distance_m: float) -> float:
@@ -148,7 +162,7 @@ def lay_out(
         n_knots += len(rates)
         passed_s += len(rates) * knot_s
         ends.append(n_knots)
-    return Course(np.concatenate(progress), np.concatenate(up), tuple(parts), tuple(ends))
+    return Course(np.concatenate(progress), np.concatenate(up), tuple(parts), tuple(ends), patience)
 
 
 def _slowed(n: int, needed: float) -> FloatArray:

@@ -1,7 +1,8 @@
-"""Motions to be performed, and plans that perform them."""
+"""Motions to be performed, plans that perform them, and what planning goes by."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,33 @@ from mplearn.recording import FloatArray, IntArray
 
 from .footwork import Footwork
 from .reference import Reference
+
+
+@dataclass(frozen=True)
+class PlannerConfig:
+    """How motions become commands.
+
+    Attributes:
+        period_s: Time between commands [s].
+        knot_steps: Commands from one solution of the inverse kinematics to the next.
+        blend_s: Time in which the present posture gives way to the primitive's [s]: less in short
+            motions, more where there is far to go.
+        blend_velocity: Share of the velocity limits that the blending may take.
+        zmp_margin_m: How far inside the soles the zero-moment point stays, if slowing down can
+            make it [m].
+        model_error: By which share masses and gains may be wrong: the zero-moment point stays
+            farther inside by this share of its distance from the COG, which is what moving masses
+            make of it.
+        cache_size: Number of plans that are kept.
+    """
+
+    period_s: float = 0.004
+    knot_steps: int = 5
+    blend_s: float = 0.5
+    blend_velocity: float = 0.3
+    zmp_margin_m: float = 0.015
+    model_error: float = 0.1
+    cache_size: int = 256
 
 
 class Motion(NamedTuple):

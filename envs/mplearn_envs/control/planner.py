@@ -10,62 +10,29 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Hashable
-from dataclasses import dataclass
 
 import numpy as np
 
 from mplearn.errors import InvalidValueError
-from mplearn.recording import FloatArray, IntArray
+from mplearn.recording import FloatArray
 from mplearn_envs.robot import Robot
 
-from .course import Course, lay_out, stretches
+from .draft import Draft, Drafter, Pace
 from .footwork import Footwork, Lift, read_footwork
 from .gravity import holding_torques
-from .kinematics import forward
-from .legs import balanced_path
-from .momentum import ground_reaction, momenta, velocities
-from .pendulum import zmp_along
 from .plan import Motion as Motion
 from .plan import Plan as Plan
+from .plan import PlannerConfig as PlannerConfig
 from .reference import N_BASE, Reference, reference_robot
-from .splines import fading, refine
-from .stride import (
-    CARRY_M,
-    left_share,
-    plan_ground,
-    plan_rise,
-    plan_weight,
-    recentred,
-    sole_middles,
-    sole_outlines,
-)
-from .support import margins_along
-from .upper_body import limit_velocity, servo_commands
+from .splines import refine
+from .stride import left_share, recentred, sole_middles
+from .upper_body import servo_commands
 
 GRID_DECIMALS = 6
-CLOSE_M = 0.035  # a zero-moment point so near the edge is planned again, for all masses
-_SOLE_M = 0.1  # by no more than this
 OUT_OF_REACH = 1e-3  # [m, rad]: an error that slowing down does not mend
-
-
-@dataclass(frozen=True)
-class PlannerConfig:
-    """How motions become commands.
-
-    Attributes:
-        period_s: Time between commands [s].
-        knot_steps: Commands from one solution of the inverse kinematics to the next.
-        blend_s: Time in which the present posture gives way to the primitive's [s]: less in short
-            motions, more where there is far to go.
-        blend_velocity: Share of the velocity limits that the blending may take.
-        cache_size: Number of plans that are kept.
-    """
-
-    period_s: float = 0.004
-    knot_steps: int = 5
-    blend_s: float = 0.5
-    blend_velocity: float = 0.3
-    cache_size: int = 256
+_TRIES = 6
+_SLOWEST = 0.6  # of the pace is tried next, at least
+_ENOUGH_M = 1e-3  # a margin that falls short by less is enough
 
 
 class Planner:
@@ -80,17 +47,11 @@ class Planner:
         self.robot = robot
         self.config = config or PlannerConfig()
         self._reference = reference_robot(robot)
-        self._mass = float(self._reference.tree.mass.sum())
+        self._drafter = Drafter(robot, self.config)
         self._velocity = np.concatenate(
             (self._reference.velocity[:N_BASE], robot.per_joint("velocity"))
         )
         self._stiffness = robot.per_joint("stiffness")
-        joints = robot.position_limits[robot.leg_joints].copy()
-        knees = np.isin(robot.leg_joints, [robot.joint_names.index(name) for name in robot.knees])
-        joints[knees, 0] = np.maximum(joints[knees, 0], 0.5 * robot.guard_knee_rad)
-        self._limits = np.vstack((self._reference.limits, joints, [[0.0, np.inf]] * 2))
-        rates = robot.per_joint("velocity")[robot.leg_joints]
-        self._rates = np.concatenate((self._reference.velocity, rates, [np.inf] * 2))
         self._tracked = np.concatenate((np.arange(N_BASE), N_BASE + robot.upper_joints))
         self._cache: OrderedDict[Hashable, Plan] = OrderedDict()
 
@@ -169,129 +130,67 @@ class Planner:
         return self.plan(start, motion, 1.0, ("hold", duration_s))
 
     def _plan(self, start: Reference, motion: Motion, speed: float) -> Plan:
-        knot_s = self.config.period_s * self.config.knot_steps
-        pose = forward(self._reference.tree, start.q)
-        here = pose.moment[0] / pose.carried[0]
-        for _ in range(4):
-            course, targets = self._targets(start, motion, speed, knot_s, here)
-            ground = plan_ground(self._reference, course, motion.footwork, start.ground)
-            weight = plan_weight(course, sole_middles(self._reference, ground), here[:2], knot_s)
-            cog = weight.path(here[2], knot_s)
-            q, error = self._follow(start, targets, ground, cog)
-            excess = self._excess(start, targets, q, knot_s)
-            if excess <= 1.0 or error.max() > OUT_OF_REACH:
+        pace = Pace(speed)
+        draft = self._drafter.draft(start, motion, pace)
+        for _ in range(_TRIES):
+            slower = self._slower(draft, start, motion, pace)
+            if slower == pace:
                 break
-            speed /= 1.02 * excess
-        up = np.concatenate(([start.lifted], course.up))
-        standing = np.concatenate((start.ground[None], ground))
-        balance, zmp, margin = self._balance(q, standing, up, knot_s)
-        if not weight.still and margin.min() < CLOSE_M and np.isfinite(zmp).all():
-            off = zmp - zmp_along(np.vstack((here[:2], cog)), here[2], knot_s)
-            off = np.clip(off, -_SOLE_M, _SOLE_M)
-            q, error = self._follow(start, targets, ground, weight.path(here[2], knot_s, off))
-            balance, zmp, margin = self._balance(q, standing, up, knot_s)
-        middles = sole_middles(self._reference, standing)
-        borne = np.where(np.isfinite(zmp), zmp, balance[:, :2])  # a wild motion may fly
-        share = left_share(middles, up, borne)
-        torque = holding_torques(self._reference, q, share, borne, middles)
-        led = q[:, 7:] + torque / self._stiffness  # a servo gives way to what it holds
+            pace = slower
+            draft = self._drafter.draft(start, motion, pace)
+        knot_s = self._drafter.knot_s
+        middles = sole_middles(self._reference, draft.ground)
+        borne = np.where(np.isfinite(draft.zmp), draft.zmp, draft.cog[:, :2])  # it may fly
+        share = left_share(middles, draft.up, borne)
+        torque = holding_torques(self._reference, draft.q, share, borne, middles)
+        led = draft.q[:, 7:] + torque / self._stiffness  # a servo gives way to what it holds
         position, rate = refine(led, knot_s, self.config.knot_steps)
-        commands = servo_commands(self.robot, position, rate)
-        end = self._end(targets, q[-1], ground[-1], int(up[-1]), knot_s)
         return Plan(
-            commands, q, knot_s, error, end, speed, balance, zmp, margin, standing, up, share
+            commands=servo_commands(self.robot, position, rate),
+            q=draft.q,
+            knot_s=knot_s,
+            error=draft.error,
+            end=self._end(draft),
+            speed=pace.speed,
+            cog=draft.cog,
+            zmp=draft.zmp,
+            zmp_margin_m=draft.margin,
+            ground=draft.ground,
+            up=draft.up,
+            share=share,
         )
 
-    def _follow(
-        self, start: Reference, targets: FloatArray, ground: FloatArray, cog: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the reference postures and their errors; see `balanced_path`."""
-        width = len(self._reference.limits)
-        carried = np.clip(targets[:, -2:] / CARRY_M, 0.0, 1.0)
-        carried = carried * carried * (3.0 - 2.0 * carried)
-        path: tuple[FloatArray, FloatArray] = balanced_path(
-            self._reference, targets[:, :width], targets[:, width:], ground, carried, cog, start.q
-        )
-        return path
+    def _slower(self, draft: Draft, start: Reference, motion: Motion, pace: Pace) -> Pace:
+        """Return the pace that velocity limits and balance ask for; the same where it is right.
 
-    def _excess(self, start: Reference, targets: FloatArray, q: FloatArray, knot_s: float) -> float:
-        """Return the largest velocity as a share of its limit."""
-        base = np.vstack((start.target[:N_BASE], targets[:, :N_BASE]))
-        velocity = np.diff(np.hstack((base, q[:, 7:])), axis=0) / knot_s
-        return float(np.max(np.abs(velocity) / self._velocity))
-
-    def _targets(
-        self, start: Reference, motion: Motion, speed: float, knot_s: float, here: FloatArray
-    ) -> tuple[Course, FloatArray]:
-        """Return the plan's times, and tracked coordinates and swing at the knots after the start.
-
-        Returns:
-            The course, and targets of shape (K, U + n_legs + 2) [m, rad].
+        What moving masses add to the zero-moment point falls with the square of the pace.
         """
-        footwork = motion.footwork
-        n_frames = len(motion.frames)
-        before = np.concatenate((start.target, start.swing))
-        before_rate = np.concatenate((start.velocity, start.swing_velocity))
-        if footwork is None:
-            swing = np.broadcast_to(
-                np.append(start.swing[:-2], (0.0, 0.0)), (n_frames, len(start.swing))
-            )
-        else:
-            swing = np.hstack((footwork.legs, footwork.rise))
-        limits = self._limits
-        frames = np.clip(np.hstack((motion.frames, swing)), limits[:, 0], limits[:, 1])
-        gap = before - frames[0]
-        length_s = motion.duration_s / speed
-        allowed = self.config.blend_velocity * self._rates
-        needed_s = float(np.max(1.875 * np.abs(gap) / allowed))  # a quintic's peak velocity
-        blend_s = max(needed_s, min(self.config.blend_s, 0.6 * length_s))
-        wait_s = max(0.0, needed_s - 0.6 * length_s)
+        if draft.error.max() > OUT_OF_REACH:
+            return pace
+        base = np.vstack((start.target[:N_BASE], draft.targets[:, :N_BASE]))
+        velocity = np.diff(np.hstack((base, draft.q[:, 7:])), axis=0) / self._drafter.knot_s
+        excess = float(np.max(np.abs(velocity) / self._velocity))
+        if excess > 1.0:
+            return pace._replace(speed=pace.speed / (1.02 * excess))
+        moving = np.linalg.norm(draft.zmp - draft.cog[:, :2], axis=1)
+        wanted = self.config.zmp_margin_m + self.config.model_error * moving
+        short = np.nan_to_num(wanted - draft.margin, nan=np.inf)
+        worst = int(np.argmax(short))
+        if not (short[worst] > _ENOUGH_M and moving[worst] > 0):
+            return pace
+        share = 1.0 - 1.1 * short[worst] / moving[worst]
+        slower = max(_SLOWEST, float(np.sqrt(max(share, 0.0))))
+        if draft.course.waits(worst, 1.0 / (motion.rate_hz * pace.speed)):
+            return pace._replace(patience=pace.patience / slower)
+        return pace._replace(speed=pace.speed * slower)
 
-        middles = sole_middles(self._reference, start.ground)
-        to_foot = float(np.linalg.norm(middles - here[:2], axis=1).max())
-        apart = float(np.linalg.norm(middles[0] - middles[1]))
-        rise = float(start.swing[-2:].max())
-        parts = stretches(n_frames, footwork, start.lifted, rise, to_foot, apart)
-        course = lay_out(parts, 1.0 / (motion.rate_hz * speed), knot_s, wait_s, 1.0)
-        at = course.progress
-        time = np.arange(1.0, len(at) + 1.0) * knot_s
-        low = np.minimum(at.astype(np.int64), n_frames - 2)
-        share = (at - low)[:, None]
-        path = frames[low] * (1 - share) + frames[low + 1] * share
-        moves = wait_s == 0 and parts[0].first < parts[0].last
-        first = (frames[1] - frames[0]) * motion.rate_hz * speed if moves else 0.0
-        heights = path[:, -2:].copy()
-        path += fading(time, blend_s, gap, before_rate - first)
-        path[:, -2:] = plan_rise(course, heights, start, path[:, -2:])
-        path = np.clip(path, limits[:, 0], limits[:, 1])
-        width = len(self._rates) - 2
-        path[:, :width] = limit_velocity(
-            path[:, :width], before[:width], self._rates[:width] * knot_s
-        )
-        return course, path
-
-    def _balance(
-        self, q: FloatArray, ground: FloatArray, up: IntArray, knot_s: float
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return COG (K + 1, 3), zero-moment point (K + 1, 2) and its margin (K + 1,) [m]."""
-        ref = self._reference
-        feet, rate = ref.stance.feet, velocities(q, knot_s)
-        cog, linear, angular, _ = momenta(ref.tree, ref.inertia, feet, ref.corners[:, :0], q, rate)
-        between = ground_reaction(self._mass, cog, linear, angular, knot_s)
-        zmp = np.vstack((between[:1], 0.5 * (between[1:] + between[:-1]), between[-1:]))
-        points = np.nan_to_num(zmp, nan=np.inf)
-        margin = margins_along(sole_outlines(ref, ground), up, points)
-        return cog, zmp, margin
-
-    def _end(
-        self, targets: FloatArray, q: FloatArray, ground: FloatArray, up: int, knot_s: float
-    ) -> Reference:
+    def _end(self, draft: Draft) -> Reference:
         """Return the reference after the last knot, seen from between the feet."""
-        width = len(self._reference.limits)
-        rate = (targets[-1] - targets[-2]) / knot_s
+        targets, up, width = draft.targets, int(draft.up[-1]), len(self._reference.limits)
+        rate = (targets[-1] - targets[-2]) / self._drafter.knot_s
         lifted = np.zeros(2)
         if up >= 0:
             lifted[up] = 1.0
-        q, ground = recentred(q, ground)
+        q, ground = recentred(draft.q[-1], draft.ground[-1])
         parts = (targets[-1, :width], rate[:width], q, targets[-1, width:], rate[width:], lifted)
         return Reference(*(np.round(part, GRID_DECIMALS) for part in (*parts, ground)))
