@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..recording import FloatArray, IntArray
+from .banded import factorise, solve
 
 _PINNED = 1e8  # weight of a given start, relative to what else is known of that frame
 
@@ -30,51 +31,44 @@ def most_likely_trajectory(
         rate_hz: Frames per second [1/s].
         start: Posture to start from, at rest, shape (D,).
     """
-    bands, rhs = normal_equations(means, variances, states, rate_hz)
+    columns, motion = normal_equations(means, variances, states, rate_hz)
     if start is not None:
-        weight = _PINNED * bands[2, :, 0]
-        bands[2, :, 0] += weight
-        rhs[:, 0] += weight * start
-        if rhs.shape[1] > 1:  # at rest: the second frame equals the first
-            weight = _PINNED * bands[2, :, 1]
-            bands[2, :, 0] += weight
-            bands[2, :, 1] += weight
-            bands[1, :, 1] -= weight
-    from scipy.linalg import solveh_banded
-
-    # the channels one after another are one long banded system
-    one = np.moveaxis(bands, 0, -1).reshape(-1, 3).T
-    flat = solveh_banded(one, rhs.ravel(), overwrite_ab=True, overwrite_b=True, check_finite=False)
-    return np.ascontiguousarray(flat.reshape(rhs.shape).T)
+        weight = _PINNED * columns[0, 0]
+        columns[0, 0] += weight
+        motion[0] += weight * start
+        if len(motion) > 1:  # at rest: the second frame equals the first
+            weight = _PINNED * columns[1, 0]
+            columns[0, 0] += weight
+            columns[1, 0] += weight
+            columns[0, 1] -= weight
+    factorise(columns)
+    solve(columns, motion)
+    return motion
 
 
 def normal_equations(
     means: FloatArray, variances: FloatArray, states: IntArray, rate_hz: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return W^T U^-1 W in upper banded form, shape (3, D, T), and W^T U^-1 mu, shape (D, T).
+    """Return W^T U^-1 W by columns, see `banded`, shape (T, 3, D), and W^T U^-1 mu, shape (T, D).
 
     Velocity is ``(c[t+1] - c[t-1]) rate / 2``, acceleration ``(c[t+1] - 2 c[t] + c[t-1]) rate^2``;
     the first and the last frame have neither.
     """
     scale = np.array([1.0, rate_hz / 2, rate_hz**2])[:, None, None]
-    tables = np.stack([scale**2 / variances, scale * means / variances])
-    tables = np.ascontiguousarray(np.swapaxes(tables, -1, -2))
-    weights, pulls = np.take(tables, states, axis=-1)  # (3, D, T) each
-    v, a = weights[1, :, 1:-1], weights[2, :, 1:-1]
-    pull_v, pull_a = pulls[1, :, 1:-1], pulls[2, :, 1:-1]
-    bands = np.moveaxis(np.zeros((*weights.shape[1:], 3)), -1, 0)  # in memory as LAPACK has it
-    rhs = pulls[0]
-    second, first, diagonal = bands
-    diagonal += weights[0]
-    if rhs.shape[1] > 2:
-        outer = v + a
-        diagonal[:, :-2] += outer
-        diagonal[:, 1:-1] += 4 * a
-        diagonal[:, 2:] += outer
-        first[:, 1:-1] -= 2 * a
-        first[:, 2:] -= 2 * a
-        second[:, 2:] += a - v
-        rhs[:, :-2] += pull_a - pull_v
-        rhs[:, 1:-1] -= 2 * pull_a
-        rhs[:, 2:] += pull_a + pull_v
-    return bands, rhs
+    weight, v, a = (scale**2 / variances)[:, states]  # (T, D) each
+    pull, pull_v, pull_a = (scale * means / variances)[:, states]
+    columns = np.zeros((len(states), 3, means.shape[2]))
+    diagonal, first, second = columns[:, 0], columns[:, 1], columns[:, 2]
+    diagonal += weight
+    if len(states) > 2:
+        v, a, pull_v, pull_a = v[1:-1], a[1:-1], pull_v[1:-1], pull_a[1:-1]
+        diagonal[:-2] += v + a
+        diagonal[1:-1] += 4 * a
+        diagonal[2:] += v + a
+        first[:-2] -= 2 * a
+        first[1:-1] -= 2 * a
+        second[:-2] += a - v
+        pull[:-2] += pull_a - pull_v
+        pull[1:-1] -= 2 * pull_a
+        pull[2:] += pull_a + pull_v
+    return columns, pull

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import InvalidValueError
 from ..recording import FloatArray
+from .averaging import average_of_motions
 from .joins import drawn_from, joined
 from .schedule import GenerativePrimitive, Schedule, state_durations_s
 from .smooth import most_likely_trajectory
@@ -133,16 +134,12 @@ STYLES: dict[str, Style] = {
 def _average_of_samples(
     primitive: GenerativePrimitive, request: Request, rng: np.random.Generator, n_frames: int
 ) -> FloatArray:
-    hmm, n = primitive.hmm, request.n_samples
+    hmm = primitive.hmm
     expected = state_durations_s(primitive) * request.model_rate_hz
-    stays = rng.geometric(1.0 / np.maximum(expected, 1.0), size=(n, len(expected)))
-    deviations = np.sqrt(hmm.variances)
-    total = np.zeros((n_frames, hmm.n_channels))
-    for durations in stays:
-        states = np.repeat(np.arange(len(durations)), durations)
-        noise = rng.standard_normal((len(states), hmm.n_channels))
-        total += _resampled(hmm.means[states] + deviations[states] * noise, n_frames)
-    return total / n
+    stays = rng.geometric(1.0 / np.maximum(expected, 1.0), size=(request.n_samples, len(expected)))
+    n_own = max(round(expected.sum()), 1)
+    average = average_of_motions(hmm.means, hmm.variances, stays, n_own, rng)
+    return _resampled(average, n_frames)
 
 
 def _resampled(frames: FloatArray, n_frames: int) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ModelError
-from ..generation import lowpass
+from ..generation import interpolate, lowpass
 from ..recording import FloatArray
 
 _KNOT_RATE_HZ = 25.0
@@ -61,7 +61,7 @@ class CompactMotion:
         n_knots = min(max(n_knots, 4), n_frames)
         places = np.linspace(0, n_frames - 1, n_knots)
         smooth = lowpass(frames, rate_hz, _CUTOFF_HZ) if n_knots < n_frames else frames
-        values = _spline(smooth, np.arange(float(n_frames)), places)
+        values = smooth if n_knots == n_frames else interpolate(smooth, places)
         magnitude = np.maximum(np.abs(values).max(axis=0), 1e-9)
         exponents = np.ceil(np.log2(magnitude)).astype(np.int16) - 15
         knots = np.clip(np.round(np.ldexp(values, -exponents)), -32768, 32767)
@@ -71,16 +71,7 @@ class CompactMotion:
     def frames(self) -> FloatArray:
         """The motion, shape (T, D)."""
         values = np.ldexp(self.knots.astype(np.float64), self.exponents)
-        places = np.linspace(0, self.n_frames - 1, len(values))
-        frames = _spline(values, places, np.arange(float(self.n_frames)))
+        places = np.linspace(0, len(values) - 1, self.n_frames)
+        frames = values if len(values) == self.n_frames else interpolate(values, places)
         frames.flags.writeable = False
         return frames
-
-
-def _spline(values: FloatArray, places: FloatArray, wanted: FloatArray) -> FloatArray:
-    if len(values) == len(wanted):
-        return np.array(values)
-    from scipy.interpolate import make_interp_spline
-
-    degree = min(3, len(values) - 1)
-    return np.asarray(make_interp_spline(places, values, k=degree, axis=0)(wanted))

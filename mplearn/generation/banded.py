@@ -1,0 +1,63 @@
+"""Symmetric banded matrices, one a channel, by their Cholesky factors L: M = L L^T.
+
+A matrix is kept by its columns, from the diagonal down: ``columns[t, i, d]`` is the element in row
+t + i, column t of channel d's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from ..recording import FloatArray
+
+_SINGULAR = 1e-12  # of a diagonal element: if less than this is left of it, that is rounding
+
+
+@njit(cache=True, error_model="numpy")
+def factorise(columns: FloatArray) -> None:
+    """Replace matrices, shape (T, B, D), by L; they may be positive semi-definite."""
+    n_rows, n_band, n_channels = columns.shape
+    least, scale = _SINGULAR * columns[:, 0], np.empty(n_channels)
+    for t in range(n_rows):
+        column = columns[t]
+        for d in range(n_channels):
+            scale[d] = 1.0 / np.sqrt(column[0, d]) if column[0, d] > least[t, d] else 0.0
+        n = min(n_band, n_rows - t)
+        for i in range(n):
+            for d in range(n_channels):
+                column[i, d] *= scale[d]
+        for i in range(1, n):
+            below = columns[t + i]
+            for j in range(i, n):
+                for d in range(n_channels):
+                    below[j - i, d] -= column[i, d] * column[j, d]
+
+
+@njit(cache=True, error_model="numpy")
+def multiply(factor: FloatArray, x: FloatArray) -> FloatArray:
+    """Return L x, shape (T, D)."""
+    product = np.zeros_like(x)
+    for t in range(factor.shape[0]):
+        for i in range(min(factor.shape[1], factor.shape[0] - t)):
+            for d in range(x.shape[1]):
+                product[t + i, d] += factor[t, i, d] * x[t, d]
+    return product
+
+
+@njit(cache=True, error_model="numpy")
+def solve(factor: FloatArray, x: FloatArray) -> None:
+    """Replace right-hand sides, shape (T, D), by the solutions of L L^T x = rhs."""
+    n_rows, n_band, n_channels = factor.shape
+    for t in range(n_rows):
+        for d in range(n_channels):
+            x[t, d] /= factor[t, 0, d]
+        for i in range(1, min(n_band, n_rows - t)):
+            for d in range(n_channels):
+                x[t + i, d] -= factor[t, i, d] * x[t, d]
+    for t in range(n_rows - 1, -1, -1):
+        for i in range(1, min(n_band, n_rows - t)):
+            for d in range(n_channels):
+                x[t, d] -= factor[t, i, d] * x[t + i, d]
+        for d in range(n_channels):
+            x[t, d] /= factor[t, 0, d]

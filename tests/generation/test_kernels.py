@@ -1,0 +1,102 @@
+"""Splines, banded matrices, filters and averages against scipy and whole matrices."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import make_interp_spline
+from scipy.signal import butter, sosfiltfilt
+
+from mplearn.generation import lowpass
+from mplearn.generation.averaging import average_of_motions, stretched
+from mplearn.generation.banded import factorise, multiply, solve
+from mplearn.generation.splines import interpolate
+
+
+@pytest.mark.parametrize("n_knots", range(1, 9))
+def test_a_spline_is_scipys(n_knots):
+    rng = np.random.default_rng(n_knots)
+    knots = rng.standard_normal((n_knots, 3))
+    places = np.append(rng.uniform(0, n_knots - 1, 30), [0, n_knots - 1])
+    if n_knots == 1:
+        expected = np.repeat(knots, 32, axis=0)
+    else:
+        degree = min(3, n_knots - 1)
+        expected = make_interp_spline(np.arange(n_knots), knots, k=degree)(places)
+    np.testing.assert_allclose(interpolate(knots, places), expected, atol=1e-12)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(3, 200), st.floats(0.3, 49.0), st.integers(0, 2**32))
+def test_the_filter_is_scipys(n_frames, cutoff_hz, seed):
+    frames = np.cumsum(np.random.default_rng(seed).standard_normal((n_frames, 2)), axis=0)
+    pad = min(n_frames - 1, int(np.ceil(200 / cutoff_hz)))
+    sections = butter(2, cutoff_hz, fs=100, output="sos")
+    expected = sosfiltfilt(sections, frames, axis=0, padtype="odd", padlen=pad)
+    np.testing.assert_allclose(
+        lowpass(frames, 100.0, cutoff_hz), expected, atol=1e-9 * np.abs(frames).max()
+    )
+
+
+def whole(columns):
+    """Return the matrices, shape (D, T, T), of their columns from the diagonal down."""
+    n = len(columns)
+    out = np.zeros((columns.shape[2], n, n))
+    for t in range(n):
+        for i in range(min(columns.shape[1], n - t)):
+            out[:, t + i, t] = out[:, t, t + i] = columns[t, i]
+    return out
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 30), st.integers(1, 5), st.integers(0, 2**32))
+def test_banded_matrices_are_the_whole_ones(n_rows, n_band, seed):
+    rng = np.random.default_rng(seed)
+    columns = rng.standard_normal((n_rows, n_band, 2))
+    columns[:, 0] = 2 * n_band + rng.uniform(0, 9, (n_rows, 2))
+    matrices, x = whole(columns), rng.standard_normal((n_rows, 2))
+    factor = columns.copy()
+    factorise(factor)
+    for d in range(2):
+        expected = np.linalg.cholesky(matrices[d])
+        np.testing.assert_allclose(multiply(factor, x)[:, d], expected @ x[:, d], atol=1e-10)
+    solved = x.copy()
+    solve(factor, solved)
+    np.testing.assert_allclose(np.einsum("dij,jd->id", matrices, solved), x, atol=1e-10)
+
+
+def matrix_of(n_drawn, n_frames):
+    """Return what stretches a motion linearly, shape (n_frames, n_drawn)."""
+    place = np.linspace(0, n_drawn - 1, n_frames)
+    return np.stack([np.interp(place, np.arange(n_drawn), row) for row in np.eye(n_drawn)], axis=1)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.integers(1, 6), st.integers(1, 4), st.integers(1, 30), st.integers(1, 9), st.integers(0, 99)
+)
+def test_an_average_has_the_distribution_of_the_average_of_draws(
+    n_motions, n_states, n_frames, longest, seed
+):
+    """Mean and covariance from whole matrices; the covariance may well be singular."""
+    rng = np.random.default_rng(seed)
+    stays = rng.integers(1, longest + 1, (n_motions, n_states))
+    means, variances = rng.standard_normal((n_states, 2)), rng.uniform(0, 3, (n_states, 2))
+    mean, covariance = np.zeros((n_frames, 2)), np.zeros((2, n_frames, n_frames))
+    for own in stays:
+        states, stretch = np.repeat(np.arange(n_states), own), matrix_of(own.sum(), n_frames)
+        mean += stretch @ means[states] / n_motions
+        for d in range(2):
+            covariance[d] += stretch * variances[states, d] @ stretch.T / n_motions**2
+    shares, products = stretched(stays, n_frames)
+    np.testing.assert_allclose(shares @ means, mean, atol=1e-12)
+    columns = products @ variances
+    np.testing.assert_allclose(whole(columns), covariance, atol=1e-12)
+    factorise(columns)
+    unit = np.repeat(np.eye(n_frames)[:, :, None], 2, axis=2)
+    factor = np.stack(
+        [multiply(columns, unit[k]) for k in range(n_frames)], axis=1
+    )  # L, by columns
+    np.testing.assert_allclose(np.einsum("ikd,jkd->dij", factor, factor), covariance, atol=1e-7)
+    drawn = average_of_motions(means, 0 * variances, stays, n_frames, rng)
+    np.testing.assert_allclose(drawn, mean, atol=1e-12)
