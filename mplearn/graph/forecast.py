@@ -10,7 +10,7 @@ from ..errors import InvalidValueError
 from ..recording import FloatArray, IntArray
 from .counts import TransitionCounts
 from .expected import left_out_surprises
-from .prediction import History, Prediction, backed_off, surprise, usable_context
+from .prediction import History, Prediction, backed_off, most_likely, surprise, usable_context
 from .walks import stationary
 
 
@@ -51,15 +51,9 @@ class Forecast(TransitionCounts):
 
     def predict(self, history: History, k: int = 3) -> tuple[Prediction, ...]:
         """Return the ``k`` primitives most likely to come next, the most likely first."""
-        if k < 1:
-            raise InvalidValueError(f"k must be at least 1, not {k}")
-        p, ids = self.probabilities(history), self.ids
         last = usable_context(history, 1)
-        best = np.argsort(-p, kind="stable")[:k]
-        times = [self._time_s(last, ids[i]) for i in best]
-        return tuple(
-            Prediction(ids[i], float(p[i]), *time_s) for i, time_s in zip(best, times, strict=True)
-        )
+        p = self.probabilities(history)
+        return most_likely(self.ids, p, k, lambda id: self.time_s(last, id))
 
     def surprises(self, sequence: History) -> FloatArray:
         """Return -log P(x_t | what came before) [nat], t = 1, 2, ..., shape (len(sequence) - 1,).
@@ -87,6 +81,18 @@ class Forecast(TransitionCounts):
             shares[t] = (1 + len(usual) - reached) / (1 + len(usual))
         return shares
 
+    def time_s(self, last: tuple[int, ...], next_id: int) -> tuple[float, float]:
+        """Return mean and standard deviation of the time until a primitive starts [s].
+
+        Args:
+            last: The primitive before it, from whose start time is counted; empty where nothing is
+                known of it.
+            next_id: The primitive; where it never followed, whatever did stands in for it.
+        """
+        if not last:
+            return math.nan, math.nan
+        return self._edges.time_s(last[0], next_id if (last[0], next_id) in self._edges else None)
+
     def stationary(self, restart: float = 0.01) -> FloatArray:
         """Return how often an endless walk is at each primitive, shape (n,), as `ids`.
 
@@ -112,9 +118,3 @@ class Forecast(TransitionCounts):
     def _indexed_edges(self) -> tuple[IntArray, IntArray, IntArray]:
         edges = self._edges
         return self._indices(edges.sources), self._indices(edges.targets), edges.counts
-
-    def _time_s(self, last: tuple[int, ...], next_id: int) -> tuple[float, float]:
-        """Return mean and standard deviation of the time until the next primitive starts [s]."""
-        if not last:
-            return math.nan, math.nan
-        return self._edges.time_s(last[0], next_id if (last[0], next_id) in self._edges else None)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
+from ..errors import InvalidValueError
 from ..recording import FloatArray
 from .counts import TransitionCounts
 
@@ -34,6 +35,16 @@ class Prediction:
     duration_std_s: float
 
 
+class Followers(Protocol):
+    """What followed what, how often."""
+
+    def __len__(self) -> int:
+        """Number of nodes n."""
+
+    def followers(self, context: tuple[int, ...]) -> FloatArray:
+        """How often each node followed a context (the empty one too), shape (n,)."""
+
+
 def usable_context(history: History, order: int) -> tuple[int, ...]:
     """Return the latest primitives, at most ``order``, that no unrecognised segment breaks off."""
     latest = tuple(history[max(len(history) - order, 0) :])
@@ -41,7 +52,7 @@ def usable_context(history: History, order: int) -> tuple[int, ...]:
     return tuple(id for id in latest[after_gap:] if id is not None)
 
 
-def backed_off(counts: TransitionCounts, context: tuple[int, ...], mass: float) -> FloatArray:
+def backed_off(counts: Followers, context: tuple[int, ...], mass: float) -> FloatArray:
     """Return p(next | context), shape (n,), interpolated over the orders [Witten1991].
 
     ``p_k(x) = (c(h_k, x) + m d(h_k) p_{k-1}(x)) / (c(h_k) + m d(h_k))`` from equal shares upwards,
@@ -57,6 +68,26 @@ def backed_off(counts: TransitionCounts, context: tuple[int, ...], mass: float) 
             weight = mass * np.count_nonzero(seen)
             p = (seen + weight * p) / (seen.sum() + weight)
     return p
+
+
+def most_likely(
+    ids: Sequence[int], p: FloatArray, k: int, time_s: Callable[[int], tuple[float, float]]
+) -> tuple[Prediction, ...]:
+    """Return the ``k`` nodes of the largest probability, the most likely first.
+
+    Args:
+        ids: The nodes.
+        p: Their probabilities, shape (n,).
+        k: How many to return at most.
+        time_s: Returns mean and standard deviation of the time until a node starts [s].
+
+    Raises:
+        InvalidValueError: ``k`` is not positive.
+    """
+    if k < 1:
+        raise InvalidValueError(f"k must be at least 1, not {k}")
+    best = np.argsort(-p, kind="stable")[:k]
+    return tuple(Prediction(ids[i], float(p[i]), *time_s(ids[i])) for i in best)
 
 
 def surprise(counts: TransitionCounts, sequence: History) -> FloatArray:

@@ -10,5 +10,6 @@ from .events import PrimitiveSplit as PrimitiveSplit
 from .events import Recognised as Recognised
 from .events import SegmentClosed as SegmentClosed
 from .events import TransitionSeen as TransitionSeen
+from .foresight import NextMotion as NextMotion
 from .learner import MotionLearner as MotionLearner
 from .merge import merge as merge

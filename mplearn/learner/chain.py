@@ -4,34 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import astuple, dataclass
+from dataclasses import astuple
 from typing import Any
 
 from ..graph import TransitionGraph
 from ..recording import Segment
 from ..tree import ROOT, Change, Placement
 from .events import Anomaly, Event, TransitionSeen
+from .foresight import NextMotion, foresee
+from .links import Link, run_before, step_s
 
 REMEMBERED = 2048  # segments; older ones cannot be counted again
-
-
-@dataclass
-class Link:
-    """A segment in the chain.
-
-    Attributes:
-        number: The tree's number of the segment.
-        primitive: What it was recognised as; None for nothing.
-        follows: Whether it came right after the one before it.
-        segment: Where it lies.
-        nearest: The primitive that it was nearest to, recognised or not; None for none.
-    """
-
-    number: int
-    primitive: int | None
-    follows: bool
-    segment: Segment
-    nearest: int | None = None
 
 
 class Chain:
@@ -65,19 +48,9 @@ class Chain:
         """Take note that what comes next does not follow what came."""
         self._broken = True
 
-    def latest(self) -> list[int]:
-        """Return the latest primitives that what comes next depends on, oldest first.
-
-        Where the last motion was not recognised, the nearest primitive stands in for it: it tells
-        more of what comes next than nothing does.
-        """
-        if self._broken or not self._links:
-            return []
-        last = self._links[-1]
-        id = last.nearest if last.primitive is None else last.primitive
-        if id is None or id not in self.graph:
-            return []
-        return [*self._run(len(self._links) - 1), id]
+    def foresee(self, k: int) -> tuple[NextMotion, ...]:
+        """Return the ``k`` motions most likely to come next, see `foresee`."""
+        return foresee(self.graph, self._links, self.rate_hz, k, broken=self._broken)
 
     def follow(self, segment: Segment, placement: Placement, false_alarms: float) -> list[Event]:
         """Take the next segment, count what is known by it, and say what is surprising.
@@ -93,8 +66,8 @@ class Chain:
         known = placement.node_id if placement.node_id in placement.born else None
         if placement.recognised and not placement.splits:
             known = placement.node_id
-        link = Link(placement.number, known, not self._broken, segment, placement.nearest)
-        self._links.append(link)
+        follows, nearest, like = not self._broken, placement.nearest, placement.like
+        self._links.append(Link(placement.number, known, follows, segment, nearest, like))
         self._paused_frames, self._broken = 0, False
         events: list[Event] = []
         if known is not None and not placement.born:
@@ -145,22 +118,14 @@ class Chain:
 
     def _run(self, i: int) -> list[int]:
         """Return the primitives before link i, oldest first, as far as nothing breaks them off."""
-        run: list[int] = []
-        while i > 0 and self._links[i].follows and len(run) < self.graph.order:
-            i -= 1
-            primitive = self._links[i].primitive
-            if primitive is None:
-                break
-            run.insert(0, primitive)
-        return run
+        return run_before(self._links, i, self.graph.order, lambda link: link.primitive)
 
     def _count(self, i: int) -> list[Event]:
         """Count the transition to link i, if there is one."""
         link, run = self._links[i], self._run(i)
         if link.primitive is None or not run:
             return []
-        previous = self._links[i - 1].segment
-        duration_s = (link.segment.start - previous.start) / self.rate_hz
+        duration_s = step_s(self._links, i, self.rate_hz)
         self.graph.observe(run[-1], link.primitive, duration_s, before=run[:-1])
         count = self.graph.count(run[-1], link.primitive)
         return [TransitionSeen(link.segment, run[-1], link.primitive, count)]
@@ -180,10 +145,7 @@ class Chain:
     def state(self) -> dict[str, Any]:
         """Return everything as plain values."""
         return {
-            "links": [
-                (link.number, link.primitive, link.follows, astuple(link.segment), link.nearest)
-                for link in self._links
-            ],
+            "links": [astuple(link) for link in self._links],
             "paused_frames": self._paused_frames,
             "broken": self._broken,
         }
@@ -191,8 +153,8 @@ class Chain:
     def load_state(self, state: dict[str, Any]) -> None:
         """Resume from what `state` returned."""
         self._links = [
-            Link(number, primitive, follows, Segment(*segment), nearest)
-            for number, primitive, follows, segment, nearest in state["links"]
+            Link(number, primitive, follows, Segment(*segment), nearest, like)
+            for number, primitive, follows, segment, nearest, like in state["links"]
         ]
         self._paused_frames = int(state["paused_frames"])
         self._broken = bool(state["broken"])

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..body import BodyView, MotionObserver, view_of
 from ..errors import BodyError
-from ..graph import Prediction, TransitionGraph
+from ..graph import TransitionGraph
 from ..library import MotionNovelty, PrimitiveLibrary
 from ..people import PeopleConfig, PeopleTree
 from ..recording import FloatArray, Recording, Segment, are_markers
@@ -34,6 +34,7 @@ from .events import (
     Recognised,
     SegmentClosed,
 )
+from .foresight import NextMotion
 from .snapshot import library_of
 
 STILL_M = (
@@ -164,16 +165,16 @@ class MotionLearner:
 
     # ---- what was learned
 
-    def predict_next(self, k: int = 3) -> tuple[Prediction, ...]:
-        """Return the ``k`` primitives most likely to come next, the most likely first.
+    def predict_next(self, k: int = 3) -> tuple[NextMotion, ...]:
+        """Return the ``k`` motions most likely to come next, the most likely first.
 
-        They depend on the latest motions of the stream; where the last one was not recognised, its
-        nearest primitive stands in for it. Empty before a primitive is known.
+        They depend on the latest motions of the stream, those included that have no primitive yet
+        (`foresight`). Empty before anything has moved.
 
         Raises:
             InvalidValueError: ``k`` is not positive.
         """
-        return self.graph.predict(self._chain.latest(), k)
+        return self._chain.foresee(k)
 
     def snapshot(self) -> PrimitiveLibrary:
         """Return what is known now, frozen."""

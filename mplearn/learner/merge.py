@@ -97,8 +97,9 @@ def _renamed(
 ) -> list[Any]:
     """Return the links of a chain, with other numbers, ids and frames."""
     out = []
-    for number, primitive, follows, (start, end, decided_at, *rest), nearest in links:
+    for number, primitive, follows, (start, end, decided_at, *rest), nearest, like in links:
         segment = (start + frames, end + frames, decided_at + frames, *rest)
         ids = [None if id is None else new_id.get(id) for id in (primitive, nearest)]
-        out.append((number + n_before, ids[0], follows, segment, ids[1]))
+        like = None if like is None else like + n_before
+        out.append((number + n_before, ids[0], follows, segment, ids[1], like))
     return out

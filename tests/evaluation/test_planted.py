@@ -34,14 +34,19 @@ def test_a_table_of_planted_anomalies():
     assert math.isnan(Judged((), ()).auc)
 
 
-def test_motions_are_foretold_once_they_are_known():
+def test_motions_are_foretold_once_they_have_been_seen():
     session = demonstrate(["BAR", "BAL", "BAD", "BAU"] * 9, seed=3)
     features = observe(session.recording)
     motions = found_motions(features, session.truth)
     assert np.mean([motion.label != "" for motion in motions]) > 0.9
     foretold = foretell(features, session.truth)
-    assert foretold.perfect.shape == foretold.learned.shape == (35, 2)
+    assert foretold.perfect.shape == foretold.learned.shape == foretold.primitives.shape == (35, 3)
+    assert foretold.shown[:5].tolist() == [0, 0, 0, 1, 1]
     assert foretold.perfect[4:, 0].all()  # a cycle: from the second round on all is known
-    assert not foretold.learned[:10].any()
-    assert foretold.learned[-8:, 0].mean() >= 0.75
+    assert not foretold.learned[:3, 0].any()
+    assert not foretold.primitives[:10, 0].any()
+    assert foretold.learned[4:, 0].mean() >= 0.9
+    assert foretold.primitives[-8:, 0].mean() >= 0.75
+    assert (foretold.learned[-8:, 2] < 0.5).mean() >= 0.75
+    assert foretold.at_most == pytest.approx(20 / 31)
     assert len(prediction_table("told", [("one", foretold)] * 2).rows) == 3

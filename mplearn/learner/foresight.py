@@ -1,0 +1,100 @@
+"""What comes next, with motions that have been seen too seldom to be primitives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..graph import Extension, TransitionGraph
+from .links import Link, run_before, step_s
+
+
+@dataclass(frozen=True)
+class NextMotion:
+    """A motion that may come next, how likely, and when.
+
+    Attributes:
+        id: Its primitive; None where it has none yet.
+        segments: Numbers of the latest segments that show it (`mplearn.tree.Placement.number`),
+            oldest first; empty where they were too long ago.
+        probability: How likely it is, in [0, 1].
+        duration_s: Mean time from the start of the last motion until this one starts [s], see
+            `mplearn.graph.Prediction`.
+        duration_std_s: Standard deviation of that time [s].
+    """
+
+    id: int | None
+    segments: tuple[int, ...]
+    probability: float
+    duration_s: float
+    duration_std_s: float
+
+
+def foresee(
+    graph: TransitionGraph, links: Sequence[Link], rate_hz: float, k: int, *, broken: bool
+) -> tuple[NextMotion, ...]:
+    """Return the ``k`` motions most likely to come next, the most likely first.
+
+    What is no primitive yet is foretold from the first time it has been seen: segments that are
+    like each other are taken for one motion, and the transitions they take part in are counted
+    beside the graph's. After a motion that was never followed by anything, its nearest primitive
+    stands in for it.
+
+    Args:
+        graph: The transitions between primitives.
+        links: The latest segments.
+        rate_hz: Frames per second [1/s].
+        k: How many to return at most.
+        broken: Whether what comes next does not follow the last of them.
+
+    Raises:
+        InvalidValueError: ``k`` is not positive.
+    """
+    motions = motions_of(links)
+    seen = Extension(graph)
+
+    def run(i: int) -> list[int]:
+        return run_before(links, i, graph.order, lambda link: motions[link.number])
+
+    for i, link in enumerate(links):
+        motion = motions[link.number]
+        if motion < 0:
+            seen.add_node(motion)
+        if link.follows and i > 0 and min(motion, motions[links[i - 1].number]) < 0:
+            before = run(i)
+            seen.observe(before[-1], motion, step_s(links, i, rate_hz), before=before[:-1])
+    history: list[int] = []
+    if links and not broken:
+        last, nearest = motions[links[-1].number], links[-1].nearest
+        history = [*run(len(links) - 1), last]
+        if nearest is not None and nearest in graph and not seen.followers((last,)).any():
+            history = [nearest]
+    shown: dict[int, list[int]] = {}
+    for number, motion in motions.items():
+        shown.setdefault(motion, []).append(number)
+    return tuple(
+        NextMotion(
+            each.id if each.id in graph else None,
+            tuple(shown.get(each.id, ())),
+            each.probability,
+            each.duration_s,
+            each.duration_std_s,
+        )
+        for each in seen.predict(history, k)
+    )
+
+
+def motions_of(links: Sequence[Link]) -> dict[int, int]:
+    """Return the motion that each segment shows, by number.
+
+    It is the primitive, or that of the segment which it is like; where there is neither, the motion
+    is new and goes by -1 minus the segment's number.
+    """
+    motions: dict[int, int] = {}
+    for link in links:
+        motion = link.primitive
+        if motion is None:
+            like = None if link.like is None else motions.get(link.like)
+            motion = -1 - link.number if like is None else like
+        motions[link.number] = motion
+    return motions
