@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-import gymnasium
 import numpy as np
 from scipy import stats
 
-import mplearn_envs  # noqa: F401  (registers the environment)
 from mplearn.errors import InvalidValueError
 from mplearn.evaluation import Table
 from mplearn.recording import FloatArray
 
-from .episodes import Episode, play
-from .policies import NEEDS_TASK, POLICIES, Policy
-from .rl import TrainedPolicy, TrainingConfig
-from .rl.config import AlgorithmName, PriorUse, usual_prior
-from .rl.train import train
-from .rl.trained import CONFIG, POLICY
-
-if TYPE_CHECKING:
-    from rich.console import Console
+from .contest import Contest, Game
+from .episodes import Episode
+from .policies import NEEDS_TASK, POLICIES
+from .rl import TrainingConfig
+from .rl.config import AlgorithmName, PriorUse, usual_prior, usual_steps
 
 COLUMNS = ("task", "dynamics", "policy", "return", "success", "falls", "time")
 CONFIDENCE = 0.95
 SLOW = ("search",)  # plays as few episodes as the simulated robot does
+ROUND_STEPS = 20_000  # of a training: so much is lost at most when it is interrupted
+PROBES = 10  # episodes after each round, for the log
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Comparison:
         seeds: Of the episodes, and of the trainings: one agent a seed.
         episodes: Episodes a seed, kinematic.
         simulated_episodes: Episodes a seed, simulated; and of policies that think long.
-        steps: Macro steps of a training.
+        steps: Macro steps of a training; None: what suits the task, see `usual_steps`.
         library: File of the library; None is the built-in one.
     """
 
@@ -58,7 +58,7 @@ class Comparison:
     seeds: tuple[int, ...] = (100, 101, 102, 103, 104)
     episodes: int = 50
     simulated_episodes: int = 4
-    steps: int = 40_000
+    steps: int | None = None
     library: str | None = None
 
     def __post_init__(self) -> None:
@@ -68,92 +68,122 @@ class Comparison:
         if len(self.seeds) < 2:
             raise InvalidValueError(f"an interval needs at least 2 seeds, not {self.seeds}")
 
+    @property
+    def n_contests(self) -> int:
+        """How many contests there are in all."""
+        return sum(len(self.contests(task)) for task in self.tasks) * len(self.seeds)
+
+    def contests(self, task: str) -> dict[str, list[Contest]]:
+        """Return the contests of a task: of each contestant, one a seed."""
+        trainings = self._trainings(task)
+        policies = [
+            name
+            for name in self.policies
+            if task in NEEDS_TASK.get(name, (task,)) and (name, task) != ("search", "follow")
+        ]
+        out = {}
+        for name in [*policies, *trainings]:
+            games = tuple(Game(dynamics, self._n(name, dynamics)) for dynamics in self.dynamics)
+            training = trainings.get(name)
+            out[name] = [
+                Contest(
+                    task, name, seed, games, self.library, training and replace(training, seed=seed)
+                )
+                for seed in self.seeds
+            ]
+        return out
+
+    def steps_of(self, task: str) -> int:
+        """Return the macro steps of a training."""
+        return usual_steps(task) if self.steps is None else self.steps
+
+    def _n(self, name: str, dynamics: str) -> int:
+        slow = dynamics == "simulated" or name in SLOW
+        return self.simulated_episodes if slow else self.episodes
+
+    def _trainings(self, task: str) -> dict[str, TrainingConfig]:
+        """Return how each agent is trained for a task, by its name; but for the seed."""
+        steps = self.steps_of(task)
+        uses: list[tuple[AlgorithmName, PriorUse]] = [
+            (algorithm, "feature" if algorithm == "dqn" else prior)
+            for algorithm in self.algorithms
+            for prior in self.priors or (usual_prior(task),)
+        ]
+        return {
+            f"{algorithm}, prior as {use}": TrainingConfig(
+                task=task,
+                algorithm=algorithm,
+                prior=use,
+                steps=steps,
+                library=self.library,
+                round_steps=min(steps, ROUND_STEPS),
+                episodes=PROBES,
+            )
+            for algorithm, use in uses
+        }
+
 
 def compare(
-    comparison: Comparison, agents: Path, console: Console | None = None
+    comparison: Comparison,
+    folder: Path,
+    jobs: int | None = 1,
+    done: Callable[[Contest], object] = lambda _: None,
 ) -> Iterator[Table]:
     """Yield one table a task.
 
     Args:
         comparison: What to compare.
-        agents: Folder of the trained agents; those that are there already are taken from there.
-        console: Where the progress of trainings is shown; None is silent.
+        folder: Where trained agents and episodes are kept; those that are there already are taken
+            from there, so that a comparison that was interrupted goes on.
+        jobs: Number of processes; None is the number of processors.
+        done: Told of each contest that is over.
     """
-    for task in comparison.tasks:
-        priors = comparison.priors or (usual_prior(task),)
-        trained = {
-            f"{algorithm}, prior as {prior}": [
-                _trained(comparison, task, algorithm, prior, seed, agents, console)
-                for seed in comparison.seeds
-            ]
-            for algorithm in comparison.algorithms
-            for prior in (("feature",) if algorithm == "dqn" else priors)
-        }
-        rows = []
-        for dynamics in comparison.dynamics:
-            env = gymnasium.make(
-                "mplearn/PrimitiveHumanoid-v0",
-                library=comparison.library,
-                task=task,
-                dynamics=dynamics,
-                disable_env_checker=True,
-            )
-            for name, policies in _contestants(comparison, task, env, trained):
-                slow = dynamics == "simulated" or name in SLOW
-                n = comparison.simulated_episodes if slow else comparison.episodes
-                results = [
-                    play(env, policy, n, seed)
-                    for policy, seed in zip(policies, comparison.seeds, strict=True)
-                ]
-                rows.append((task, dynamics, name, *_cells(results)))
-            env.close()
-        yield Table(
-            f"Task {task!r}: {len(comparison.seeds)} seeds",
-            COLUMNS,
-            tuple(rows),
-            f"Mean over seeds and its {100 * CONFIDENCE:.0f} % interval (Student's t), of "
-            f"{comparison.episodes} kinematic or {comparison.simulated_episodes} simulated "
-            f"episodes a seed (so few of {', '.join(SLOW)}, too). The return is discounted by "
-            f"time. Agents are trained kinematically, one a seed, for {comparison.steps} macro "
-            "steps.",
-        )
+    contests = {task: comparison.contests(task) for task in comparison.tasks}
+    in_order = [each for of in contests.values() for entrants in of.values() for each in entrants]
+    with _mapping(jobs or os.cpu_count() or 1) as mapped:
+        results = mapped(partial(Contest.play, folder=folder), in_order)
+        for task, entrants in contests.items():
+            played: dict[str, list[list[list[Episode]]]] = {}
+            for name, of_seeds in entrants.items():
+                for contest in of_seeds:
+                    played.setdefault(name, []).append(next(results))
+                    done(contest)
+            yield _table(comparison, task, played)
 
 
-def _contestants(
-    comparison: Comparison,
-    task: str,
-    env: gymnasium.Env[Any, Any],
-    trained: dict[str, list[TrainedPolicy]],
-) -> Iterator[tuple[str, Sequence[Policy]]]:
-    for name in comparison.policies:
-        foresees = name == "search" and task == "follow"
-        if task in NEEDS_TASK.get(name, (task,)) and not foresees:
-            yield name, [POLICIES[name](env)] * len(comparison.seeds)
-    yield from trained.items()
+@contextmanager
+def _mapping(jobs: int) -> Iterator[Callable[..., Iterator[list[list[Episode]]]]]:
+    """Yield `map`, over that many processes."""
+    if jobs == 1:
+        yield map
+        return
+    with ProcessPoolExecutor(jobs, get_context("spawn"), _work_alone) as pool:
+        yield pool.map
 
 
-def _trained(
-    comparison: Comparison,
-    task: str,
-    algorithm: AlgorithmName,
-    prior: PriorUse,
-    seed: int,
-    agents: Path,
-    console: Console | None,
-) -> TrainedPolicy:
-    config = TrainingConfig(
-        task=task,
-        algorithm=algorithm,
-        prior=prior,
-        steps=comparison.steps,
-        seed=seed,
-        library=comparison.library,
-        round_steps=comparison.steps,
+def _work_alone() -> None:
+    """Use one thread; called in each process before torch is there."""
+    os.environ["OMP_NUM_THREADS"] = "1"
+
+
+def _table(
+    comparison: Comparison, task: str, played: Mapping[str, Sequence[Sequence[Sequence[Episode]]]]
+) -> Table:
+    """Return a task's table; ``played``: the episodes of each contestant, seed and game."""
+    rows = [
+        (task, dynamics, name, *_cells([games[k] for games in of_seeds]))
+        for k, dynamics in enumerate(comparison.dynamics)
+        for name, of_seeds in played.items()
+    ]
+    return Table(
+        f"Task {task!r}: {len(comparison.seeds)} seeds",
+        COLUMNS,
+        tuple(rows),
+        f"Mean over seeds and its {100 * CONFIDENCE:.0f} % interval (Student's t), of "
+        f"{comparison.episodes} kinematic or {comparison.simulated_episodes} simulated episodes a "
+        f"seed (so few of {', '.join(SLOW)}, too). The return is discounted by time. Agents are "
+        f"trained kinematically, one a seed, for {comparison.steps_of(task)} macro steps.",
     )
-    folder = agents / f"{task}-{algorithm}-{prior}-{seed}"
-    if (folder / POLICY).exists() and TrainingConfig.load(folder / CONFIG)[0] == config:
-        return TrainedPolicy.load(folder)
-    return train(config, folder, console=console)
 
 
 def _cells(results: Sequence[Sequence[Episode]]) -> tuple[str, ...]:

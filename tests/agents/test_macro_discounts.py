@@ -16,7 +16,7 @@ torch = pytest.importorskip("torch")
 torch.set_num_threads(1)
 
 
-def brute_force(rewards, values, ends, discounts, gae_lambda):
+def brute_force(rewards, values, ends, discounts, traces):
     """Sum all deltas of the rest of the episode, each with its own product of discounts."""
     steps, n = rewards.shape
     out = np.zeros((steps, n))
@@ -28,7 +28,7 @@ def brute_force(rewards, values, ends, discounts, gae_lambda):
                 out[t, i] += weight * (rewards[k, i] + after - values[k, i])
                 if ends[k, i]:
                     break
-                weight *= discounts[k, i] * gae_lambda
+                weight *= discounts[k, i] * traces[k, i]
     return out
 
 
@@ -39,9 +39,10 @@ def test_advantages_are_those_of_brute_force(seed, gae_lambda):
     shape = (12, 3)
     rewards, values = rng.normal(size=shape), rng.normal(size=(13, 3))
     discounts, ends = rng.uniform(0.2, 1.0, shape), rng.random(shape) < 0.2
-    found = advantages(*(x.astype(np.float32) for x in (rewards, values)), ends,
-                       discounts.astype(np.float32), gae_lambda)  # fmt: skip
-    expected = brute_force(rewards, values, ends, discounts, gae_lambda)
+    traces = gae_lambda ** rng.uniform(0.1, 4.0, shape)
+    single = (x.astype(np.float32) for x in (discounts, traces))
+    found = advantages(*(x.astype(np.float32) for x in (rewards, values)), ends, *single)
+    expected = brute_force(rewards, values, ends, discounts, traces)
     np.testing.assert_allclose(found, expected, atol=2e-5)
 
 
@@ -70,7 +71,9 @@ def test_a_rollout_keeps_durations_and_what_truncation_cut_off():
     buffer = model.rollout_buffer
     assert not buffer.generator_ready
     taken = buffer.actions[:, :, 0].astype(int)
-    expected = DISCOUNT ** np.array([0.5, 1.0, 2.0, 3.0])[taken]
+    durations_s = np.array([0.5, 1.0, 2.0, 3.0])[taken]
+    expected = DISCOUNT**durations_s
+    np.testing.assert_allclose(buffer.durations_s, durations_s, rtol=1e-6)
     np.testing.assert_allclose(buffer.discounts, expected, rtol=1e-6)
     assert set(np.flatnonzero(buffer.cut_off.any(axis=1))) == set(range(6, 64, 7))
     starts = buffer.episode_starts > 0
@@ -79,7 +82,9 @@ def test_a_rollout_keeps_durations_and_what_truncation_cut_off():
     with torch.no_grad():
         after = model.policy.predict_values(last).numpy().reshape(1, -1)
     rewards = buffer.rewards + expected * buffer.cut_off
-    found = brute_force(rewards, np.vstack((buffer.values, after)), ends, expected, 0.95)
+    found = brute_force(
+        rewards, np.vstack((buffer.values, after)), ends, expected, 0.97**durations_s
+    )
     np.testing.assert_allclose(buffer.advantages, found, atol=1e-4)
 
 
@@ -90,7 +95,7 @@ def test_with_a_constant_discount_it_is_stable_baselines_own():
     model = collected(lambda: GraphWorld(world.edges, [0.5] * 6, world.reward, ends=(5,)))
     buffer = model.rollout_buffer
     peer = MaskableDictRolloutBuffer(
-        64, world.observation_space, world.action_space, "cpu", 0.95, DISCOUNT**0.5, 2
+        64, world.observation_space, world.action_space, "cpu", 0.97**0.5, DISCOUNT**0.5, 2
     )
     for name in ("rewards", "values", "episode_starts"):
         getattr(peer, name)[:] = getattr(buffer, name)
@@ -141,7 +146,7 @@ def test_replayed_steps_keep_their_own_discounts():
 
 
 def test_steps_without_a_discount_are_refused():
-    from mplearn_agents.rl.semi_markov import step_discounts
+    from mplearn_agents.rl.semi_markov import of_steps
 
     with pytest.raises(InvalidValueError, match=r"info\['discount'\].*\['action_mask'\]"):
-        step_discounts([{"action_mask": 1}])
+        of_steps([{"action_mask": 1}], "discount")

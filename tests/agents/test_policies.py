@@ -218,9 +218,9 @@ def test_a_mirror_does_what_is_recognised_and_waits_where_it_may_not():
     info = {"action_mask": np.array([1, 1, 0, 1])}
 
     def seen(slot, elapsed):
-        task = np.full(13, 0.25)
+        task = np.full(14, 0.25)
         task[:4] = np.arange(4) == slot
-        task[-1] = elapsed
+        task[-2] = elapsed
         return {"task": task}
 
     assert Mirror().act(seen(None, 0.5), info) == 0  # nothing is recognised yet

@@ -74,9 +74,11 @@ def test_advantages_count_each_steps_own_duration(trained, options):
         n = len(episode)
         ends = np.zeros((n, 1), bool)
         ends[-1] = episode.is_terminated
-        discounts = np.array([[info["discount"]] for info in episode.get_infos()[1:]], np.float32)
+        infos = episode.get_infos()[1:]
+        discounts = np.array([[info["discount"]] for info in infos], np.float32)
+        traces = np.array([[0.97 ** info["duration_s"]] for info in infos], np.float32)
         rewards = np.array(episode.get_rewards(), np.float32)[:, None]
-        found = advantages(rewards, values[start : start + n + 1, None], ends, discounts, 0.95)
+        found = advantages(rewards, values[start : start + n + 1, None], ends, discounts, traces)
         expected += [*found[:, 0], 0.0]
         start += n + 1
     np.testing.assert_allclose(

@@ -7,8 +7,11 @@ import pytest
 from standing_library import standing_library
 
 from mplearn.errors import InvalidValueError
+from mplearn_agents import contest
 from mplearn_agents.cli import main
+from mplearn_agents.episodes import play
 from mplearn_agents.rl import ProjectIllegal, TrainedPolicy, TrainingConfig
+from mplearn_agents.rl.config import VERSION
 from mplearn_agents.rl.projection import project
 from mplearn_agents.rl.train import make_environment, train
 
@@ -31,7 +34,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def config(folder):
     return TrainingConfig(
-        task="goal", library=str(folder / "small.mplearn"), steps=2048, round_steps=1024, episodes=4
+        task="goal", library=str(folder / "small.mplearn"), steps=4096, round_steps=2048, episodes=4
     )
 
 
@@ -45,7 +48,7 @@ def weights(agent):
 
 
 def test_a_training_that_was_interrupted_ends_like_one_that_was_not(folder, config, agent):
-    train(replace(config, steps=1024), folder / "halves")
+    train(replace(config, steps=2048), folder / "halves")
     resumed = train(config, folder / "halves", resume=True)
     for name, value in weights(agent).items():
         np.testing.assert_array_equal(weights(resumed)[name], value, err_msg=name)
@@ -217,8 +220,11 @@ def test_bad_input_is_said(folder, config, agent, capsys, tmp_path):
         train(config, tmp_path / "none", resume=True)
     with pytest.raises(InvalidValueError, match="holds no training"):
         TrainedPolicy.load(tmp_path)
-    (tmp_path / "training.json").write_text('{"slots": 3}')
+    (tmp_path / "training.json").write_text(f'{{"version": {VERSION}, "slots": 3}}')
     with pytest.raises(InvalidValueError, match="missing or damaged"):
+        TrainedPolicy.load(tmp_path)
+    (tmp_path / "training.json").write_text('{"task": "goal", "slots": {}}')
+    with pytest.raises(InvalidValueError, match="agent of version 1; here are agents of version"):
         TrainedPolicy.load(tmp_path)
     env = make_environment(replace(config, task="recite"))
     with pytest.raises(InvalidValueError, match="another task"):
@@ -235,11 +241,16 @@ def test_the_commands(folder, capsys):
     assert "agent written to" in capsys.readouterr().out
     assert main(["perform", "--agent", out, "--dynamics", "kinematic", "--episodes", "2"]) == 0
     assert "of 2 episodes succeeded" in capsys.readouterr().out
-    table = ["compare", "--library", library, "--out", str(folder / "table"), "--tasks", "goal",
-             "--policies", "random", "quick-path", "--seeds", "2", "--episodes", "3",
-             "--simulated-episodes", "1", "--steps", "1"]  # fmt: skip
+
+
+def test_a_table_of_policies_and_agents_and_what_is_kept_of_it(folder, capsys, monkeypatch):
+    table = ["compare", "--library", str(folder / "small.mplearn"), "--out", str(folder / "table"),
+             "--tasks", "goal", "--policies", "random", "quick-path", "--seeds", "2",
+             "--episodes", "3", "--simulated-episodes", "1", "--steps", "1",
+             "--jobs", "1"]  # fmt: skip
     assert main(table) == 0
-    written = (folder / "table" / "compare.md").read_text()
+    file = folder / "table" / "compare.md"
+    written = file.read_text()
     rows = [line for line in written.splitlines() if line.startswith("| goal")]
     assert [row.split(" | ")[1:3] for row in rows] == [
         [dynamics, policy]
@@ -247,3 +258,27 @@ def test_the_commands(folder, capsys):
         for policy in ("random", "quick-path", "maskable-ppo, prior as logits")
     ]
     assert all("100.0 ± 0.0 %" in row for row in rows if "quick-path" in row)
+    played = []
+    with monkeypatch.context() as patched:
+        patched.setattr(contest, "play", lambda *asked: played.append(asked) or play(*asked))
+        patched.setattr(contest, "train", None)  # nothing is trained again
+        assert main(table) == 0
+        assert file.read_text() == written and not played
+        lost = folder / "table" / "episodes" / "goal-simulated-random-101.json"
+        lost.write_text("[")
+        assert main([*table, "--episodes", "3"]) == 0
+        assert file.read_text() == written and len(played) == 1
+    assert main([*table, "--policies", "random", "--dynamics", "kinematic", "--variants"]) == 0
+    rows = [line for line in file.read_text().splitlines() if line.startswith("| goal")]
+    agents = [row.split(" | ")[2] for row in rows]
+    assert agents == [
+        "random",
+        "maskable-ppo, prior as logits",
+        "maskable-ppo, prior as feature",
+        "maskable-ppo, prior as logits",
+        "maskable-ppo, prior as regulariser",
+        "maskable-ppo, prior as logits",
+        "ppo, prior as logits",
+        "dqn, prior as feature",
+    ]
+    assert rows[1] == rows[3] == rows[5]

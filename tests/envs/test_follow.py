@@ -77,6 +77,7 @@ def test_a_motion_is_shown_after_a_share_of_it_and_predicts(share):
         if known:
             id, began_s = known[-1]
             usual_s = repertoire.duration_s(id) / task.pace
+            assert shown[97] == pytest.approx(max(0.0, 1.0 - time_s / task.deadline_s))
             assert shown[96] == pytest.approx(min((time_s - began_s) / usual_s, 3.0))
             if repertoire.after(id).mask.sum() == 2 and following:
                 assert after.argmax() == repertoire.slots[following[0][0]]

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING, get_args
+
+if TYPE_CHECKING:
+    from mplearn_agents.contest import Contest
 
 HELP = "Compare policies and trained agents on the environment's tasks."
 
@@ -24,24 +28,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--policies", nargs="+", help="names of policies (default: all)")
     parser.add_argument("--algorithms", nargs="*", default=["maskable-ppo"])
     parser.add_argument("--priors", nargs="+", help="see `mplearn train` (default: by task)")
+    parser.add_argument(
+        "--variants",
+        action="store_true",
+        help="compare on 'goal', too, the uses of the prior, and PPO and DQN without masks",
+    )
     parser.add_argument("--seeds", type=int, default=5, help="number of seeds (default: 5)")
     parser.add_argument("--first-seed", type=int, default=100, help="the first (default: 100)")
     parser.add_argument("--episodes", type=int, default=50, help="kinematic episodes a seed")
     parser.add_argument(
         "--simulated-episodes", type=int, default=4, help="simulated episodes a seed"
     )
-    parser.add_argument("--steps", type=int, default=40_000, help="macro steps of a training")
+    parser.add_argument("--steps", type=int, help="macro steps of a training (default: by task)")
+    parser.add_argument("--jobs", type=int, help="processes (default: one a processor)")
 
 
 def run(args: argparse.Namespace) -> None:
-    """Train what is not trained yet, play, and print each table as it is done."""
+    """Train and play what was not before, and print and write each table as it is done."""
+    from dataclasses import replace
+
     from rich.console import Console
+    from rich.progress import Progress
     from rich.table import Table as Shown
 
     from mplearn_agents.compare import Comparison, compare
     from mplearn_agents.policies import POLICIES
+    from mplearn_agents.rl.config import AlgorithmName, PriorUse
 
-    console = Console()
     comparison = Comparison(
         tasks=tuple(args.tasks),
         dynamics=tuple(args.dynamics),
@@ -54,14 +67,32 @@ def run(args: argparse.Namespace) -> None:
         steps=args.steps,
         library=None if args.library is None else str(args.library),
     )
+    comparisons = [comparison]
+    if args.variants:
+        alone = replace(comparison, tasks=("goal",), dynamics=("kinematic",), policies=())
+        comparisons += [
+            replace(alone, algorithms=("maskable-ppo",), priors=get_args(PriorUse)),
+            replace(alone, algorithms=get_args(AlgorithmName), priors=None),
+        ]
+    console, file = Console(), args.out / "compare.md"
     args.out.mkdir(parents=True, exist_ok=True)
-    written = []
-    for table in compare(comparison, args.out / "agents", console):
-        shown = Shown(*table.columns, title=table.title, caption=table.note, caption_justify="left")
-        for row in table.rows:
-            shown.add_row(*row)
-        console.print(shown)
-        written.append(table.to_markdown())
-    file = args.out / "compare.md"
-    file.write_text("\n".join(written), encoding="utf-8")
+    written: list[str] = []
+    total = sum(each.n_contests for each in comparisons)
+    with Progress(console=console) as progress:
+        bar = progress.add_task("", total=total)
+
+        def done(contest: Contest) -> None:
+            what = f"{contest.name} on {contest.task}, seed {contest.seed}"
+            progress.update(bar, advance=1, description=what)
+
+        for each in comparisons:
+            for table in compare(each, args.out, args.jobs, done):
+                shown = Shown(
+                    *table.columns, title=table.title, caption=table.note, caption_justify="left"
+                )
+                for row in table.rows:
+                    shown.add_row(*row)
+                console.print(shown)
+                written.append(table.to_markdown())
+                file.write_text("\n".join(written), encoding="utf-8")
     console.print(f"written to {file}")

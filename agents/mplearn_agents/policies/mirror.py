@@ -27,12 +27,12 @@ class Mirror(Policy):
         """
         mask = legal_actions(info)
         seen = observation["task"]
-        if len(seen) != 3 * mask.size + 1:
+        if len(seen) != 3 * mask.size + 2:
             raise InvalidValueError(
-                f"this policy needs the task 'follow', which shows {3 * mask.size + 1} numbers, "
+                f"this policy needs the task 'follow', which shows {3 * mask.size + 2} numbers, "
                 f"not {len(seen)}"
             )
         recognised = seen[: mask.size]
         slot = int(np.argmax(recognised))
-        under_way = recognised[slot] > 0 and seen[-1] < 1.0
+        under_way = recognised[slot] > 0 and seen[-2] < 1.0
         return slot if under_way and mask[slot] else HOLD

@@ -28,8 +28,8 @@ ON_POLICY = {
     "batch_size": 256,
     "n_epochs": 6,
     "learning_rate": 7e-4,
-    "gae_lambda": 0.95,
-    "ent_coef": 0.03,
+    "gae_lambda": 0.97,  # per second
+    "ent_coef": 0.06,
 }
 OFF_POLICY = {
     "learning_rate": 5e-4,
@@ -66,10 +66,10 @@ RECIPES: dict[AlgorithmName, Recipe] = {
         MacroMaskablePPO,
         MaskedPriorPolicy,
         {"rollout_buffer_class": MaskedMacroStepBuffer},
-        8,
+        16,
         ON_POLICY,
     ),
-    "ppo": Recipe(MacroPPO, PriorPolicy, {"rollout_buffer_class": MacroStepBuffer}, 8, ON_POLICY),
+    "ppo": Recipe(MacroPPO, PriorPolicy, {"rollout_buffer_class": MacroStepBuffer}, 16, ON_POLICY),
     "dqn": Recipe(
         DQN, "MultiInputPolicy", {"replay_buffer_class": MacroReplayBuffer}, 1, OFF_POLICY
     ),

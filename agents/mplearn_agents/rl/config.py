@@ -9,6 +9,7 @@ from typing import Any, Literal, TypeAlias, get_args
 
 from mplearn.errors import InvalidValueError, MPLearnError
 
+VERSION = 2  # of agents: changes with networks, what they see, and what tasks show
 AlgorithmName: TypeAlias = Literal["maskable-ppo", "ppo", "dqn"]
 #: What the transition prior is to the policy: nothing but a feature; its initial logits; or what
 #: it is drawn to by a penalty on the divergence from it (instead of the entropy bonus).
@@ -22,6 +23,11 @@ def usual_prior(task: str) -> PriorUse:
     else.
     """
     return "feature" if task == "follow" else "logits"
+
+
+def usual_steps(task: str) -> int:
+    """Return for how many macro steps to train for a task: more where more must be found out."""
+    return 80_000 if task == "follow" else 40_000
 
 
 @dataclass(frozen=True)
@@ -73,17 +79,24 @@ class TrainingConfig:
     def save(self, path: Path, slots: dict[int, int]) -> None:
         """Write this as JSON, with the slot of each primitive that the agent knows."""
         kept = {str(id): slot for id, slot in slots.items()}
-        path.write_text(json.dumps({**asdict(self), "slots": kept}, indent=2) + "\n", "utf-8")
+        values = {"version": VERSION, **asdict(self), "slots": kept}
+        path.write_text(json.dumps(values, indent=2) + "\n", "utf-8")
 
     @classmethod
     def load(cls, path: Path) -> tuple[TrainingConfig, dict[int, int]]:
         """Return what `save` wrote.
 
         Raises:
-            InvalidValueError: The file is missing, or damaged.
+            InvalidValueError: The file is missing, damaged, or of another version.
         """
         try:
             values = json.loads(path.read_text("utf-8"))
+            version = values.pop("version", 1)
+            if version != VERSION:
+                raise InvalidValueError(
+                    f"{path.parent} holds an agent of version {version}; here are agents of "
+                    f"version {VERSION}, whose networks differ: train it again"
+                )
             slots = {int(id): int(slot) for id, slot in values.pop("slots").items()}
             return cls(**values), slots
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:

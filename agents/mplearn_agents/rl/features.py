@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import torch
@@ -9,6 +10,8 @@ from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
 from .encoding import FAR, LEAST_PRIOR, PRIOR, Scaling, width_of_slots
+
+LARGEST = -math.log(LEAST_PRIOR)  # log prior, see `log_prior`
 
 
 class PrimitiveFeatures(BaseFeaturesExtractor):

@@ -11,18 +11,19 @@ from stable_baselines3.common.torch_layers import MlpExtractor
 from torch import nn
 
 from .config import PriorUse
-from .features import blocks_of, log_prior
+from .features import LARGEST, blocks_of, log_prior
+
+SMALL = 0.01  # gain of layers that make logits, as Stable-Baselines3 has it
 
 
 class Trunk(nn.Module):
-    """Two multilayer perceptrons that see what blocks of slots have in common; gates over slots.
+    """Two multilayer perceptrons that see what blocks of slots have in common; scores of slots.
 
     What matters is often whether two blocks speak of the same slot (what was recognised is legal;
     the current primitive is the one asked for), whichever it is: so both perceptrons get, beside
-    the features, the scalar product of each pair of the B blocks. And what a block says of a slot
-    matters to the action of the same slot: so the actor has for each the sum of what the blocks say
-    of it, weighted by gates that its perceptron opens and closes (they start closed), and the
-    logarithm of its prior.
+    the features, the scalar product of each pair of the B blocks. And what the blocks say of a slot
+    matters to the action of the same slot, whichever it is: so the actor has for each the score
+    that one small network, the same for all, gives it, and the logarithm of its prior.
 
     Args:
         net_arch: Widths of the perceptrons' layers.
@@ -47,7 +48,7 @@ class Trunk(nn.Module):
         one, other = torch.triu_indices(n_blocks, n_blocks, 1)
         n_inputs = n_features - self.n_actions + len(one)
         self.mlp = MlpExtractor(n_inputs, net_arch, activation_fn, "cpu")
-        self.gates = nn.Linear(self.mlp.latent_dim_pi, n_blocks)
+        self.score = SlotScore(n_blocks + 1, self.mlp.latent_dim_pi)
         self.register_buffer("blocks", blocks, persistent=False)
         self.register_buffer("one", blocks[one], persistent=False)
         self.register_buffer("other", blocks[other], persistent=False)
@@ -61,8 +62,9 @@ class Trunk(nn.Module):
     def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
         """Return the actor's latent, shape (N, H + 2 A)."""
         latent = self.mlp.forward_actor(self._inputs(features))
-        gated = torch.einsum("nb,nba->na", self.gates(latent), features[:, self.blocks])
-        return torch.cat((latent, gated, features[:, -self.n_actions :]), dim=1)
+        log_prior = features[:, -self.n_actions :]
+        said = torch.cat((features[:, self.blocks], log_prior[:, None] / LARGEST), dim=1)
+        return torch.cat((latent, self.score(said, latent), log_prior), dim=1)
 
     def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
         """Return the critic's latent, shape (N, H)."""
@@ -71,6 +73,31 @@ class Trunk(nn.Module):
     def _inputs(self, features: torch.Tensor) -> torch.Tensor:
         common = (features[:, self.one] * features[:, self.other]).sum(dim=2)
         return torch.cat((features[:, : -self.n_actions], common), dim=1)
+
+
+class SlotScore(nn.Module):
+    """A score of each slot by what is said of it, in the light of everything else.
+
+    A slot of which nothing is said, as of one that is free, has score 0.
+
+    Args:
+        n_blocks: Number of blocks B that say something of slots.
+        n_latent: Number of numbers H that say everything else.
+        width: Of the hidden layer.
+    """
+
+    def __init__(self, n_blocks: int, n_latent: int, width: int = 32) -> None:
+        super().__init__()
+        self.said = nn.Linear(n_blocks, width, bias=False)
+        self.context = nn.Linear(n_latent, width)
+        self.out = nn.Linear(width, 1, bias=False)
+
+    def forward(self, said: torch.Tensor, latent: torch.Tensor) -> torch.Tensor:
+        """Return the scores, shape (N, A), of what is said (N, B, A) in a context (N, H)."""
+        context = self.context(latent)[:, None]
+        hidden = torch.tanh(self.said(said.transpose(1, 2)) + context) - torch.tanh(context)
+        scores: torch.Tensor = self.out(hidden).squeeze(2)
+        return scores
 
 
 class _WithPrior:
@@ -97,8 +124,7 @@ class _WithPrior:
         with torch.no_grad():
             net.weight[:, -2 * n : -n] = torch.eye(n)
             net.weight[:, -n:] = torch.eye(n) if self.prior == "logits" else 0.0
-            for parameter in self.mlp_extractor.gates.parameters():
-                parameter.zero_()
+            nn.init.orthogonal_(self.mlp_extractor.score.out.weight, SMALL)
 
     def evaluate_actions(
         self: Any, obs: Any, actions: torch.Tensor, **masks: Any

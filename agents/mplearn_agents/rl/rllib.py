@@ -42,15 +42,15 @@ from .returns import advantages
 
 NAME = "mplearn-flat"
 MASK = "action_mask"
-DISCOUNT = "discount"
+DISCOUNT, DURATION = "discount", "duration_s"
 WIDTH = 128
-GAE_LAMBDA = 0.95
+GAE_LAMBDA = 0.97  # per second
 
 
 class FlatObservation(gymnasium.Wrapper[Any, Any, Any, Any]):
     """Shows an observation as one vector: all scaled numbers, then log prior and mask (A each).
 
-    Of ``info`` it keeps the discount only: infos travel between the machines.
+    Of ``info`` it keeps the duration only: infos travel between the machines.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
@@ -73,7 +73,8 @@ class FlatObservation(gymnasium.Wrapper[Any, Any, Any, Any]):
     ) -> tuple[NDArray[np.float32], SupportsFloat, bool, bool, dict[str, Any]]:
         """Perform a macro step."""
         observation, reward, terminated, truncated, info = self.env.step(action)
-        return self.flat(observation), reward, terminated, truncated, {DISCOUNT: info[DISCOUNT]}
+        kept = {key: info[key] for key in (DISCOUNT, DURATION)}
+        return self.flat(observation), reward, terminated, truncated, kept
 
     def flat(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
         """Return the vector."""
@@ -136,15 +137,17 @@ class MacroStepAdvantages(ConnectorV2):  # type: ignore[misc]
         for episode in episodes:  # each with one step more than were made, for the last value
             n = len(episode) - 1
             rewards = np.asarray(episode.get_rewards(), np.float32)[:n]
-            discounts = [info[DISCOUNT] for info in episode.get_infos()[1 : n + 1]]
+            infos = episode.get_infos()[1 : n + 1]
+            discounts = np.array([info[DISCOUNT] for info in infos], np.float32)
+            durations_s = np.array([info[DURATION] for info in infos], np.float32)
             ends = np.zeros(n, np.bool_)
             ends[-1] = episode.is_terminated
             found = advantages(
                 rewards[:, None],
                 values[start : start + n + 1, None],
                 ends[:, None],
-                np.array(discounts, np.float32)[:, None],
-                GAE_LAMBDA,
+                discounts[:, None],
+                GAE_LAMBDA ** durations_s[:, None],
             )
             gains[start : start + n] = found[:, 0]
             start += n + 1

@@ -52,6 +52,7 @@ class FollowTask(Task):
     2C..3C-1    how likely each primitive comes after this one              0 .. 1
     3C          time since the recognised motion began, as a share of how   0 .. 3
                 long it usually takes the demonstrator
+    3C+1        time left, as a share of ``deadline_s``                     0 .. 1
     =========== =========================================================== ========
 
     Before anything is recognised, there is no 1, and the time is that since the start, as a share
@@ -86,8 +87,8 @@ class FollowTask(Task):
 
     def space(self, repertoire: Repertoire) -> spaces.Box:
         """Return the bounds of the observation, see the table."""
-        high = np.ones(3 * repertoire.capacity + 1)
-        high[-1] = _LONGEST_TIME
+        high = np.ones(3 * repertoire.capacity + 2)
+        high[-2] = _LONGEST_TIME
         return spaces.Box(np.zeros_like(high), high, dtype=np.float64)
 
     def reset(self, scene: Scene) -> None:
@@ -117,16 +118,17 @@ class FollowTask(Task):
         self._go_on(scene.time_s)
 
     def observe(self) -> FloatArray:
-        """Return what was recognised, what is predicted, and since when, see the table."""
+        """Return what was recognised and when, what is predicted, and the time left; see the table."""
         n, capacity = self._n_recognised, self._repertoire.capacity
-        out = np.zeros(3 * capacity + 1)
+        out = np.zeros(3 * capacity + 2)
         usual_s = self._median_s
         if n:
             out[self._repertoire.slots[self._ids[n - 1]]] = 1.0
             usual_s = self._usual_s[self._ids[n - 1]]
-        out[capacity : 2 * capacity], out[2 * capacity : -1] = self._prediction()
+        out[capacity : 2 * capacity], out[2 * capacity : -2] = self._prediction()
         began_s = self._ends_s[n - 2] if n > 1 else 0.0
-        out[-1] = min((self._time_s - began_s) / usual_s, _LONGEST_TIME)
+        out[-2] = min((self._time_s - began_s) / usual_s, _LONGEST_TIME)
+        out[-1] = max(0.0, 1.0 - self._time_s / self.deadline_s)
         return out
 
     def bonuses(self, choice: Choice) -> dict[str, float]:

@@ -1,0 +1,113 @@
+"""A contestant plays a task with one seed; what was trained and played is kept in a folder."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+
+import mplearn_envs  # noqa: F401  (registers the environment)
+
+from .episodes import Episode, play
+from .policies import POLICIES, Policy
+from .rl import TrainedPolicy, TrainingConfig
+from .rl.train import train
+from .rl.trained import CONFIG, POLICY
+
+
+@dataclass(frozen=True)
+class Game:
+    """Episodes of one task.
+
+    Attributes:
+        dynamics: "kinematic" or "simulated".
+        episodes: How many.
+    """
+
+    dynamics: str
+    episodes: int
+
+
+@dataclass(frozen=True)
+class Contest:
+    """A contestant, its task and its seed.
+
+    Attributes:
+        task: Name of the task.
+        name: Of the contestant: of a policy in `POLICIES`, or of what ``training`` trains.
+        seed: Of the episodes.
+        games: What is played.
+        library: File of the library; None is the built-in one.
+        training: Of an agent; None for a policy.
+    """
+
+    task: str
+    name: str
+    seed: int
+    games: tuple[Game, ...]
+    library: str | None
+    training: TrainingConfig | None
+
+    def play(self, folder: Path) -> list[list[Episode]]:
+        """Return the episodes of each game; those that the folder has are taken from there.
+
+        A training that was interrupted goes on at its last checkpoint.
+
+        Args:
+            folder: Where agents and episodes are kept.
+        """
+        return [self._played(game, folder) for game in self.games]
+
+    def _played(self, game: Game, folder: Path) -> list[Episode]:
+        env = gymnasium.make(
+            "mplearn/PrimitiveHumanoid-v0",
+            library=self.library,
+            task=self.task,
+            dynamics=game.dynamics,
+            disable_env_checker=True,
+        )
+        asked = {
+            "episodes": game.episodes,
+            "library": env.unwrapped.library.version,  # type: ignore[attr-defined]
+            "training": None if self.training is None else asdict(self.training),
+        }
+        what = f"{self.task}-{game.dynamics}-{self.name}-{self.seed}".replace(", ", "-")
+        file = folder / "episodes" / f"{what.replace(' ', '-')}.json"
+        episodes = _kept(file, asked)
+        if episodes is None:
+            episodes = play(env, self._player(env, folder), game.episodes, self.seed)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            made = {"asked": asked, "episodes": [asdict(episode) for episode in episodes]}
+            file.write_text(json.dumps(made), encoding="utf-8")
+        env.close()
+        return episodes
+
+    def _player(self, env: gymnasium.Env[Any, Any], folder: Path) -> Policy:
+        if self.training is None:
+            return POLICIES[self.name](env)
+        agent = _trained(self.training, folder / "agents")
+        agent.require_fit(env)
+        return agent
+
+
+def _kept(file: Path, asked: dict[str, Any]) -> list[Episode] | None:
+    """Return the episodes of a file; None if it is not there, damaged, or was asked otherwise."""
+    try:
+        made = json.loads(file.read_text("utf-8"))
+        if made["asked"] == asked:
+            return [Episode(**episode) for episode in made["episodes"]]
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    return None
+
+
+def _trained(config: TrainingConfig, agents: Path) -> TrainedPolicy:
+    """Return the agent of a training, which is made, or ended, if it was not before."""
+    what = (config.task, config.algorithm, config.prior, config.steps, config.seed)
+    folder = agents / "-".join(map(str, what))
+    if (folder / POLICY).exists() and TrainingConfig.load(folder / CONFIG)[0] == config:
+        return TrainedPolicy.load(folder)
+    return train(config, folder, resume=(folder / CONFIG).exists())
