@@ -1,6 +1,7 @@
 """The motion primitive graph: learned transitions, paths, walks, prediction [Kulic2012, 3]."""
 
 from .chains import MergedGraph as MergedGraph
+from .constraints import Asked as Asked
 from .extension import Extension as Extension
 from .levels import LevelledGraph as LevelledGraph
 from .levels import tree_levels as tree_levels

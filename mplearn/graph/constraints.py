@@ -6,8 +6,9 @@ import heapq
 import math
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import islice
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypedDict
 
 from ..errors import InvalidValueError, NoPathError
 from .search import costs_to, no_path
@@ -22,17 +23,30 @@ _MAX_EXPANDED = 500_000
 Seen = Callable[[tuple[int, ...], int], bool]
 
 
+class Asked(TypedDict, total=False):
+    """What a path must be like, but for what it passes.
+
+    Attributes:
+        length: Exact number of primitives, start and goal included.
+        duration_s: Least and most mean time from the start of the first primitive to the start of
+            the last [s].
+        novel: Ask for a sequence that has never been observed as a whole, though each of its steps
+            has: one that holds a succession of at most ``order + 1`` primitives which is not among
+            the histories counted (`history_capacity` bounds those).
+    """
+
+    length: int | None
+    duration_s: tuple[float, float] | None
+    novel: bool
+
+
 @dataclass(frozen=True)
 class Constraints:
-    """What a walk must meet.
+    """What a walk must meet; see `Asked` for the last three.
 
     Attributes:
         avoid: Primitives that must not be passed.
         visit: Primitives that must be passed, in any order (at most 12).
-        length: Exact number of primitives, start and goal included.
-        duration_s: Least and most mean time from the start of the first primitive to the start of
-            the last [s].
-        novel: Whether it must hold a succession that has never been observed.
     """
 
     avoid: Collection[int] = ()
@@ -123,24 +137,29 @@ def constrained_walks(
     return walks
 
 
+@dataclass(frozen=True)
 class _Search:
-    def __init__(
-        self,
-        view: nx.DiGraph,
-        start: int,
-        goal: int,
-        asked: Constraints,
-        weight: str,
-        k: int,
-        order: int,
-        seen: Seen,
-    ) -> None:
-        self.view, self.start, self.goal, self.asked = view, start, goal, asked
-        self.weight, self.k, self.order, self.seen = weight, k, order, seen
-        self.bit = {node: 1 << i for i, node in enumerate(sorted(set(asked.visit)))}
-        self.low_ms, self.high_ms = -math.inf, math.inf
-        if asked.duration_s is not None:
-            self.low_ms, self.high_ms = (1e3 * s for s in asked.duration_s)
+    """The search of `constrained_walks`, whose arguments these are."""
+
+    view: nx.DiGraph
+    start: int
+    goal: int
+    asked: Constraints
+    weight: str
+    k: int
+    order: int
+    seen: Seen
+
+    @cached_property
+    def bit(self) -> dict[int, int]:
+        """A bit for each primitive that must be passed."""
+        return {node: 1 << i for i, node in enumerate(sorted(set(self.asked.visit)))}
+
+    @cached_property
+    def limits_ms(self) -> tuple[float, float]:
+        """Least and most time [ms]."""
+        low_s, high_s = self.asked.duration_s or (-math.inf, math.inf)
+        return 1e3 * low_s, 1e3 * high_s
 
     def walks(self) -> Iterator[tuple[int, ...]]:
         """Yield the walks, best first."""
@@ -176,7 +195,7 @@ class _Search:
                 if follower not in ahead:
                     continue
                 after = self._after(state, follower, edge["duration_s"])
-                if after.ms <= self.high_ms:
+                if after.ms <= self.limits_ms[1]:
                     reached = cost + edge[self.weight]
                     entry = (reached + ahead[follower], len(trail), reached, after)
                     heapq.heappush(queue, entry)
@@ -187,7 +206,7 @@ class _Search:
             state.node == self.goal
             and state.visited == (1 << len(self.bit)) - 1
             and self.asked.length in (None, state.steps)
-            and self.low_ms <= state.ms <= self.high_ms
+            and self.limits_ms[0] <= state.ms <= self.limits_ms[1]
             and state.novel == self.asked.novel
         )
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias, Unpack
 
 import numpy as np
 
 from ..errors import InvalidValueError, NoPathError
-from .constraints import Constraints, constrained_walks
+from .constraints import Asked, Constraints, constrained_walks
 from .forecast import Forecast
 from .search import simple_paths
 from .walks import WalkSampler
@@ -36,9 +36,7 @@ class Plan(Forecast):
         by: Criterion = "probability",
         avoid: Collection[int] = (),
         visit: Collection[int] = (),
-        length: int | None = None,
-        duration_s: tuple[float, float] | None = None,
-        novel: bool = False,
+        **asked: Unpack[Asked],
     ) -> tuple[int, ...]:
         """Return the best sequence of observed transitions from ``start`` to ``goal``.
 
@@ -49,29 +47,14 @@ class Plan(Forecast):
             by: What is best: the most likely, the fewest steps, or the shortest mean duration.
             avoid: Primitives that must not be passed.
             visit: Primitives that must be passed, in any order (at most 12).
-            length: Exact number of primitives, ``start`` and ``goal`` included.
-            duration_s: Least and most mean time from the start of ``start`` to the start of
-                ``goal`` [s].
-            novel: Ask for a sequence that has never been observed as a whole, though each of its
-                steps has: one that holds a succession of at most ``order + 1`` primitives which is
-                not among the histories counted (`history_capacity` bounds those).
+            **asked: What else it must be like, see `Asked`.
 
         Raises:
             UnknownPrimitiveError: A primitive is not a node.
             NoPathError: There is no such path; the message says what was asked.
             InvalidValueError: A value is not allowed, or the search would be too large.
         """
-        return self.k_paths(
-            start,
-            goal,
-            1,
-            by=by,
-            avoid=avoid,
-            visit=visit,
-            length=length,
-            duration_s=duration_s,
-            novel=novel,
-        )[0]
+        return self.k_paths(start, goal, 1, by=by, avoid=avoid, visit=visit, **asked)[0]
 
     def k_paths(
         self,
@@ -82,9 +65,7 @@ class Plan(Forecast):
         by: Criterion = "probability",
         avoid: Collection[int] = (),
         visit: Collection[int] = (),
-        length: int | None = None,
-        duration_s: tuple[float, float] | None = None,
-        novel: bool = False,
+        **asked: Unpack[Asked],
     ) -> tuple[tuple[int, ...], ...]:
         """Return up to ``k`` different paths, best first; arguments as in `path`.
 
@@ -95,13 +76,13 @@ class Plan(Forecast):
             raise InvalidValueError(f"k must be at least 1, not {k}")
         if by not in _WEIGHTS:
             raise InvalidValueError(f"by must be one of {tuple(_WEIGHTS)}, not {by!r}")
-        if novel and self.order < 2:
+        wanted = Constraints(avoid, visit, **asked)
+        if wanted.novel and self.order < 2:
             raise InvalidValueError("novel paths need a graph of order 2 at least, not 1")
-        asked = Constraints(avoid, visit, length, duration_s, novel)
-        if asked.only_avoid:
+        if wanted.only_avoid:
             return simple_paths(self.view(), start, goal, avoid, _WEIGHTS[by], k)
         return constrained_walks(
-            self.view(), start, goal, asked, _WEIGHTS[by], k, order=self.order, seen=self.seen
+            self.view(), start, goal, wanted, _WEIGHTS[by], k, order=self.order, seen=self.seen
         )
 
     def log_probability(self, path: Sequence[int]) -> float:

@@ -6,12 +6,13 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
 from ..errors import InvalidValueError
 from ..generation import StyleName, Trajectory, generate, retime
-from ..graph import Criterion, LevelledGraph, tree_levels
+from ..graph import Asked, Criterion, LevelledGraph, tree_levels
 from ..recording import FloatArray
 from . import storage
 from .content import from_content, to_content
@@ -24,16 +25,7 @@ class PrimitiveLibrary(Knowledge):
     """A snapshot of learned primitives and their transitions; nothing here changes.
 
     Wherever a primitive is asked for, its id or its name will do. Two libraries hold the same if
-    their `version` is the same.
-
-    Attributes:
-        primitives: The primitives.
-        graph: Their transitions; a snapshot that refuses changes, its `copy` can grow.
-        channels: Name of each channel, length D.
-        rate_hz: Frame rate of models and exemplars [1/s].
-        body: Name of the body that moves; empty where the channels are no body's.
-        tree: The nodes of the tree.
-        recogniser: What recognises segments; None in a library that only acts.
+    their `version` is the same. Attributes are those of `Holdings`.
     """
 
     @cached_property
@@ -51,22 +43,10 @@ class PrimitiveLibrary(Knowledge):
         by: Criterion = "probability",
         avoid: Collection[Key] = (),
         visit: Collection[Key] = (),
-        length: int | None = None,
-        duration_s: tuple[float, float] | None = None,
-        novel: bool = False,
+        **asked: Unpack[Asked],
     ) -> tuple[int, ...]:
         """Return the best path, see `TransitionGraph.path`."""
-        return self.k_paths(
-            start,
-            goal,
-            1,
-            by=by,
-            avoid=avoid,
-            visit=visit,
-            length=length,
-            duration_s=duration_s,
-            novel=novel,
-        )[0]
+        return self.k_paths(start, goal, 1, by=by, avoid=avoid, visit=visit, **asked)[0]
 
     def k_paths(
         self,
@@ -77,9 +57,7 @@ class PrimitiveLibrary(Knowledge):
         by: Criterion = "probability",
         avoid: Collection[Key] = (),
         visit: Collection[Key] = (),
-        length: int | None = None,
-        duration_s: tuple[float, float] | None = None,
-        novel: bool = False,
+        **asked: Unpack[Asked],
     ) -> tuple[tuple[int, ...], ...]:
         """Return up to ``k`` paths, best first, see `TransitionGraph.k_paths`."""
         return self.graph.k_paths(
@@ -89,9 +67,7 @@ class PrimitiveLibrary(Knowledge):
             by=by,
             avoid=[self[key].id for key in avoid],
             visit=[self[key].id for key in visit],
-            length=length,
-            duration_s=duration_s,
-            novel=novel,
+            **asked,
         )
 
     def walk(self, start: Key | None, length: int, rng: np.random.Generator) -> tuple[int, ...]:
