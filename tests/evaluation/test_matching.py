@@ -79,10 +79,14 @@ def say(number, node=0, recognised=False, **more):
     return Placement(number, node, recognised, 1.0, 0.5 if recognised else math.inf, **more)
 
 
-def test_rates_of_a_session_told_move_by_move():
-    labels = ["a", "b", "a", "a", "a", "b", "a", "b", "b", "a", "c"]
+def found_all(labels):
+    """Motions of these labels, each of which was found exactly."""
     motions = [LabelledSegment(10 * i, 10 * i + 10, label) for i, label in enumerate(labels)]
-    found = [Segment(m.start, m.end) for m in motions]
+    return motions, [Segment(m.start, m.end) for m in motions]
+
+
+def test_rates_of_a_session_told_move_by_move():
+    motions, found = found_all("abaaababbac")
     told = [
         say(0),
         say(1),
@@ -108,9 +112,7 @@ def test_rates_of_a_session_told_move_by_move():
 
 
 def test_spurious_duplicate_split_and_merged_primitives():
-    labels = ["a", "a", "b", "b", "a", "a", "a", "b"]
-    motions = [LabelledSegment(10 * i, 10 * i + 10, label) for i, label in enumerate(labels)]
-    found = [Segment(m.start, m.end) for m in motions]
+    motions, found = found_all("aabbaaab")
     told = [
         say(0),
         say(1),
