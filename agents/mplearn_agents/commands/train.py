@@ -33,8 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what the transition prior is to the policy (default: a feature in 'follow', initial "
         "logits elsewhere)",
     )
+    parser.add_argument("--steps", type=int, help="macro steps to train for (default: by task)")
     for name, what in (
-        ("steps", "macro steps to train for"),
         ("round_steps", "macro steps between checkpoints"),
         ("episodes", "episodes of each evaluation"),
         ("seed", "seed of everything"),
@@ -61,12 +61,13 @@ def run(args: argparse.Namespace) -> None:
     from rich.console import Console
 
     from mplearn_agents.rl import TrainingConfig
-    from mplearn_agents.rl.config import usual_prior
+    from mplearn_agents.rl.config import usual_prior, usual_steps
     from mplearn_agents.rl.train import train
 
     given = {f.name: getattr(args, f.name) for f in fields(TrainingConfig) if hasattr(args, f.name)}
     given["library"] = None if args.library is None else str(args.library)
     given["prior"] = args.prior or usual_prior(args.task)
+    given["steps"] = usual_steps(args.task) if args.steps is None else args.steps
     console = Console()
     config = TrainingConfig(**given)
     start = None if args.start is None else _taken_along(args.start, config)

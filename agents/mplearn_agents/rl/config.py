@@ -27,7 +27,7 @@ def usual_prior(task: str) -> PriorUse:
 
 def usual_steps(task: str) -> int:
     """Return for how many macro steps to train for a task: more where more must be found out."""
-    return 80_000 if task == "follow" else 40_000
+    return 100_000 if task == "follow" else 40_000
 
 
 @dataclass(frozen=True)
