@@ -10,6 +10,7 @@ from mplearn.errors import InvalidValueError
 from mplearn_agents import contest
 from mplearn_agents.cli import main
 from mplearn_agents.episodes import play
+from mplearn_agents.policies import RandomWalk
 from mplearn_agents.rl import ProjectIllegal, TrainedPolicy, TrainingConfig
 from mplearn_agents.rl.config import VERSION
 from mplearn_agents.rl.projection import project
@@ -243,6 +244,13 @@ def test_the_commands(folder, capsys):
     assert "of 2 episodes succeeded" in capsys.readouterr().out
 
 
+class Stroller(RandomWalk):
+    """In place of an agent."""
+
+    def require_fit(self, env):
+        pass
+
+
 def test_a_table_of_policies_and_agents_and_what_is_kept_of_it(folder, capsys, monkeypatch):
     table = ["compare", "--library", str(folder / "small.mplearn"), "--out", str(folder / "table"),
              "--tasks", "goal", "--policies", "random", "quick-path", "--seeds", "2",
@@ -268,7 +276,8 @@ def test_a_table_of_policies_and_agents_and_what_is_kept_of_it(folder, capsys, m
         lost.write_text("[")
         assert main([*table, "--episodes", "3"]) == 0
         assert file.read_text() == written and len(played) == 1
-    assert main([*table, "--policies", "random", "--dynamics", "kinematic", "--variants"]) == 0
+        patched.setattr(contest, "train", lambda *asked, resume: Stroller())
+        assert main([*table, "--policies", "random", "--dynamics", "kinematic", "--variants"]) == 0
     rows = [line for line in file.read_text().splitlines() if line.startswith("| goal")]
     agents = [row.split(" | ")[2] for row in rows]
     assert agents == [
