@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from mplearn.errors import InvalidValueError
+from mplearn.errors import InvalidValueError, MPLearnError
 
 from ..evaluations import BUILT_IN, Setting, evaluations_for
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from mplearn.evaluation import Table
 
 HELP = "Measure segmentation, learning and performing, on synthetic sessions or on recordings."
 
@@ -17,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "data",
         help=f"{' or '.join(repr(name) for name in BUILT_IN)}; a recording or folder whose labels "
-        "are repetitions of movements; or one whose labels are activities",
+        "are repetitions of movements, primitives, or activities",
     )
     parser.add_argument("--out", type=Path, help="folder to write the tables to, as Markdown")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="run these experiments only")
@@ -42,10 +48,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> None:
     """Run the experiments; print each table as it is done."""
     from rich.console import Console
-    from rich.table import Table as Shown
 
     console = Console()
-    found = evaluations_for(args.data)
+    setting = Setting(args.data, tuple(args.seeds), args.orders, _wrong(args))
+    found = evaluations_for(setting)
     if args.list:
         for name, evaluation in found.items():
             console.print(f"{name}: {evaluation.__doc__}")
@@ -54,23 +60,39 @@ def run(args: argparse.Namespace) -> None:
     unknown = [name for name in names if name not in found]
     if unknown:
         raise InvalidValueError(f"experiments on {args.data} are {list(found)}, not {unknown}")
-    setting = Setting(args.data, tuple(args.seeds), args.orders, _wrong(args))
+    if args.data not in BUILT_IN and setting.left_out:
+        console.print(f"left out: {', '.join(setting.left_out)}")
     written: list[str] = []
+    failed: list[str] = []
     for name in names:
-        for table in found[name](setting):
-            shown = Shown(
-                *table.columns, title=table.title, caption=table.note, caption_justify="left"
-            )
-            for row in table.rows:
-                shown.add_row(*row)
-            console.print(shown)
-            written.append(table.to_markdown())
-            if args.out is not None:  # after each: a long run that is stopped leaves what it has
-                args.out.mkdir(parents=True, exist_ok=True)
-                file = args.out / f"{Path(args.data).name}.md"
-                file.write_text("\n".join(written), encoding="utf-8")
-    if args.out is not None:
+        n_before = len(written)
+        try:
+            for table in found[name](setting):
+                _show(console, table)
+                written.append(table.to_markdown())
+                if args.out is not None:  # after each: a run that is stopped leaves what it has
+                    args.out.mkdir(parents=True, exist_ok=True)
+                    file = args.out / f"{Path(args.data).name}.md"
+                    file.write_text("\n".join(written), encoding="utf-8")
+        except MPLearnError as error:  # the others can be measured nevertheless
+            failed.append(name)
+            console.print(f"{name}: {error}")
+        else:
+            if len(written) == n_before:
+                console.print(f"{name}: nothing to measure in {args.data}")
+    if args.out is not None and written:
         console.print(f"written to {args.out / Path(args.data).name}.md")
+    if failed:
+        raise InvalidValueError(f"could not be measured on {args.data}: {', '.join(failed)}")
+
+
+def _show(console: Console, table: Table) -> None:
+    from rich.table import Table as Shown
+
+    shown = Shown(*table.columns, title=table.title, caption=table.note, caption_justify="left")
+    for row in table.rows:
+        shown.add_row(*row)
+    console.print(shown)
 
 
 def _wrong(args: argparse.Namespace) -> Path | None:

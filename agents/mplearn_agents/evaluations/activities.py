@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from mplearn.errors import InvalidValueError
-
 from .setting import Setting
 
 if TYPE_CHECKING:
@@ -17,10 +15,7 @@ def activities(setting: Setting) -> Iterator[Table]:
     """Which activity goes on when, the number of activities not given."""
     from mplearn.evaluation.experiments import activity_table
 
-    labelled = [take for take in setting.takes if take.labels]
-    if not labelled:
-        raise InvalidValueError(f"no recording in {setting.data} has labels")
-    yield activity_table(labelled)
+    yield activity_table(setting.takes)
 
 
 EVALUATIONS = {"activities": activities}

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from mplearn.errors import InvalidValueError
-
 from .setting import Setting
 
 if TYPE_CHECKING:
@@ -65,7 +63,7 @@ def anomaly(setting: Setting) -> Iterator[Table]:
     """Planted wrong motions and orders, and motions performed wrongly on purpose."""
     from mplearn.evaluation.experiments import anomaly_table, judge_people
 
-    yield anomaly_table(judge_people(setting.takes, setting.wrong_takes))
+    yield from _filled(anomaly_table(judge_people(setting.takes, setting.wrong_takes)))
 
 
 def scaffolding(setting: Setting) -> Iterator[Table]:
@@ -79,21 +77,21 @@ def generation(setting: Setting) -> Iterator[Table]:
     """Generated motions against repetitions kept back."""
     from mplearn.evaluation.experiments import generation_table
 
-    yield generation_table(setting.takes)
+    yield from _filled(generation_table(setting.takes))
 
 
 def chains(setting: Setting) -> Iterator[Table]:
     """Factorial models against longer chains."""
     from mplearn.evaluation.experiments import factorial_table
 
-    yield factorial_table(setting.takes)
+    yield from _filled(factorial_table(setting.takes))
 
 
 def inverse_kinematics(setting: Setting) -> Iterator[Table]:
     """Distance of the body's markers from the measured ones."""
     from mplearn.evaluation.experiments import marker_residual_table
 
-    yield marker_residual_table(setting.takes)
+    yield from _filled(marker_residual_table(take for take in setting.takes if take.is_markers))
 
 
 def walks(setting: Setting) -> Iterator[Table]:
@@ -103,8 +101,6 @@ def walks(setting: Setting) -> Iterator[Table]:
     from ..walk_table import walk_table
 
     takes = setting.takes
-    if not takes:
-        raise InvalidValueError(f"{setting.data} holds no takes")
     learner = MotionLearner(LearnerConfig(takes[0].channels, takes[0].rate_hz))
     for take in takes:
         for _ in learner.learn_recording(take):
@@ -113,7 +109,15 @@ def walks(setting: Setting) -> Iterator[Table]:
     walked += [
         (name, each.learner.snapshot()) for name, each in setting.people_outcomes[:: setting.orders]
     ]
-    yield walk_table(walked, setting.seeds)
+    performable = [(name, library) for name, library in walked if library.body and len(library)]
+    if performable:
+        yield walk_table(performable, setting.seeds)
+
+
+def _filled(table: Table) -> Iterator[Table]:
+    """Yield a table that has rows: where there was too little to measure it has none."""
+    if table.rows:
+        yield table
 
 
 EVALUATIONS = {

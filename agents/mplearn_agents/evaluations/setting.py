@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING
 from mplearn.errors import InvalidValueError
 
 if TYPE_CHECKING:
+    from mplearn.evaluation import LabelKind
     from mplearn.evaluation.experiments import Outcome
     from mplearn.recording import Recording
 
@@ -35,18 +37,55 @@ class Setting:
             raise InvalidValueError(f"orders must be at least 1, not {self.orders}")
 
     @cached_property
-    def takes(self) -> tuple[Recording, ...]:
-        """The takes of the data."""
+    def recordings(self) -> tuple[Recording, ...]:
+        """All recordings of the data."""
         from mplearn.mocap import open_recordings
 
         return open_recordings(self.data)
+
+    @cached_property
+    def kind(self) -> LabelKind:
+        """What the labels of the recordings are."""
+        from mplearn.evaluation import kind_of_labels
+
+        return kind_of_labels(self.recordings)
+
+    @cached_property
+    def takes(self) -> tuple[Recording, ...]:
+        """The recordings that are evaluated.
+
+        Raises:
+            InvalidValueError: None can be.
+        """
+        chosen = self._suitable(self.recordings)
+        if not chosen:
+            raise InvalidValueError(f"{self.data} holds no two labelled repetitions of a movement")
+        return chosen
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Names of the recordings that are not."""
+        chosen = {take.name for take in self.takes}
+        return tuple(each.name for each in self.recordings if each.name not in chosen)
 
     @cached_property
     def wrong_takes(self) -> tuple[Recording, ...]:
         """The takes that were performed wrongly; none where there is no folder of them."""
         from mplearn.mocap import open_recordings
 
-        return () if self.wrong is None else open_recordings(self.wrong)
+        if self.wrong is None or not self.takes:
+            return ()
+        first = self.takes[0]
+        found = open_recordings(self.wrong, rate_hz=first.rate_hz)
+        return self._suitable([take for take in found if take.channels == first.channels])
+
+    def _suitable(self, recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+        from mplearn.evaluation import alike, repeating
+
+        if self.kind == "repetitions":
+            return alike(repeating(recordings))
+        labelled = tuple(each for each in recordings if each.labels)
+        return labelled if self.kind == "activities" else alike(labelled)
 
     @cached_property
     def paper_outcomes(self) -> list[tuple[str, Outcome]]:

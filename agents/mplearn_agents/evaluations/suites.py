@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from .activities import EVALUATIONS as ACTIVITIES
 from .people import EVALUATIONS as PEOPLE
 from .robot import EVALUATIONS as ROBOT
+from .sessions import EVALUATIONS as SESSIONS
 from .setting import Setting
 from .synthetic import EVALUATIONS as SYNTHETIC
 
 if TYPE_CHECKING:
-    from mplearn.evaluation import Table
+    from mplearn.evaluation import LabelKind, Table
 
 Evaluation: TypeAlias = Callable[[Setting], "Iterator[Table]"]
 
@@ -21,8 +21,14 @@ Evaluation: TypeAlias = Callable[[Setting], "Iterator[Table]"]
 BUILT_IN: Mapping[str, Mapping[str, Evaluation]] = {"paper-session": SYNTHETIC, "robot": ROBOT}
 
 
-def evaluations_for(data: str) -> Mapping[str, Evaluation]:
+#: Experiments on recordings, by what their labels are.
+OF_LABELS: Mapping[LabelKind, Mapping[str, Evaluation]] = {
+    "repetitions": PEOPLE,
+    "primitives": SESSIONS,
+    "activities": ACTIVITIES,
+}
+
+
+def evaluations_for(setting: Setting) -> Mapping[str, Evaluation]:
     """Return the experiments on a source of data, by name, in the order they are run."""
-    if data in BUILT_IN:
-        return BUILT_IN[data]
-    return ACTIVITIES if any(Path(data).glob("*labels*.json")) else PEOPLE
+    return BUILT_IN[setting.data] if setting.data in BUILT_IN else OF_LABELS[setting.kind]

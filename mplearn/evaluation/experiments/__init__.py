@@ -15,6 +15,7 @@ from .learning import learning_table as learning_table
 from .peers import peers_table as peers_table
 from .people import learn_together as learn_together
 from .people import people_table as people_table
+from .prediction import foretell as foretell
 from .prediction import foretell_paper_sessions as foretell_paper_sessions
 from .prediction import foretell_people as foretell_people
 from .prediction import prediction_table as prediction_table

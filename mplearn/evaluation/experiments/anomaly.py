@@ -109,7 +109,8 @@ def judge_people(
 ) -> Iterator[tuple[str, dict[str, Judged]]]:
     """Learn most of a session of each person's takes; judge the rest, and what is planted.
 
-    Every fifth take is kept from learning altogether: motions never learned. Motions are judged in
+    Every fifth take is kept from learning altogether: motions never learned; a person of one take
+    is left out. Motions are judged in
     sessions of random order, so that each part holds all classes; orders in one whose movements are
     followed by three others only, cut where movements begin to be used up.
 
@@ -120,8 +121,10 @@ def judge_people(
     """
     wrongly = by_person(incorrect)
     for person, own in by_person(takes).items():
+        if len(own) < 2:
+            continue
         rng = np.random.default_rng(seed)
-        apart = range(int(rng.integers(5)), len(own), 5)
+        apart = range(int(rng.integers(min(5, len(own)))), len(own), 5)
         known = [take for i, take in enumerate(own) if i not in apart]
         library, right, classes = _learn(*_mixed_up(known, rng))
         unknown = found_motions(*_mixed_up([own[i] for i in apart], rng))
@@ -199,7 +202,8 @@ def _wrong_motions(
     mixed, small = [], []
     for motion in known:
         others = [other for other in known if other.label != motion.label]
-        mixed.append(_mixed(motion.frames, others[rng.integers(len(others))].frames, rng))
+        if others:
+            mixed.append(_mixed(motion.frames, others[rng.integers(len(others))].frames, rng))
         small.append(motion.frames[0] + 0.5 * (motion.frames - motion.frames[0]))
     planted = {
         "never learned": [motion.frames for motion in unknown],

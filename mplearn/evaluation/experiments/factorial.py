@@ -72,6 +72,9 @@ def factorial_table(takes: Iterable[Recording], n_pairs: int = 5) -> Table:
 def _rows(whose: str, groups: Sequence[Motions], n_pairs: int) -> list[tuple[str, ...]]:
     outcomes: dict[str, list[tuple[float, float, float, bool]]] = defaultdict(list)
     for motions in groups:
+        motions = {name: own for name, own in motions.items() if len(own) > 1}
+        if len(motions) < 2:
+            continue
         pooled = np.concatenate([frames for own in motions.values() for frames in own])
         floor = (FLOOR * pooled.std(axis=0)) ** 2 + 1e-8
         learned = {name: own[::2] for name, own in motions.items()}

@@ -70,7 +70,7 @@ def generation_table(takes: Iterable[Recording]) -> Table:
     return Table(
         title="Generation against held-out repetitions of the same person",
         columns=("style", "RMSE", "mean |jerk| / human's", "smooth is better in: RMSE", "jerk"),
-        rows=tuple(_row(way, found) for way in (*WAYS, ANOTHER)),
+        rows=tuple(_row(way, found) for way in found),
         note=(
             f"{len(found[ANOTHER])} primitives of {n_people} people, in the joint angles of the "
             f"robot; models of {STATES} states from all but the last {HELD_OUT} repetitions of "

@@ -1,0 +1,65 @@
+"""What the labels of some recordings are, and which of the recordings can be evaluated together."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from ..errors import RecordingError
+from ..mocap import resample
+from ..recording import Recording
+
+LabelKind: TypeAlias = Literal["repetitions", "primitives", "activities"]
+SHOWN = 4  # times that a class comes in a recording whose labels are primitives, in the median
+_SHORTEST = 10  # frames of a repetition
+_SAME_RATE = 1e-3  # share by which clocks may differ
+
+
+def kind_of_labels(recordings: Iterable[Recording]) -> LabelKind:
+    """Return what the labels of recordings are.
+
+    Repetitions of one movement a recording, if those of most are; else primitives in a session, if
+    classes come again and again in a recording; else activities, coarser than primitives.
+
+    Raises:
+        RecordingError: No recording has labels.
+    """
+    counts = [Counter(label.label for label in each.labels) for each in recordings if each.labels]
+    if not counts:
+        raise RecordingError("no recording has labels")
+    repeated = sum(len(each) == 1 and each.total() > 1 for each in counts)
+    if 2 * repeated > len(counts):
+        return "repetitions"
+    usual = float(np.median([number for each in counts for number in each.values()]))
+    return "primitives" if usual >= SHOWN else "activities"
+
+
+def repeating(recordings: Iterable[Recording]) -> tuple[Recording, ...]:
+    """Return the recordings that hold at least two labelled repetitions of one movement."""
+    return tuple(
+        each
+        for each in recordings
+        if len(each.labels) > 1
+        and len({label.label for label in each.labels}) == 1
+        and min(label.end - label.start for label in each.labels) >= _SHORTEST
+    )
+
+
+def alike(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+    """Return the recordings of the channels that most have, all at the lowest of their rates."""
+    if not recordings:
+        return ()
+    channels, _ = Counter(each.channels for each in recordings).most_common(1)[0]
+    chosen = [each for each in recordings if each.channels == channels]
+    lowest = min(each.rate_hz for each in chosen)
+    return tuple(_at(each, lowest) for each in chosen)
+
+
+def _at(recording: Recording, rate_hz: float) -> Recording:
+    if recording.rate_hz < (1 + _SAME_RATE) * rate_hz:
+        return replace(recording, rate_hz=rate_hz)
+    return resample(recording, rate_hz)
