@@ -70,6 +70,8 @@ def common_recogniser(
             "leaves": np.ones(len(leaves), dtype=np.bool_),
             "members": [members[i] for i in order],
             "diameters": np.array(diameters)[order],
+            "caps": None,
         },
     }
-    return Recogniser.from_state(common)
+    recogniser = Recogniser.from_state(common)
+    return recogniser.calibrated(recogniser.config.false_acceptance)

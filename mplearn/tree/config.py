@@ -73,8 +73,9 @@ class TreeConfig:
         min_branch: Members of each branch from which on it is one.
         merge_ratio: Two leaves that a segment lies in are merged when the distance between them is
             below that inside them times this; 0 for never.
-        false_acceptance: Share of the motions of unknown kinds that may be taken for known ones:
-            all radii are scaled to it (`mplearn.tree.rejection`); None leaves them as they are.
+        false_acceptance: Share of the motions of unknown kinds that a recogniser may take for
+            known ones (`mplearn.tree.rejection`): its radii are the smaller for it; None leaves
+            them as they are. What is learned does not depend on it.
         n_candidates: Leaves, by mean trajectory, that are looked at closely; 0 to search down from
             the root, as printed.
         max_exemplars: Exemplars kept by a node; a leaf that has so many may be split.

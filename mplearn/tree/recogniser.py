@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
+from copy import copy
+from dataclasses import asdict, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from . import form
 from .bank import ExemplarBank
 from .config import FormConfig, TreeConfig
 from .placement import Match
+from .rejection import Strangers, spreads
 from .search import NodeIndex
 
 
@@ -57,6 +59,38 @@ class Recogniser:
     def primitives(self) -> tuple[int, ...]:
         """Ids of the primitives it knows."""
         return tuple(int(id) for id in self._index.ids[self._index.leaves])
+
+    @property
+    def false_acceptance(self) -> float:
+        """Largest share of motions of unknown kinds to be expected that is taken for known ones.
+
+        It is estimated from how near exemplars come to primitives that are not theirs; NaN where
+        there is no second one.
+        """
+        index = self._index
+        return Strangers.of(index, self._bank, index.radii()).rate(1.0)
+
+    def calibrated(self, false_acceptance: float | None) -> Recogniser:
+        """Return a recogniser with radii at which no more strangers are accepted than stated.
+
+        Radii are only ever made smaller: what lies outside of the rules' own is no execution of the
+        primitive, however far strangers are.
+
+        Args:
+            false_acceptance: Share of the motions of unknown kinds that may be taken for known;
+                None for the rules' own radii.
+
+        Raises:
+            InvalidValueError: It is no share.
+        """
+        config = replace(self.config, false_acceptance=false_acceptance)
+        index = copy(self._index)
+        index.caps = None
+        if false_acceptance is not None:
+            units = spreads(index, self._bank)
+            strangers = Strangers.of(index, self._bank, units)
+            index.caps = strangers.threshold(false_acceptance) * units
+        return Recogniser(config, self._bank, index, self.shortest_frames)
 
     def recognise(self, frames: FloatArray) -> Recognition:
         """Recognise a segment, shape (T, D).

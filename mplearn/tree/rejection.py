@@ -1,56 +1,94 @@
 """How near a motion of an unknown kind comes to what is known: a radius with a stated error rate.
 
-Every known primitive was unknown once. A segment that lies in one leaf is, for all the other
-leaves, a motion of an unknown kind: how near it comes to the nearest of those is what a stranger's
-distance is like. The rule is that of conformal prediction [Vovk2005]: if strangers come as those
-did, a new one falls below the k-th smallest of n such distances with probability k / (n + 1).
+Every known primitive was unknown once. For the exemplars of a leaf the other leaves are what is
+known: how near they come to the nearest of those, in units of how far that leaf's own exemplars lie
+apart, is what a stranger's distance is like. The rule is that of conformal prediction [Vovk2005],
+over leaves and not over exemplars, for executions of one motion come equally near [Dunn2023]: where
+a share s_k of the exemplars of leaf k comes nearer than t, a stranger does with a probability of
+(1 + sum of s_k) / (K + 1) at most. It is 2 / (K + 1) at the nearest that was seen, for who comes
+nearer than anyone makes a stranger of a leaf as well. A smaller rate lies beyond that; down there
+the probability falls with the third power of t, as it does where motions fill three dimensions.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
-REMEMBERED = 512  # strangers
-LEAST = 0.1  # smallest share of the radius that rules give that is left
+from ..recording import FloatArray
+from .bank import ExemplarBank
+from .search import NodeIndex, mean_nearest
+
+DIMENSIONS = 3.0  # nearest neighbours among people's motions tell of 2.3 to 5.5
+_PAIR = 2.0
+_SHARED = 6.0  # exemplars that the spread all leaves share counts for beside a leaf's own
 
 
 class Strangers:
-    """The latest distances of motions to the nearest leaf but their own, in radii."""
+    """How near motions come to primitives that are not theirs.
 
-    def __init__(self) -> None:
-        self._ratios: list[float] = []
+    Args:
+        distances: Of each primitive, how near its exemplars come to another, shape (k,) each.
+    """
 
-    def __len__(self) -> int:
-        """Number of distances."""
-        return len(self._ratios)
+    def __init__(self, distances: Sequence[FloatArray]) -> None:
+        seen = [each for each in distances if len(each)]
+        order = np.argsort(np.concatenate([np.zeros(0), *seen]), kind="stable")
+        shares = [np.full(len(each), 1 / len(each)) for each in seen]
+        self._n_leaves = len(seen)
+        self._distances = np.concatenate([np.zeros(0), *seen])[order]
+        sums = 1 + np.cumsum(np.concatenate([np.zeros(0), *shares])[order])
+        self._expected = np.maximum(_PAIR, sums)
 
-    def add(self, ratio: float) -> None:
-        """Take one more."""
-        self._ratios.append(float(ratio))
-        del self._ratios[:-REMEMBERED]
+    @classmethod
+    def of(cls, index: NodeIndex, bank: ExemplarBank, units: FloatArray) -> Strangers:
+        """Return those of all leaves of an index, in a unit of each node, shape (n,)."""
+        unit = dict(zip(index.ids.tolist(), units.tolist(), strict=True))
+        power = index.config.power
+        found = []
+        for id, is_leaf, members in zip(index.ids, index.leaves, index.members, strict=True):
+            near = [index.others(bank[n], bank, int(id)) for n in members] if is_leaf else []
+            found.append(
+                [min(m.distance**power / unit[m.node] for m in each) for each in near if each]
+            )
+        return cls([np.array(each) for each in found])
 
     def threshold(self, rate: float) -> float:
-        """Return the ratio below which a share ``rate`` of strangers falls, at least `LEAST`.
+        """Return the distance within which a share ``rate`` of strangers comes at most.
 
-        As long as too few were seen to tell, it is the smallest of theirs, and at most 1.
+        It is inf where there was none.
         """
-        k = int(rate * (len(self) + 1))
-        if k < 1:
-            return min(1.0, *self._ratios) if self._ratios else 1.0
-        return max(LEAST, float(np.partition(self._ratios, k - 1)[k - 1]))
+        if not self._n_leaves:
+            return float("inf")
+        allowed = rate * (self._n_leaves + 1)
+        if allowed < _PAIR:
+            return float(self._distances[0] * (allowed / _PAIR) ** (1 / DIMENSIONS))
+        within = int(np.searchsorted(self._expected, allowed, side="right"))
+        return float(self._distances[min(within, len(self._distances) - 1)])
 
-    def rate(self, ratio: float) -> float:
-        """Return the share of strangers expected at or below a ratio; NaN before any was seen."""
-        if not self._ratios:
+    def rate(self, distance: float) -> float:
+        """Return the largest share of strangers expected nearer than that; NaN if none was seen."""
+        if not self._n_leaves:
             return float("nan")
-        return (1 + sum(each <= ratio for each in self._ratios)) / (len(self) + 1)
+        below = int(np.searchsorted(self._distances, distance, side="left"))
+        if below:
+            return min(1.0, float(self._expected[below - 1] / (self._n_leaves + 1)))
+        beyond = (distance / self._distances[0]) ** DIMENSIONS if distance > 0 else 0.0
+        return min(1.0, float(_PAIR * beyond / (self._n_leaves + 1)))
 
-    def state(self) -> dict[str, Any]:
-        """Return everything as plain arrays."""
-        return {"ratios": np.array(self._ratios)}
 
-    def load_state(self, state: dict[str, Any]) -> None:
-        """Resume from what `state` returned."""
-        self._ratios = [float(ratio) for ratio in state["ratios"]]
+def spreads(index: NodeIndex, bank: ExemplarBank) -> FloatArray:
+    """Return how far the exemplars of each node lie apart, shape (n,).
+
+    It is the mean distance of an exemplar to the others, as that of a segment to a node is taken,
+    drawn towards that of all nodes where there are few.
+    """
+    inside = []
+    for members in index.members:
+        apart = bank.matrix(members) + np.diag(np.full(len(members), np.inf))
+        n_nearest = min(index.config.n_nearest, len(members) - 1)
+        inside.append(mean_nearest(apart, n_nearest) if n_nearest else np.zeros(0))
+    shared = float(np.mean([each.mean() for each in inside if len(each)] or [0.0]))
+    drawn = [(each.sum() + _SHARED * shared) / (len(each) + _SHARED) for each in inside]
+    return np.asarray(np.maximum(drawn, 1e-12))

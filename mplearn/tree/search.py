@@ -36,14 +36,14 @@ class NodeIndex:
 
     Attributes:
         limit: Largest radius.
-        factor: Radii that are used over those of the rules.
+        caps: Largest radius of each node, shape (n,); None for that of the rules.
         members: Numbers of the exemplars of each node, in the order of the nodes' ids.
     """
 
     def __init__(self, config: TreeConfig, bank: ExemplarBank) -> None:
         self.config = config
         self.limit = 0.0
-        self.factor = 1.0
+        self.caps: FloatArray | None = None
         self.members: list[list[int]] = []
         self._known = np.zeros(0, _KNOWN)
         self._means = Rows((bank.n_channels * config.form.n_points,))
@@ -101,7 +101,7 @@ class NodeIndex:
         radii = self.config.reach * self._known["diameter"]
         if np.isfinite(self.config.reach_cap):
             radii = np.minimum(radii, min(self.config.reach_cap * self.scale(), self.limit))
-        return np.asarray(self.factor * radii)
+        return np.asarray(radii if self.caps is None else np.minimum(radii, self.caps))
 
     def radius(self, id: int) -> float:
         """Return the radius of one node."""
@@ -117,6 +117,12 @@ class NodeIndex:
         if self.config.n_candidates:
             return self._compare(exemplar, bank, self._candidates(exemplar, bank))
         return self._descend(exemplar, bank)
+
+    def others(self, exemplar: Exemplar, bank: ExemplarBank, but: int) -> list[Match]:
+        """Return the leaves that a segment is near to, best first, but for one of them."""
+        near = self._candidates(exemplar, bank) if self.config.n_candidates else self.leaves
+        places = np.arange(len(self.ids))[near]
+        return self._compare(exemplar, bank, places[self.ids[places] != but])
 
     def _candidates(self, exemplar: Exemplar, bank: ExemplarBank) -> IntArray:
         """Return the leaves nearest by mean trajectory."""
@@ -160,7 +166,7 @@ class NodeIndex:
         """Return everything as plain values and arrays."""
         return {
             "limit": self.limit,
-            "factor": self.factor,
+            "caps": None if self.caps is None else self.caps.copy(),
             "ids": self.ids.copy(),
             "parents": self._known["parent"].copy(),
             "leaves": self.leaves.copy(),
@@ -173,7 +179,8 @@ class NodeIndex:
         """Return the index that `state` described."""
         index = cls(config, bank)
         index.limit = float(state["limit"])
-        index.factor = float(state.get("factor", 1.0))
+        caps = state.get("caps")
+        index.caps = None if caps is None else np.array(caps, dtype=np.float64)
         columns = (state[name] for name in ("ids", "parents", "leaves", "diameters", "members"))
         for id, parent, is_leaf, diameter, members in zip(*columns, strict=True):
             facts = (int(id), int(parent), bool(is_leaf), float(diameter))

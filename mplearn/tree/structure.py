@@ -11,7 +11,6 @@ from .config import TreeConfig
 from .memory import SegmentMemory
 from .node import Node
 from .placement import ROOT, Change, Merge, Reparent, Split
-from .rejection import Strangers
 from .search import NodeIndex
 
 
@@ -26,7 +25,6 @@ class Structure:
         nodes: The nodes by id, in the order of their birth.
         next_id: Id of the node that is formed next.
         index: What the search knows of them.
-        strangers: How near motions come to leaves that are not theirs.
     """
 
     def __init__(self, config: TreeConfig, memory: SegmentMemory) -> None:
@@ -34,7 +32,6 @@ class Structure:
         self.memory = memory
         self.nodes = {ROOT: Node(ROOT, None, 0)}
         self.next_id = ROOT + 1
-        self.strangers = Strangers()
         self.index = NodeIndex(config, memory.bank)
 
     @property
@@ -45,7 +42,8 @@ class Structure:
     def reindex(self) -> None:
         """Let the search know all nodes anew."""
         self.index = NodeIndex(self.config, self.memory.bank)
-        self._note(*self.nodes.values())
+        for node in self.nodes.values():
+            self.index.put(node, self.memory.bank)
 
     def _note(self, *changed: Node) -> None:
         """Let the search know what has changed in some nodes, or that they are gone."""
@@ -57,16 +55,15 @@ class Structure:
         self.tune()
 
     def tune(self) -> None:
-        """Let radii follow the scale of all motion, and the stated rate of false acceptance."""
+        """Let radii follow the scale of all motion."""
         self.index.limit = self.config.reach_limit * self.memory.scale()
-        rate = self.config.false_acceptance
-        self.index.factor = 1.0 if rate is None else self.strangers.threshold(rate)
 
     def remeasure(self) -> None:
         """Measure all distances again."""
         for node in self.nodes.values():
             node.matrix = self.memory.bank.matrix(node.members)
         self.reindex()
+        self.tune()
 
     def add(self, node: Node, number: int) -> None:
         """Put a segment into a node; the least informative exemplars of a full one go."""

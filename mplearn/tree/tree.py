@@ -101,15 +101,6 @@ class PrimitiveTree:
             )
         return index.radius(id)
 
-    @property
-    def false_acceptance(self) -> float:
-        """Share of motions of unknown kinds expected to be taken for known ones, as radii are now.
-
-        It is estimated from how near motions came to primitives that are not theirs; NaN before
-        there were any.
-        """
-        return self._structure.strangers.rate(self._structure.index.factor)
-
     def exemplars(self, id: int) -> tuple[FloatArray, ...]:
         """Return the kept segments of a node as they came, shape (L, D) each."""
         return tuple(self._memory.frames[number] for number in self.node(id).members)
@@ -139,12 +130,13 @@ class PrimitiveTree:
         return self._models.of(id)
 
     def recogniser(self) -> Recogniser:
-        """Return what the tree would recognise now, frozen."""
+        """Return what the tree would recognise now, frozen; at the stated rate, if there is one."""
         index = self._structure.index
         numbers = {number for group in index.members for number in group}
         bank = self._memory.bank.subset(numbers)
         known = NodeIndex.from_state(self.config, bank, index.state())
-        return Recogniser(self.config, bank, known, self._shortest_frames)
+        frozen = Recogniser(self.config, bank, known, self._shortest_frames)
+        return frozen.calibrated(self.config.false_acceptance)
 
     # ---- learning
 
@@ -169,8 +161,6 @@ class PrimitiveTree:
         distance, ratio = (matches[0].distance, matches[0].ratio) if matches else (np.inf, np.inf)
         node = self.node(matches[0].node if ratio <= 1 else ROOT)
         recognised = node.id != ROOT and node.is_leaf
-        if recognised and len(matches) > 1 and not self.config.local:
-            structure.strangers.add(matches[1].ratio * structure.index.factor)
         structure.add(node, number)
         like = self._waiting_like(node)
         if node.id == ROOT or self.config.local:
@@ -265,7 +255,6 @@ class PrimitiveTree:
             "n_seen": self.n_seen,
             "next_id": self._structure.next_id,
             **self._memory.state(),
-            "strangers": self._structure.strangers.state(),
             "nodes": [node.state() for node in self.nodes],
         }
 
@@ -276,9 +265,9 @@ class PrimitiveTree:
         self._memory.load_state(state, [number for node in nodes for number in node.members])
         self._structure = Structure(self.config, self._memory)
         self._structure.next_id = int(state["next_id"])
-        self._structure.strangers.load_state(state["strangers"])
         self._structure.nodes = {node.id: node for node in nodes}
         self._structure.reindex()
+        self._structure.tune()
         self._models = GroupModels(self.config, self._structure)
 
     def _waiting_like(self, node: Node) -> int | None:

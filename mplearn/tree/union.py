@@ -145,9 +145,6 @@ def _joined(tree: PrimitiveTree, a: dict[str, Any], b: dict[str, Any]) -> dict[s
         "sample": {"numbers": numbers, "matrix": bank.matrix(numbers.tolist())},
         "bank": bank.state(),
         "frames": [each for each, keep in zip(frames, kept, strict=True) if keep],
-        "strangers": {
-            "ratios": np.concatenate([a["strangers"]["ratios"], b["strangers"]["ratios"]])
-        },
         "nodes": nodes,
     }
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import binom
+from scipy.spatial.distance import cdist
 
 sys.path.insert(0, str(Path(__file__).parent))
 from motions import RATE_HZ, Motions
@@ -15,56 +15,85 @@ from mplearn.tree import PrimitiveTree, TreeConfig
 from mplearn.tree.rejection import Strangers
 
 
-@pytest.mark.parametrize("rate", [0.05, 0.2])
-def test_the_stated_rate_is_the_measured_one_on_any_distribution(rate):
-    rng = np.random.default_rng(1)
-    hits = 0
-    for _ in range(400):
-        strangers = Strangers()
-        for ratio in rng.lognormal(0.5, 0.7, 99):
-            strangers.add(ratio)
-        hits += (rng.lognormal(0.5, 0.7, 10) < strangers.threshold(rate)).sum()
-    low, high = binom.ppf([1e-4, 1 - 1e-4], 1000, rate) / 1000
-    assert low <= hits / 4000 <= high
+def nearest_others(points):
+    """Distance of each execution of each class to the nearest class but its own."""
+    middles = points.mean(axis=1)
+    found = []
+    for k, own in enumerate(points):
+        found.append(cdist(own, np.delete(middles, k, axis=0)).min(axis=1))
+    return found
+
+
+@pytest.mark.parametrize("rate", [0.02, 0.05, 0.1, 0.3])
+@pytest.mark.parametrize("n_dimensions", [3, 8])
+def test_no_more_strangers_are_accepted_than_stated(rate, n_dimensions):
+    rng = np.random.default_rng(round(1000 * rate) + n_dimensions)
+    n_known, shares = 12, []
+    for _ in range(1500):
+        middles = rng.normal(size=(n_known + 1, 1, n_dimensions))
+        points = middles + rng.normal(0, 0.1, (n_known + 1, 8, n_dimensions))
+        threshold = Strangers(nearest_others(points[:-1])).threshold(rate)
+        stranger = cdist(points[-1], points[:-1].mean(axis=1)).min(axis=1)
+        shares.append((stranger < threshold).mean())
+    error = np.std(shares) / np.sqrt(len(shares))
+    assert np.mean(shares) < rate + 2.5 * error
+    assert np.mean(shares) > 0.25 * rate - 2.5 * error or n_dimensions > 3  # it is of use
 
 
 def test_the_estimate_and_the_threshold_are_inverse():
-    strangers = Strangers()
-    assert np.isnan(strangers.rate(1.0)) and strangers.threshold(0.01) == 1.0
-    for ratio in np.arange(1, 100) / 10:
-        strangers.add(ratio)
-    for rate in (0.05, 0.1, 0.5):
-        assert strangers.rate(strangers.threshold(rate) - 1e-9) == pytest.approx(rate, abs=0.011)
-    for _ in range(2000):
-        strangers.add(5.0)
-    assert len(strangers) == 512
+    nobody = Strangers([])
+    assert np.isnan(nobody.rate(1.0)) and nobody.threshold(0.01) == np.inf
+    rng = np.random.default_rng(0)
+    strangers = Strangers([rng.lognormal(k / 20, 0.2, 12) for k in range(30)])
+    for rate in (0.001, 0.01, 0.05, 0.1, 0.5):
+        assert rate / 2 < strangers.rate(strangers.threshold(rate)) <= rate * (1 + 1e-9)
+    rates = [strangers.rate(t) for t in np.linspace(0, 20, 200)]
+    assert rates == sorted(rates) and rates[0] == 0.0 and rates[-1] == pytest.approx(1.0)
 
 
-def crowded(seed, n_motions=40):
+def crowded(seed, n_motions):
     """Motions of few channels, so that some are as near to each other as executions of one."""
     motions = Motions(n_motions, 2, seed)
     motions.keys *= 0.25
     return motions
 
 
-def test_strangers_are_accepted_as_often_as_stated():
-    rate = 0.15
-    tree = PrimitiveTree(TreeConfig(false_acceptance=rate), 2, RATE_HZ)
-    known = crowded(0, 60)
-    for _, frames in known.session(9):
-        tree.insert(frames)
-    assert len(tree.leaves) > 20
-    assert tree.false_acceptance == pytest.approx(rate, abs=0.01)
-    recogniser = tree.recogniser()
-    strangers = crowded(77, 300)
-    accepted = sum(
-        recogniser.recognise(strangers.perform(m)).primitive is not None for m in range(300)
-    )
-    low, high = binom.ppf([1e-3, 1 - 1e-3], 60, rate) / 60  # what 60 known motions can tell
-    assert low <= accepted / 300 <= high
-    again = type(recogniser).from_state(recogniser.state())
-    frames = strangers.perform(3)
-    assert again.recognise(frames) == recogniser.recognise(frames)
+def test_a_recogniser_holds_the_rate_that_was_stated():
+    accepted, missed = {}, {}
+    for seed in range(3):
+        known, strangers = crowded(seed, 24), crowded(100 + seed, 40)
+        tree = PrimitiveTree(TreeConfig(reach=3.0, reach_cap=3.0, reach_limit=2.0), 2, RATE_HZ)
+        for _, frames in known.session(6):
+            tree.insert(frames)
+        strange = [strangers.perform(m) for m in range(40)]
+        usual = [known.perform(m) for m in range(24)]
+        for rate in (None, 0.2, 0.1):
+            recogniser = tree.recogniser().calibrated(rate)
+            accepted.setdefault(rate, []).extend(recogniser.recognise(x).primitive for x in strange)
+            missed.setdefault(rate, []).extend(recogniser.recognise(x).primitive for x in usual)
+            assert rate is None or recogniser.false_acceptance <= rate + 1e-9
+    share = {rate: 1 - found.count(None) / len(found) for rate, found in accepted.items()}
+    assert share[None] > 0.4  # these rules' own radii hold no rate
+    for rate in (0.2, 0.1):
+        assert share[rate] <= rate + 2 * np.sqrt(rate / 40)  # what so few known motions can tell
+    assert missed[0.2].count(None) < 0.5 * len(missed[0.2])
+
+
+def test_a_stated_rate_changes_what_is_recognised_and_not_what_is_learned():
+    trees = [PrimitiveTree(TreeConfig(false_acceptance=rate), 2, RATE_HZ) for rate in (None, 0.05)]
+    for tree in trees:
+        for _, frames in crowded(3, 10).session(7):
+            tree.insert(frames)
+    plain, stated = trees
+    assert [node.members for node in plain.nodes] == [node.members for node in stated.nodes]
+    assert plain.recogniser().false_acceptance > 0.05 >= stated.recogniser().false_acceptance
+    frozen = stated.recogniser()
+    again = type(frozen).from_state(frozen.state())
+    later = plain.recogniser().calibrated(0.05)
+    for m in range(10):
+        frames = crowded(3, 10).perform(m)
+        found = frozen.recognise(frames)
+        assert again.recognise(frames) == found and later.recognise(frames) == found
 
 
 def test_a_rate_must_be_a_share():
