@@ -188,11 +188,11 @@ class KinematicPerformer(Performer):
         """Perform a primitive; None holds. See `Performer.perform`."""
         motion = ("hold", self.hold_s) if id is None else self.repertoire.key(id)
         key = (self._here.key, motion)
-        known: _Known | None = self.repertoire.recall(key)
+        known: _Known | None = self.repertoire.memory.recall(key)
         if known is None or on_frame is not None:
             plan = self._plan(id)
             known = self._performed(plan)
-            self.repertoire.remember(key, known)
+            self.repertoire.memory.remember(key, known)
             if on_frame is not None:
                 self._play(plan, on_frame, frame_steps)
         self._here = known.place

@@ -1,40 +1,37 @@
-"""A library as one robot can perform it: motions, verdicts, slots, and which may come next."""
+"""A library as one robot can perform it: who has which slot, and which may come next."""
 
 from __future__ import annotations
 
 import copy
-from collections import OrderedDict
 from collections.abc import Hashable
-from functools import cached_property
-from threading import RLock
 from typing import Any
 from weakref import WeakValueDictionary
 
 import numpy as np
 
-from mplearn.errors import InvalidValueError, LibraryError, RobotError
+from mplearn.errors import LibraryError, RobotError
 from mplearn.generation import StyleName
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import FloatArray
 
 from .choices import Choices, choose_among
 from .control.controller import tracked_columns
-from .control.planner import Motion, Plan, Planner
-from .control.reference import Reference, rest_reference
-from .feasibility import Feasibility, FeasibilityCheck, FeasibilityConfig
-from .robot import Retargeting, Robot
+from .control.reference import Reference
+from .feasibility import FeasibilityConfig
+from .memory import Memory
+from .robot import Robot
+from .skills import Skills
 from .slots import Slots
 
 ENTRY_GAP = 0.5  # largest difference of a tracked coordinate [rad]
-_MEMORY = 4096  # outcomes of about 6 kB each
 HEIGHT_SCALE = 5.0  # 0.2 m of height count as much as 1 rad
+_OUTCOMES = 4096  # of about 6 kB each
 
 
-class Repertoire:
+class Repertoire(Skills):
     """The primitives of a library, in slots of a fixed number: slot 0 is hold.
 
-    What is found out about a primitive is kept until it changes; it depends on nothing else, so
-    several environments may share a repertoire, in threads too.
+    Several environments may share a repertoire, in threads too.
 
     Args:
         library: The primitives and their transitions.
@@ -50,8 +47,7 @@ class Repertoire:
         slots: Slot of each primitive.
         ids: Ids of the primitives that have one.
         growing: See above.
-        memory: What performers remember; see `remember` and `recall`.
-        lock: Held while anything here changes.
+        memory: What performers remember of outcomes.
 
     Raises:
         LibraryError: The library is empty, is for another body, or holds more than fits.
@@ -70,33 +66,17 @@ class Repertoire:
         novel: bool = False,
         growing: bool = False,
     ) -> None:
-        if not (np.isfinite(speed) and speed > 0):
-            raise InvalidValueError(f"speed must be positive and finite, not {speed}")
         if not len(library) and not growing:
             raise LibraryError("the library is empty: there is nothing to perform")
-        self.robot = robot
-        self.speed = float(speed)
-        self.style = style
-        self.limits = limits
+        self._slots = Slots(capacity, len(library))
+        self._slots.require_room(len(library))
+        super().__init__(library, robot, speed, style, limits)
+        self.capacity = self._slots.capacity
         self.novel = novel
         self.growing = growing
+        self.memory = Memory(_OUTCOMES)
         self._tracked = tracked_columns(robot)
-        self._slots = Slots(capacity, len(library))
-        self.capacity = self._slots.capacity
-        self._slots.require_room(len(library))
-        self._frames: dict[int, tuple[FloatArray, float]] = {}
-        self._motions: dict[int, Motion] = {}
-        self._verdicts: dict[int, Feasibility] = {}
-        self._revision: dict[int, int] = {}
-        self._check: FeasibilityCheck | None = None
-        self.memory: OrderedDict[Hashable, Any] = OrderedDict()
-        self.lock = RLock()
         self.update(library)
-
-    @cached_property
-    def planner(self) -> Planner:
-        """Plans for the robot."""
-        return Planner(self.robot)
 
     def update(self, library: PrimitiveLibrary) -> tuple[int, ...]:
         """Take a newer snapshot; primitives that live on keep their slots.
@@ -107,28 +87,20 @@ class Repertoire:
         Raises:
             LibraryError: The library is for another body.
         """
-        retargeting = _retargeting(library, self.robot)
         with self.lock:
+            self.take(library)
             left_out = self._slots.update(library.ids)
-            self.library = library
             self.slots = self._slots.of
             self.ids = tuple(sorted(self.slots))
-            self._retargeting = retargeting
-            self._frames = {id: self._frames[id] for id in self.ids if id in self._frames}
-            self._motions = {id: self._motions[id] for id in self.ids if id in self._motions}
-            self._verdicts = {id: self._verdicts[id] for id in self.ids if id in self._verdicts}
-            self._fresh: set[int] = set()  # ids whose frames are known to be this library's
             self._after: dict[int, Choices] = {}
             self._starts: FloatArray | None = None
         return left_out
 
     def forget(self) -> None:
-        """Free all slots: what comes is another learner's, whose ids mean something else."""
+        """Forget all and free all slots: what comes is another learner's, of other ids."""
         with self.lock:
+            super().forget()
             self._slots.clear()
-            self._frames.clear()
-            self._motions.clear()
-            self._verdicts.clear()
 
     def require_room(self, n_primitives: int) -> None:
         """Check that so many primitives fit.
@@ -142,97 +114,10 @@ class Repertoire:
         """Return the id of the primitive in a slot; None for hold and for free slots."""
         return self._slots.primitive(slot)
 
-    def frames(self, id: int) -> tuple[FloatArray, float]:
-        """Return a primitive's motion in the robot's channels, (T, 3 + n), and its rate [1/s]."""
-        with self.lock:
-            if id not in self._fresh:
-                self._generate(id)
-                self._fresh.add(id)
-            return self._frames[id]
-
-    def _generate(self, id: int) -> None:
-        motion = self.library.generate([id], style=self.style)
-        frames = self._retargeting(motion.frames)
-        if len(frames) == 1:
-            frames = np.repeat(frames, 2, axis=0)
-        known = self._frames.get(id)
-        if known is None or known[1] != motion.rate_hz or not np.array_equal(known[0], frames):
-            self._frames[id] = (np.ascontiguousarray(frames), motion.rate_hz)
-            self._motions.pop(id, None)
-            self._verdicts.pop(id, None)
-            self._revision[id] = self._revision.get(id, 0) + 1
-
-    def feasibility(self, id: int) -> Feasibility:
-        """Return whether the robot can perform a primitive; judged once."""
-        with self.lock:
-            frames, rate_hz = self.frames(id)
-            if id not in self._verdicts:
-                if self._check is None:
-                    self._check = FeasibilityCheck(self.planner, self.limits)
-                self._verdicts[id] = self._check.judge(frames, rate_hz, self.speed)
-            return self._verdicts[id]
-
     @property
     def feasible_ids(self) -> tuple[int, ...]:
         """Ids of the primitives that the robot can perform; judges them all."""
         return tuple(id for id in self.ids if self.feasibility(id).feasible)
-
-    def key(self, id: int) -> tuple[int, int]:
-        """Return what tells a primitive's motion from all others, earlier versions included."""
-        self.frames(id)
-        return id, self._revision[id]
-
-    def plan(self, start: Reference, id: int) -> Plan:
-        """Return the commands that perform a primitive from the present reference."""
-        with self.lock:
-            frames, rate_hz = self.frames(id)
-            if id not in self._motions:
-                self._motions[id] = self.planner.motion(frames, rate_hz)
-            speed = self.feasibility(id).speed
-            plan = self.planner.plan(start, self._motions[id], speed, self.key(id))
-        return plan._replace(end=self._settled(plan.end))
-
-    def hold(self, start: Reference, duration_s: float) -> Plan:
-        """Return the commands that come to rest in the present posture."""
-        with self.lock:
-            plan = self.planner.hold(start, duration_s)
-        return plan._replace(end=self._settled(plan.end))
-
-    def _settled(self, end: Reference) -> Reference:
-        """Return where a motion ends, such that the same place recurs, to the last bit.
-
-        The legs are solved for to about 1e-5 and depend that much on the way; and with both feet
-        down it does not matter how they swung.
-        """
-        if end.lifted >= 0:
-            return end
-        q = np.round(end.q, 4)
-        q[3:7] /= np.linalg.norm(q[3:7])
-        return end._replace(q=q, swing=self._rest.swing, swing_velocity=self._rest.swing_velocity)
-
-    @cached_property
-    def _rest(self) -> Reference:
-        return rest_reference(self.robot)
-
-    def recall(self, key: Hashable) -> Any:
-        """Return what was kept under a key; None if that is not, or no longer, in `memory`."""
-        with self.lock:
-            if key not in self.memory:
-                return None
-            self.memory.move_to_end(key)
-            return self.memory[key]
-
-    def remember(self, key: Hashable, value: Any) -> None:
-        """Keep a value in `memory`, of which the ``_MEMORY`` used last are kept."""
-        with self.lock:
-            self.memory[key] = value
-            if len(self.memory) > _MEMORY:
-                self.memory.popitem(last=False)
-
-    def duration_s(self, id: int) -> float:
-        """Return how long a primitive that it can perform takes the robot from where it starts."""
-        frames, rate_hz = self.frames(id)
-        return (len(frames) - 1) / rate_hz / self.feasibility(id).tempo
 
     def after(self, id: int) -> Choices:
         """Return what may follow a primitive: observed transitions that are feasible, and hold."""
@@ -261,20 +146,36 @@ class Repertoire:
         if not self.ids:
             return self._choices({})
         with self.lock:
-            if self._starts is None:
-                self._starts = np.array([self.frames(id)[0][0, self._tracked] for id in self.ids])
-            apart = np.abs(self._starts - reference.target)
-            apart[:, 0] *= HEIGHT_SCALE
-            gaps = dict(zip(self.ids, apart.max(axis=1).tolist(), strict=True))
+            gaps = self._gaps(reference)
             near = sorted(self.ids, key=lambda id: (gaps[id], id))
-            able = [id for id in near if self.feasibility(id).feasible]
-            if not able:
+            # no more is judged than is needed
+            first = next((id for id in near if self._starts_on(id, reference.lifted)), None)
+            other_feet = first is None
+            if first is None:
+                first = next((id for id in near if self.feasibility(id).feasible), None)
+            if first is None:
                 raise RobotError(self._nothing_feasible(near))
-            here = [id for id in able if self.feasibility(id).starts_up == reference.lifted]
-            reach = gaps[(here or able)[0]] + ENTRY_GAP
-            other_feet = set(able) - set(here) if here else set()
-            within = [id for id in near if gaps[id] <= reach and id not in other_feet]
+            within = [id for id in near if gaps[id] <= gaps[first] + ENTRY_GAP]
+            if not other_feet:
+                within = [
+                    id
+                    for id in within
+                    if self._starts_on(id, reference.lifted) or not self.feasibility(id).feasible
+                ]
             return self._choices({id: float(self.library[id].n_exemplars) for id in within})
+
+    def _starts_on(self, id: int, lifted: int) -> bool:
+        """Return whether the robot can perform a primitive, and it starts with that foot up."""
+        verdict = self.feasibility(id)
+        return verdict.feasible and verdict.starts_up == lifted
+
+    def _gaps(self, reference: Reference) -> dict[int, float]:
+        """Return how far from a reference each primitive starts [rad]."""
+        if self._starts is None:
+            self._starts = np.array([self.frames(id)[0][0, self._tracked] for id in self.ids])
+        apart = np.abs(self._starts - reference.target)
+        apart[:, 0] *= HEIGHT_SCALE
+        return dict(zip(self.ids, apart.max(axis=1).tolist(), strict=True))
 
     def _nothing_feasible(self, ids: list[int]) -> str:
         reasons = "; ".join(
@@ -310,21 +211,11 @@ class Repertoire:
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what can be worked out again, and is large."""
-        left_out = ("lock", "memory", "planner", "_check")
-        return {name: value for name, value in self.__dict__.items() if name not in left_out}
+        return {name: value for name, value in super().__getstate__().items() if name != "memory"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._check = None
-        self.memory = OrderedDict()
-        self.lock = RLock()
-
-
-def _retargeting(library: PrimitiveLibrary, robot: Robot) -> Retargeting:
-    try:
-        return Retargeting(library.channels, library.body, robot)
-    except RobotError as error:
-        raise LibraryError(f"the library is not for this robot: {error}") from error
+        super().__setstate__(state)
+        self.memory = Memory(_OUTCOMES)
 
 
 _SHARED: WeakValueDictionary[Hashable, Repertoire] = WeakValueDictionary()

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any
+from typing import Any, cast
 
 import gymnasium
 import numpy as np
@@ -21,9 +22,10 @@ from .primitive_humanoid import PrimitiveHumanoidEnv
 class PrimitiveHumanoidVectorEnv(SyncVectorEnv):
     """Environments that are stepped in threads; results are those of single ones, bit for bit.
 
-    While a robot is simulated, MuJoCo leaves Python to the other threads. What is known of the
-    library is shared. ``gymnasium.make_vec("mplearn/PrimitiveHumanoid-v0", num_envs=8)`` makes it;
-    it is a `gymnasium.vector.SyncVectorEnv` in all else, autoreset and seeds included.
+    While a robot is simulated, MuJoCo leaves Python to the other threads; where there is a thread
+    for every processor, each keeps to its own. What is known of the library is shared.
+    ``gymnasium.make_vec("mplearn/PrimitiveHumanoid-v0", num_envs=8)`` makes it; it is a
+    `gymnasium.vector.SyncVectorEnv` in all else, autoreset and seeds included.
 
     Args:
         num_envs: Number of environments.
@@ -49,22 +51,34 @@ class PrimitiveHumanoidVectorEnv(SyncVectorEnv):
         if max_episode_steps is not None:
             options["max_steps"] = max_episode_steps
         self.options = options
-        self.n_threads = n_threads or _processors()
+        self.n_threads = n_threads or len(_processors())
         self._pool: ThreadPoolExecutor | None = None
         super().__init__([_maker(options)] * num_envs, autoreset_mode=autoreset_mode)
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Step all environments at a time; see `gymnasium.vector.SyncVectorEnv.step`."""
         if self._pool is None:
-            self._pool = ThreadPoolExecutor(self.n_threads, "mplearn-env")
+            self._pool = self._threads()
         next_step = self.autoreset_mode == AutoresetMode.NEXT_STEP
         actions = np.asarray(actions)
         if actions.shape != (self.num_envs,):
             raise InvalidValueError(f"{self.num_envs} actions are needed, not {actions!r}")
-        for env, action, over in zip(self.envs, actions, self._autoreset_envs, strict=True):
-            if not (over and next_step):
-                env.begin(self._pool, action)  # type: ignore[attr-defined]
+        waiting = [
+            (cast(_Begun, env), action)
+            for env, action, over in zip(self.envs, actions, self._autoreset_envs, strict=True)
+            if not (over and next_step)
+        ]
+        # the longest first, so that no thread is left with a long one at the end
+        for env, action in sorted(waiting, key=lambda each: -each[0].expected_s(each[1])):
+            env.begin(self._pool, action)
         return super().step(actions)
+
+    def _threads(self) -> ThreadPoolExecutor:
+        """Return the threads; the system's scheduler lets two share a processor for a while."""
+        name, processors = "mplearn-env", _processors()
+        if self.n_threads == len(processors) <= self.num_envs:
+            return ThreadPoolExecutor(self.n_threads, name, _keep_to_next, (iter(processors),))
+        return ThreadPoolExecutor(self.n_threads, name)
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return which actions are legal, shape (num_envs, capacity)."""
@@ -82,6 +96,13 @@ class _Begun(gymnasium.Wrapper[Any, Any, Any, Any]):
     """An environment whose next step may have begun already, in another thread."""
 
     _result: Future[Any] | None = None
+
+    def expected_s(self, action: np.int64) -> float:
+        """Return how long what an action stands for takes the robot, legal or not [s]."""
+        env = cast(PrimitiveHumanoidEnv, self.unwrapped)
+        known = self.action_space.contains(action)
+        id = env.repertoire.primitive(int(action)) if known else None
+        return env.hold_s if id is None else env.repertoire.duration_s(id)
 
     def begin(self, pool: ThreadPoolExecutor, action: np.int64) -> None:
         """Begin the step that `step` will be asked for."""
@@ -103,7 +124,15 @@ def _maker(options: dict[str, Any]) -> Callable[[], gymnasium.Env[Any, Any]]:
     return make
 
 
-def _processors() -> int:
+def _processors() -> list[int]:
+    """Return the processors that may be used."""
     if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+        return sorted(os.sched_getaffinity(0))
+    return list(range(os.cpu_count() or 1))
+
+
+def _keep_to_next(processors: Iterator[int]) -> None:
+    """Keep this thread to the next processor, where the system allows it."""
+    if hasattr(os, "sched_setaffinity"):
+        with contextlib.suppress(OSError):
+            os.sched_setaffinity(0, {next(processors)})

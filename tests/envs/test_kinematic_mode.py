@@ -78,14 +78,16 @@ def test_what_is_remembered_is_what_was_found_out():
 
 
 def test_memory_is_bounded(monkeypatch):
-    monkeypatch.setattr("mplearn_envs.repertoire._MEMORY", 3)
     env = make("kinematic")
-    env.unwrapped.repertoire.memory.clear()
+    memory = env.unwrapped.repertoire.memory
+    memory.clear()
+    monkeypatch.setattr(memory, "capacity", 3)
     _, info = env.reset(seed=0)
     for _ in range(20):
         action = env.action_space.sample(info["action_mask"])
         *_, info = env.step(action)
-        assert len(env.unwrapped.repertoire.memory) <= 3
+        assert len(memory) <= 3
+    assert len(memory) == 3
 
 
 def test_environments_of_one_library_share_what_they_know():

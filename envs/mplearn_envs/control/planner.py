@@ -8,13 +8,13 @@ says what the ankles correct while it is performed.
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Hashable
 
 import numpy as np
 
 from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray
+from mplearn_envs.memory import Memory
 from mplearn_envs.robot import Robot
 
 from .draft import Draft, Drafter, Pace
@@ -53,7 +53,7 @@ class Planner:
         )
         self._stiffness = robot.per_joint("stiffness")
         self._tracked = np.concatenate((np.arange(N_BASE), N_BASE + robot.upper_joints))
-        self._cache: OrderedDict[Hashable, Plan] = OrderedDict()
+        self._cache = Memory(self.config.cache_size)
 
     def motion(self, frames: FloatArray, rate_hz: float) -> Motion:
         """Return the motion of frames in the robot's channels, what its feet do included.
@@ -108,12 +108,10 @@ class Planner:
         if key is None:
             return self._plan(start, motion, speed)
         full_key = (key, speed, *(part.tobytes() for part in start))
-        plan = self._cache.get(full_key)
+        plan: Plan | None = self._cache.recall(full_key)
         if plan is None:
-            plan = self._cache[full_key] = self._plan(start, motion, speed)
-            if len(self._cache) > self.config.cache_size:
-                self._cache.popitem(last=False)
-        self._cache.move_to_end(full_key)
+            plan = self._plan(start, motion, speed)
+            self._cache.remember(full_key, plan)
         return plan
 
     def hold(self, start: Reference, duration_s: float) -> Plan:
