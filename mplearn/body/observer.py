@@ -225,6 +225,14 @@ class MotionObserver:
             self._last_pitch = float(row[2])
         return features
 
+    def unite(self, other: MotionObserver) -> dict[int, int]:
+        """Take over the people whom another has seen; return their numbers here."""
+        numbers = self.identity.bodies.unite(other.identity.bodies)
+        for person, body in other._known.items():
+            if person in numbers:
+                self._known.setdefault(numbers[person], body)
+        return numbers
+
     def state(self) -> dict[str, Any]:
         """Return what `load_state` needs to resume bit for bit."""
         return {

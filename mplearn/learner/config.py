@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from ..errors import InvalidValueError
 from ..people import PeopleConfig
-from ..tree import TreeConfig
+from ..tree import FormConfig, TreeConfig
 
 
 @dataclass(frozen=True)
@@ -51,3 +52,9 @@ class LearnerConfig:
             raise InvalidValueError(f"longest_pause_s must be positive, not {self.longest_pause_s}")
         if not 0 < self.false_alarms < 1:
             raise InvalidValueError(f"false_alarms must lie in (0, 1), not {self.false_alarms}")
+
+    @classmethod
+    def from_dict(cls, settings: Mapping[str, Any]) -> LearnerConfig:
+        """Return the configuration that `dataclasses.asdict` turned into plain values."""
+        tree = TreeConfig(**settings["tree"] | {"form": FormConfig(**settings["tree"]["form"])})
+        return cls(**dict(settings) | {"tree": tree, "people": PeopleConfig(**settings["people"])})

@@ -16,10 +16,10 @@ from ..body import BodyView, MotionObserver, view_of
 from ..errors import BodyError
 from ..graph import TransitionGraph
 from ..library import MotionNovelty, PrimitiveLibrary
-from ..people import PeopleConfig, PeopleTree
+from ..people import PeopleTree
 from ..recording import FloatArray, Recording, Segment, are_markers
 from ..segmentation import make_segmenter
-from ..tree import Change, FormConfig, Placement, TreeConfig
+from ..tree import Change, MirrorMap, Placement
 from .buffer import FrameBuffer
 from .chain import Chain
 from .checks import StreamChecks
@@ -69,7 +69,10 @@ class MotionLearner:
         width = len(self._view.channels)
         self._segmenter = make_segmenter(config.segmenter, width, config.rate_hz)
         self._buffer = FrameBuffer(width)
-        self.tree = PeopleTree(config.tree, width, config.rate_hz, people=config.people)
+        mirror = MirrorMap.of(self._view.channels) if self._body else None
+        self.tree = PeopleTree(
+            config.tree, width, config.rate_hz, people=config.people, mirror=mirror
+        )
         self.graph = TransitionGraph()
         self._chain = Chain(self.graph, config.rate_hz, config.longest_pause_s)
         self.n_frames = 0
@@ -192,23 +195,14 @@ class MotionLearner:
             "tree": self.tree.state(),
             "graph": self.graph.state(),
             "chain": self._chain.state(),
-            "n_frames": self.n_frames,
-            "stream_start": self._stream_start,
             "clock_s": self._clock_s,
-            "person": self._person,
-            "n_people": self._n_people,
-            "arrivals": self._arrivals,
+            **{name.lstrip("_"): getattr(self, name) for name in _COUNTS},
         }
 
     @classmethod
     def from_state(cls, state: dict[str, Any]) -> MotionLearner:
         """Return the learner that `state` described."""
-        settings = dict(state["config"])
-        tree = dict(settings.pop("tree"))
-        form = FormConfig(**tree.pop("form"))
-        people = PeopleConfig(**settings.pop("people"))
-        rules = TreeConfig(**tree, form=form)
-        learner = cls(LearnerConfig(**settings, tree=rules, people=people))
+        learner = cls(LearnerConfig.from_dict(state["config"]))
         if learner._observer is not None:
             learner._observer.load_state(state["observer"])
         learner._segmenter.load_state(state["segmenter"])
@@ -216,12 +210,9 @@ class MotionLearner:
         learner.tree.load_state(state["tree"])
         learner.graph.load_state(state["graph"])
         learner._chain.load_state(state["chain"])
-        learner.n_frames = int(state["n_frames"])
-        learner._stream_start = int(state["stream_start"])
         learner._clock_s = state["clock_s"]
-        learner._person = int(state["person"])
-        learner._n_people = int(state["n_people"])
-        learner._arrivals = int(state["arrivals"])
+        for name in _COUNTS:
+            setattr(learner, name, int(state[name.lstrip("_")]))
         return learner
 
     # ---- inside
@@ -311,3 +302,6 @@ class MotionLearner:
         novelty = MotionNovelty(matrices, rules.n_nearest)
         found = novelty.score([(placement.nearest, placement.distance**rules.power)])
         return [Anomaly(segment, "motion", *found)] if found.p_value <= allowed else []
+
+
+_COUNTS = ("n_frames", "_stream_start", "_person", "_n_people", "_arrivals")

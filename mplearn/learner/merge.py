@@ -7,9 +7,9 @@ from functools import reduce
 from typing import Any
 
 from ..errors import InvalidValueError
-from ..people import PeopleTree
-from ..tree import PrimitiveTree
-from ..tree.union import union
+from ..graph import TransitionGraph
+from ..people.union import unite
+from ..tree import ROOT
 from .chain import Chain
 from .learner import MotionLearner
 
@@ -18,14 +18,15 @@ def merge(learners: Sequence[MotionLearner]) -> MotionLearner:
     """Return a learner that knows what all of some know, as if their streams followed each other.
 
     The learners stay as they are; a stream that one is in the middle of is ended for the merged
-    one. Primitives that several have learned become one (`mplearn.tree.union`); the counts of
-    transitions are added, so that they do not depend on the order of the learners but for the
-    names of primitives; what none had recognised alone is counted where it is known now. The first
-    learner's primitives keep their ids.
+    one. Where markers are observed, people are matched by their bodies: who is known to both is one
+    person, all others are kept apart; without markers all is one person's. Primitives that several
+    have learned become one (`mplearn.people.union`); the counts of transitions are added, so that
+    they do not depend on the order of the learners but for the names of primitives; what none had
+    recognised alone is counted where it is known now. The first learner's primitives keep their
+    ids, as far as they stay what they were.
 
     Raises:
-        InvalidValueError: There are no learners, they have other configurations, or one of them has
-            seen several people: whether those are the same is not known.
+        InvalidValueError: There are no learners, or they have other configurations.
     """
     if not learners:
         raise InvalidValueError("at least one learner is needed to merge")
@@ -46,50 +47,50 @@ def _ended(learner: MotionLearner) -> MotionLearner:
 
 
 def _merged(first: MotionLearner, second: MotionLearner) -> MotionLearner:
-    second = _ended(second)
-    joined = union(_only_tree(first.tree), _only_tree(second.tree))
-    graph = first.graph.copy()
-    graph.absorb(second.graph, {id: joined.new_id[id] for id in second.graph.ids})
-    a, b = first.state(), second.state()
-    own = joined.tree.state()
-    later = _renamed(b["chain"]["links"], joined.new_number, joined.new_id, first.n_frames)
-    learner = MotionLearner.from_state(
-        a
-        | {
-            "tree": a["tree"]
-            | {
-                "n_seen": own["n_seen"],
-                "next_id": own["next_id"],
-                "trees": [[person, own] for person in first.tree.people],
-            },
-            "graph": graph.state(),
-            "chain": a["chain"] | {"links": [*a["chain"]["links"], *later], "broken": True},
-            "n_frames": first.n_frames + second.n_frames,
-            "stream_start": first.n_frames + second.n_frames,
-        }
-    )
-    for id in joined.change.born:
-        learner.graph.add_node(id)
-    _count_late(learner._chain, dict(joined.change.moved))
+    learner, second = _ended(first), _ended(second)
+    people = {person: person for person in second.tree.people}
+    if learner._observer is not None and second._observer is not None:
+        people |= learner._observer.unite(second._observer)
+        learner._n_people = learner._observer.identity.n_people
+    joined = unite(first.tree, second.tree, people)
+    graph = TransitionGraph()
+    graph.absorb(first.graph, {id: joined.first[id] for id in first.graph.ids})
+    graph.absorb(second.graph, {id: joined.second[id] for id in second.graph.ids})
+    for id in joined.tree.leaves:
+        graph.add_node(id)
+    links = [
+        *_renamed(first.state()["chain"]["links"], 0, joined.first, 0),
+        *_renamed(
+            second.state()["chain"]["links"], joined.new_number, joined.second, first.n_frames
+        ),
+    ]
+    learner.tree = joined.tree
+    learner.graph = graph
+    learner._chain = Chain(graph, learner.config.rate_hz, learner.config.longest_pause_s)
+    learner._chain.load_state({"links": links, "paused_frames": 0, "broken": True})
+    learner.n_frames = learner._stream_start = first.n_frames + second.n_frames
+    learner._person = people.get(second._person, first._person)
+    _relabel(learner._chain, joined.moved)
+    _count_late(learner._chain, joined.placed)
     return learner
 
 
-def _count_late(chain: Chain, moved: Mapping[int, int]) -> None:
+def _relabel(chain: Chain, moved: Mapping[int, int]) -> None:
+    """Let segments be what they turned out to be; their transitions were counted."""
+    for link in chain._links:
+        primitive = moved.get(link.number, link.primitive)
+        link.primitive = None if primitive == ROOT else primitive
+
+
+def _count_late(chain: Chain, placed: Mapping[int, int]) -> None:
     """Count the transitions of segments that are known only now."""
-    late = {i for i, link in enumerate(chain._links) if link.number in moved}
+    late = {i for i, link in enumerate(chain._links) if link.number in placed}
+    late = {i for i in late if chain._links[i].primitive is None}
     for i in late:
-        chain._links[i].primitive = moved[chain._links[i].number]
+        chain._links[i].primitive = placed[chain._links[i].number]
     for i in range(1, len(chain._links)):
         if late & {i - 1, i}:
             chain._count(i)
-
-
-def _only_tree(tree: PeopleTree) -> PrimitiveTree:
-    if len(tree.people) != 1:
-        raise InvalidValueError(
-            f"only learners that have seen one person can be merged, not {len(tree.people)}"
-        )
-    return tree.of(tree.people[0])
 
 
 def _renamed(

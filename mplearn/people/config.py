@@ -24,22 +24,25 @@ class PeopleConfig:
             (`links.tension`), taken of the average distance over all pairs of leaves.
         link_own: Two leaves of one person are one primitive only up to this distance.
         join: A segment that is in none of its person's leaves joins another person's primitive up
-            to this tension.
+            to this tension, unless its person has a leaf in it.
         reach: Distance up to which the next candidate counts in a tension.
+        sided: A motion is another's mirror image, not the same, if its distance to the mirror image
+            is below its distance to the motion itself times this.
         offset_prior: Primitives that a person must share before half of his or her usual deviation
             in posture is allowed for.
     """
 
     posture: float = 0.5
     repertoire: int = 30
-    link: float = 1.2
+    link: float = 0.9
     link_own: float = 0.3
-    join: float = 0.7
+    join: float = 0.85
     reach: float = 1.5
+    sided: float = 0.75
     offset_prior: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("repertoire", "link", "link_own", "join", "reach", "offset_prior"):
+        for name in ("repertoire", "link", "link_own", "join", "reach", "sided", "offset_prior"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InvalidValueError(f"{name} must be positive, not {getattr(self, name)}")
         if not 0 <= self.posture <= 1:

@@ -2,53 +2,80 @@
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
 from ..recording import BoolArray, FloatArray, IntArray
 from .config import PeopleConfig
-from .shapes import Shape, distances
+from .offsets import offsets_of
+from .shape_table import ShapeTable
 
 _ROUNDS = 3  # links and people's offsets are found in turn
 
 
-def solve(
-    shapes: Shape, people: IntArray, n_people: int, config: PeopleConfig
-) -> tuple[IntArray, FloatArray, float]:
+class Known(NamedTuple):
+    """What is known of n leaves, in any order.
+
+    Attributes:
+        slots: Where their shapes are in the table, shape (n,).
+        people: Whose leaf each is, 0, 1, ..., shape (n,).
+        firm: Whether it is a leaf, or only what waits to become one, shape (n,).
+        together: Pairs that a person said are one motion, shape (n, n).
+        apart: Pairs that a person said are different ones, shape (n, n).
+    """
+
+    slots: IntArray
+    people: IntArray
+    firm: BoolArray
+    together: BoolArray
+    apart: BoolArray
+
+
+class Solution(NamedTuple):
+    """Which leaves are one primitive each.
+
+    Attributes:
+        groups: The group of each leaf, named by its first one, shape (n,).
+        offsets: Each person's usual deviation in posture, shape (n_people, D).
+        unit: The unit of distance, inf where no person has two leaves.
+    """
+
+    groups: IntArray
+    offsets: FloatArray
+    unit: float
+
+
+def solve(table: ShapeTable, known: Known, n_people: int, config: PeopleConfig) -> Solution:
     """Find the groups of leaves that are one primitive each.
 
     Args:
-        shapes: Of all n leaves, stacked.
-        people: Whose leaf each is, 0, 1, ..., shape (n,).
+        table: The shapes.
+        known: The leaves.
         n_people: How many people there are.
         config: The rules.
-
-    Returns:
-        The group of each leaf, shape (n,); each person's usual deviation in posture,
-        shape (n_people, D); the unit of distance, inf where no person has two leaves.
     """
-    offsets = np.zeros((n_people, shapes.posture.shape[1]))
-    groups = np.arange(len(people))
-    unit = float("inf")
+    postures = table.postures(known.slots)
+    offsets = np.zeros((n_people, postures.shape[1]))
+    groups = np.arange(len(known.people))
+    unit = math.inf
     for _ in range(_ROUNDS):
-        level = corrected(shapes, people, offsets)
-        matrix = distances(level, level, config.posture)
-        unit = unit_of(matrix, people, config.repertoire)
+        levels = postures - offsets[known.people]
+        direct, image = table.distances(levels, known.slots, config.posture)
+        unit = unit_of(direct[np.ix_(known.firm, known.firm)], known.people[known.firm], config)
         if not np.isfinite(unit):
+            groups = _agglomerate(direct, known.together, ~known.together, 0.0, 1.0)
             break
-        before, groups = groups, agglomerate(matrix / unit, people, config)
+        before, groups = groups, agglomerate(direct / unit, image / unit, known, config)
         if np.array_equal(before, groups):
             break
-        offsets = offsets_of(shapes.posture, people, n_people, groups, config.offset_prior)
-    return groups, offsets, unit
+        offsets = offsets_of(postures, known.people, n_people, groups, config.offset_prior)
+    return Solution(groups, offsets, unit)
 
 
-def corrected(shapes: Shape, people: IntArray, offsets: FloatArray) -> Shape:
-    """Return shapes less what their people's postures usually deviate by."""
-    return Shape(shapes.posture - offsets[people], shapes.movement)
-
-
-def unit_of(matrix: FloatArray, people: IntArray, repertoire: int) -> float:
+def unit_of(matrix: FloatArray, people: IntArray, config: PeopleConfig) -> float:
     """Return how far a person's primitives lie apart, or will when as many are known as are usual.
 
     It is the median distance from a leaf to the nearest other leaf of the same person. While few
@@ -57,18 +84,18 @@ def unit_of(matrix: FloatArray, people: IntArray, repertoire: int) -> float:
     Args:
         matrix: Distances, shape (n, n).
         people: Whose leaf each is, shape (n,).
-        repertoire: Leaves of a person from which on the distance is taken as it is.
+        config: The rules.
     """
     own = (people[:, None] == people) & ~np.eye(len(people), dtype=np.bool_)
     nearest = np.where(own, matrix, np.inf).min(axis=1, initial=np.inf)
     known = np.isfinite(nearest)
     if not known.any():
-        return float("inf")
-    share = min(1.0, (1.0 + float(own.sum(axis=1)[known].mean())) / repertoire)
+        return math.inf
+    share = min(1.0, (1.0 + float(own.sum(axis=1)[known].mean())) / config.repertoire)
     return float(np.median(nearest[known])) * float(np.cbrt(share))
 
 
-def tension(nearest: FloatArray, second: FloatArray, reach: float) -> FloatArray:
+def tension(nearest: float, second: float, reach: float) -> float:
     """Return how doubtful it is that a motion is its nearest neighbour.
 
     Large motions differ more from person to person than small ones do, so nearness alone decides
@@ -79,94 +106,88 @@ def tension(nearest: FloatArray, second: FloatArray, reach: float) -> FloatArray
         second: Distance to the next.
         reach: Distance up to which the next one counts: while few are known, it is far off.
     """
-    return np.asarray(nearest**2 / np.clip(second, 1e-12, reach))
+    return nearest**2 / min(max(second, 1e-12), reach)
 
 
-def agglomerate(matrix: FloatArray, people: IntArray, config: PeopleConfig) -> IntArray:
+def agglomerate(
+    direct: FloatArray, image: FloatArray, known: Known, config: PeopleConfig
+) -> IntArray:
     """Join leaves by average link, the least doubtful first; of one person only what is very near.
 
+    What is clearly nearer to the mirror image is the same motion on the other side.
+
     Args:
-        matrix: Distances in units, shape (n, n).
-        people: Whose leaf each is, shape (n,).
+        direct: Distances in units, shape (n, n).
+        image: Distances from the mirror images, shape (n, n).
+        known: The leaves.
         config: The rules.
 
     Returns:
         The group of each leaf, named by its first one, shape (n,).
     """
-    own = (people[:, None] == people) & (matrix > config.link_own)
-    return np.asarray(_agglomerate(matrix, own, config.link, config.reach))
+    own = (known.people[:, None] == known.people) & (direct > config.link_own)
+    barred = own | (image < config.sided * direct) | known.apart
+    return np.asarray(_agglomerate(direct, known.together, barred, config.link, config.reach))
 
 
 @njit(cache=True)
-def _agglomerate(matrix: FloatArray, barred: BoolArray, link: float, reach: float) -> IntArray:
+def _agglomerate(
+    matrix: FloatArray, together: BoolArray, barred: BoolArray, link: float, reach: float
+) -> IntArray:
     n = len(matrix)
     groups = np.arange(n)
-    total, sizes, alive = matrix.copy(), np.ones(n), np.ones(n, dtype=np.bool_)
+    total, sizes, mean = matrix.copy(), np.ones(n), matrix.copy()
     barred = barred.copy()
-    mean = matrix.copy()
-    nearest, second = np.empty(n), np.empty(n)
+    alive = np.arange(n)
+    nearest, second = np.full(n, np.inf), np.full(n, np.inf)
+    stale = np.ones(n, dtype=np.bool_)
+    pinned = np.argwhere(together)
+    at = 0
     while True:
-        for i in range(n):
-            nearest[i] = second[i] = np.inf
-            for j in range(n):
-                if j != i and alive[i] and alive[j]:
-                    if mean[i, j] < nearest[i]:
-                        nearest[i], second[i] = mean[i, j], nearest[i]
-                    elif mean[i, j] < second[i]:
-                        second[i] = mean[i, j]
-        best, first, other = np.inf, -1, -1
-        for i in range(n):
-            for j in range(i + 1, n):
-                if alive[i] and alive[j] and not barred[i, j]:
+        first, other = -1, -1
+        while at < len(pinned) and first < 0:
+            i, j = groups[pinned[at, 0]], groups[pinned[at, 1]]
+            at += 1
+            if i != j:
+                first, other = min(i, j), max(i, j)
+        if first < 0:
+            for i in alive:
+                if stale[i]:
+                    stale[i] = False
+                    nearest[i] = second[i] = np.inf
+                    for j in alive:
+                        if j != i:
+                            if mean[i, j] < nearest[i]:
+                                nearest[i], second[i] = mean[i, j], nearest[i]
+                            elif mean[i, j] < second[i]:
+                                second[i] = mean[i, j]
+            best, far = link, np.sqrt(link * reach)
+            for a in range(len(alive)):
+                i = alive[a]
+                for b in range(a + 1, len(alive)):
+                    j = alive[b]
                     d = mean[i, j]
+                    if d > far or barred[i, j]:
+                        continue
                     next_i = second[i] if d <= nearest[i] else nearest[i]
                     next_j = second[j] if d <= nearest[j] else nearest[j]
                     doubt = d * d / max(min(next_i, next_j, reach), 1e-12)
-                    if doubt < best:
+                    if doubt < best or (doubt == best and first < 0):
                         best, first, other = doubt, i, j
-        if first < 0 or not best <= link:
-            return groups
+            if first < 0:
+                return groups
         sizes[first] += sizes[other]
-        alive[other] = False
+        alive = alive[alive != other]
         for k in range(n):
-            total[first, k] += total[other, k]
-            barred[first, k] |= barred[other, k]
             if groups[k] == other:
                 groups[k] = first
-        for k in range(n):
+        for k in alive:
+            old = min(mean[k, first], mean[k, other])
+            total[first, k] += total[other, k]
             total[k, first] = total[first, k]
+            barred[first, k] |= barred[other, k]
             barred[k, first] = barred[first, k]
-            mean[first, k] = mean[k, first] = total[first, k] / (sizes[first] * sizes[k])
-
-
-def offsets_of(
-    postures: FloatArray, people: IntArray, n_people: int, groups: IntArray, prior: float
-) -> FloatArray:
-    """Return by how much each person's postures deviate from the others' in the same primitives.
-
-    Args:
-        postures: Mean posture of each leaf, shape (n, D).
-        people: Whose leaf each is, shape (n,).
-        n_people: How many people there are.
-        groups: The primitive of each leaf, shape (n,).
-        prior: Shared primitives for which half of it is believed.
-
-    Returns:
-        Shape (n_people, D); zero for a person who shares nothing.
-    """
-    offsets = np.zeros((n_people, postures.shape[1]))
-    shared = [
-        np.flatnonzero(groups == group)
-        for group in np.unique(groups)
-        if len(np.unique(people[groups == group])) > 1
-    ]
-    for _ in range(_ROUNDS):
-        sums, counts = np.zeros_like(offsets), np.zeros(n_people)
-        for leaves in shared:
-            level = postures[leaves] - offsets[people[leaves]]
-            mean = level.mean(axis=0)
-            for leaf in leaves:
-                sums[people[leaf]] += postures[leaf] - mean
-                counts[people[leaf]] += 1
-        offsets = sums / (counts + prior)[:, None]
-    return offsets
+            if k != first:
+                mean[first, k] = mean[k, first] = total[first, k] / (sizes[first] * sizes[k])
+                stale[k] |= old <= second[k] or mean[k, first] <= second[k]
+        stale[first] = True

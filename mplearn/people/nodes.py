@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
-from ..tree import ROOT, Node, PrimitiveTree
+from ..tree import ROOT, Change, Node, PrimitiveTree, Reparent
 from .leaf import Leaf
 
 
@@ -59,3 +59,26 @@ def nodes_of(
         if node.parent is not None:
             nodes[node.parent].children.append(node.id)
     return tuple(nodes[id] for id in sorted(nodes))
+
+
+def tidied(above: dict[int, Node], parents: dict[int, int], primitives: Collection[int]) -> Change:
+    """Take nodes out that are above one node only, or none, and hang that one higher.
+
+    Args:
+        above: Nodes above primitives; changed in place, as is what follows.
+        parents: The node above each of those, and of each primitive.
+        primitives: Ids of the primitives.
+    """
+    for id in [id for id in parents if id not in above and id not in primitives]:
+        del parents[id]
+    change = Change()
+    while True:
+        children = {id: [c for c, p in parents.items() if p == id] for id in above}
+        lone = next((id for id, below in children.items() if len(below) < 2), None)
+        if lone is None:
+            return change
+        for child in children[lone]:
+            parents[child] = parents[lone]
+            change = change.then(Change(reparented=(Reparent(child, parents[lone]),)))
+        del above[lone], parents[lone]
+        change = change.then(Change(removed=(lone,)))

@@ -8,7 +8,17 @@ from typing import Any
 from ..errors import InvalidValueError, UnknownPrimitiveError
 from ..hmm import LeftRightHMM
 from ..recording import FloatArray
-from ..tree import ROOT, Change, Node, Placement, PrimitiveTree, Recogniser, TreeConfig
+from ..tree import (
+    ROOT,
+    Change,
+    MirrorMap,
+    Node,
+    Placement,
+    PrimitiveTree,
+    Recogniser,
+    TreeConfig,
+)
+from . import editing
 from .common import common_model, common_recogniser
 from .config import PeopleConfig
 from .sharing import Sharing
@@ -28,6 +38,7 @@ class PeopleTree:
         rate_hz: Frames per second [1/s].
         groups: See `PrimitiveTree`.
         people: What makes motions of different people one primitive.
+        mirror: Which channel is the mirror image of which, where left and right are known.
 
     Attributes:
         n_seen: Segments seen, of all people.
@@ -40,12 +51,14 @@ class PeopleTree:
         rate_hz: float,
         groups: Sequence[int] | None = None,
         people: PeopleConfig | None = None,
+        mirror: MirrorMap | None = None,
     ) -> None:
         self.config = config
         self.n_channels = n_channels
         self.rate_hz = rate_hz
         self.groups = groups
         self.people_config = people or PeopleConfig()
+        self.mirror = mirror
         self.n_seen = 0
         self._trees: dict[int, PrimitiveTree] = {0: self._new_tree()}
         self._next_id = ROOT + 1
@@ -53,6 +66,9 @@ class PeopleTree:
 
     def _new_tree(self) -> PrimitiveTree:
         return PrimitiveTree(self.config, self.n_channels, self.rate_hz, self.groups)
+
+    def _new_sharing(self) -> Sharing:
+        return Sharing(self.config, self.people_config, self._trees, self._next_id, self.mirror)
 
     # ---- looking
 
@@ -168,7 +184,7 @@ class PeopleTree:
             self._trees = {person: next(iter(self._trees.values()))}
         elif person not in self._trees:
             if self._sharing is None:
-                self._sharing = Sharing(self.config, self.people_config, self._trees, self._next_id)
+                self._sharing = self._new_sharing()
             self._trees[person] = self._new_tree()
         placement = self._trees[person].insert(frames)
         if placement.refused:
@@ -182,70 +198,77 @@ class PeopleTree:
     # ---- learning by hand
 
     def split(self, id: int, groups: Sequence[Sequence[int]] | None = None) -> Change:
-        """Split a primitive of one person, as `PrimitiveTree.split` does.
+        """Split a primitive, which the rules never merge again.
+
+        Each person's leaf goes to one side, or is split itself where its exemplars do.
+
+        Args:
+            id: The primitive.
+            groups: Positions in `exemplars` that belong together, every one in one group, at least
+                2 of each leaf; the two main branches of complete-link clustering where not given,
+                of the leaves if there are several.
 
         Raises:
             UnknownPrimitiveError: There is no such primitive.
-            InvalidValueError: The groups are wrong, or several people share the primitive.
+            InvalidValueError: The groups are wrong, or there are too few exemplars.
         """
-        person, leaf = self._own(id)
-        return self._edited(person, self._trees[person].split(leaf, groups))
+        if self._sharing is None:
+            return self._edited(self._only.split(id, groups))
+        return self._edited(editing.split(self._sharing, id, groups))
 
     def merge(self, first: int, second: int) -> Change:
-        """Merge two primitives of one person into the older one, as `PrimitiveTree.merge` does.
+        """Merge two primitives into the older one, which the rules never split again.
+
+        A person who has a leaf in both keeps one, as by `PrimitiveTree.merge`.
 
         Raises:
             UnknownPrimitiveError: There is no such primitive.
-            InvalidValueError: They are the same, or several people share them.
+            InvalidValueError: They are the same.
         """
-        person, leaf = self._own(first)
-        other, second_leaf = self._own(second)
-        if person != other:
-            raise InvalidValueError(
-                f"primitive {first} is person {person}'s and {second} is person {other}'s: what "
-                "different people do is joined by its likeness only"
-            )
-        return self._edited(person, self._trees[person].merge(leaf, second_leaf))
+        if self._sharing is None:
+            return self._edited(self._only.merge(first, second))
+        return self._edited(editing.merge(self._sharing, first, second))
 
     def reparent(self, id: int, parent: int) -> Change:
-        """Hang a node below the root or another inner node.
+        """Hang a node below the root or another inner node; a person's leaf below a primitive.
+
+        A leaf below the root or an inner node is a primitive of its own. Where it was taken from
+        and where it was put, the rules leave it alone.
 
         Raises:
             UnknownPrimitiveError: There is no such node.
-            InvalidValueError: The parent is no inner node, or there are several people, whose
-                primitives hang from the root.
+            InvalidValueError: The parent lies below the node, or cannot be above it.
         """
-        if self._sharing is not None:
-            raise InvalidValueError("nodes are hung by hand only while there is one person")
-        return self._only.reparent(id, parent)
+        if self._sharing is None:
+            return self._edited(self._only.reparent(id, parent))
+        return self._edited(editing.move(self._sharing, id, parent))
 
     def remove(self, id: int, *, forget: bool = False) -> Change:
-        """Take a primitive of one person out, as `PrimitiveTree.remove` does.
+        """Take a primitive out, or a person's leaf of it; see `PrimitiveTree.remove`.
 
         Raises:
             UnknownPrimitiveError: There is no such primitive.
-            InvalidValueError: Several people share it.
         """
-        person, leaf = self._own(id)
-        return self._edited(person, self._trees[person].remove(leaf, forget=forget))
-
-    def _own(self, id: int) -> tuple[int, int]:
-        """Return the person whose a primitive is, and its leaf."""
         if self._sharing is None:
-            return next(iter(self._trees)), id
-        leaves = self._leaves_of(id)
-        if len(leaves) > 1:
-            raise InvalidValueError(
-                f"primitive {id} is shared by {len(leaves)} leaves; one person's alone can be "
-                "changed by hand"
-            )
-        return leaves[0]
+            return self._edited(self._only.remove(id, forget=forget))
+        return self._edited(editing.remove(self._sharing, id, forget=forget))
 
-    def _edited(self, person: int, change: Change) -> Change:
-        if self._sharing is not None:
-            return self._sharing.edited(person, change)
+    def _edited(self, change: Change) -> Change:
         self._next_id = max((self._next_id, *(id + 1 for id in change.born)))
         return change
+
+    # ---- being joined, see `union`
+
+    def sharing(self) -> Sharing:
+        """Return what people share; where there is one person, as if others were to come."""
+        if self._sharing is None:
+            self._sharing = self._new_sharing()
+        return self._sharing
+
+    def adopt(self, trees: dict[int, PrimitiveTree], n_seen: int) -> None:
+        """Go on with other trees, by person, that have seen so many segments."""
+        self._trees, self.n_seen = trees, n_seen
+        self._next_id = 1 + max(node.id for node in self.nodes)
 
     # ---- keeping
 
@@ -268,7 +291,7 @@ class PeopleTree:
             self._trees[int(person)].load_state(kept)
         self._sharing = None
         if state["sharing"] is not None:
-            self._sharing = Sharing(self.config, self.people_config, self._trees, self._next_id)
+            self._sharing = self._new_sharing()
             self._sharing.load_state(state["sharing"])
 
     # ---- inside
@@ -280,7 +303,7 @@ class PeopleTree:
     def _leaves_of(self, id: int) -> list[tuple[int, int]]:
         """Return the leaves of a primitive, or that one leaf, as person and id in its tree."""
         assert self._sharing is not None
-        found = self._sharing.leaves_of(id)
+        found = [leaf.key for leaf in self._sharing.leaves_of(id)]
         if not found:
             raise UnknownPrimitiveError(f"no primitive {id}; known are {list(self.leaves)}")
         return found

@@ -7,13 +7,13 @@ its joint angles, so a person's size and place have fallen away already.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ..recording import FloatArray
-from ..tree import FormConfig, form
+from ..tree import FormConfig, MirrorMap, form
 
 
 class Shape(NamedTuple):
@@ -44,12 +44,18 @@ def shape_of(exemplars: Iterable[FloatArray], config: FormConfig) -> Shape:
     return Shape(posture, (np.sqrt(weights)[:, None] * (mean - posture)).ravel())
 
 
+def mean_shape(shapes: Sequence[Shape]) -> Shape:
+    """Return the mean of some shapes."""
+    return Shape(*(np.mean(part, axis=0) for part in zip(*shapes, strict=True)))
+
+
+def mirrored(shape: Shape, mirror: MirrorMap) -> Shape:
+    """Return the mirror image of a shape."""
+    movement = mirror.apply(shape.movement.reshape(-1, len(mirror.sign)))
+    return Shape(mirror.apply(shape.posture), movement.ravel())
+
+
 def squares(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the squared distances between rows, shape (n, D) and (m, D) to (n, m)."""
     lengths = np.einsum("nd,nd->n", a, a)[:, None] + np.einsum("md,md->m", b, b)
     return np.asarray(np.maximum(lengths - 2 * a @ b.T, 0.0))
-
-
-def distances(a: Shape, b: Shape, posture: float) -> FloatArray:
-    """Return the distances between stacked shapes, (n, ...) and (m, ...) to (n, m)."""
-    return np.sqrt(posture * squares(a.posture, b.posture) + squares(a.movement, b.movement))

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..recording import FloatArray, IntArray
-from ..tree import ROOT, Change, Merge, Node, Placement, PrimitiveTree, Split, TreeConfig
+from ..tree import ROOT, Change, Merge, MirrorMap, Node, Placement, PrimitiveTree, Split, TreeConfig
 from .config import PeopleConfig
 from .identities import executions_held, identities, recognised_as, split_into
-from .leaf import Leaf, stacked
-from .links import corrected, solve, tension
-from .nodes import nodes_of
-from .shapes import Shape, distances, shape_of
+from .leaf import Leaf
+from .links import Known, solve, tension
+from .nodes import nodes_of, tidied
+from .offsets import offsets_of
+from .pins import Pins
+from .shape_table import ShapeTable
+from .shapes import Shape, shape_of
+from .waiting import Waiting, WaitingRoom
 
 
 class Sharing:
@@ -30,6 +34,14 @@ class Sharing:
         rules: What makes motions of different people one primitive.
         trees: Each person's tree; one for now, others may be added by the owner.
         next_id: First id that was never used.
+        mirror: Which channel is the mirror image of which; None where none is.
+
+    Attributes:
+        leaves: Leaves of all people.
+        pins: What a person said of them.
+        above: Nodes above primitives: what was split.
+        parents: The node above each of those, and of each primitive.
+        numbers: Person -> number of a segment in that person's tree -> number here.
     """
 
     def __init__(
@@ -38,33 +50,36 @@ class Sharing:
         rules: PeopleConfig,
         trees: dict[int, PrimitiveTree],
         next_id: int,
+        mirror: MirrorMap | None = None,
     ) -> None:
         self.config = config
         self.rules = rules
+        self.trees = trees
+        self.next_id = next_id
+        self.n_seen = 0
         self.leaves: list[Leaf] = []
-        self._trees = trees
-        self._next_id = next_id
-        self._n_seen = 0
-        self._numbers: dict[int, dict[int, int]] = {}  # person -> number in the tree -> here
-        self._above: dict[int, Node] = {}  # nodes above primitives: what was split
-        self._parents: dict[int, int] = {}
-        self._joined: dict[int, int] = {}  # segments that wait in their tree's root: primitive
+        self.pins = Pins()
+        self.above: dict[int, Node] = {}
+        self.parents: dict[int, int] = {}
+        self.numbers: dict[int, dict[int, int]] = {}
+        self.table = ShapeTable(mirror)
+        self.waiting = WaitingRoom(self.table)
         self._offsets: dict[int, FloatArray] = {}
         self._unit = float("inf")
         for person, tree in trees.items():
-            self._n_seen = tree.n_seen
-            self._numbers[person] = {n: n for node in tree.nodes for n in node.members}
+            self.n_seen = tree.n_seen
+            self.numbers[person] = {n: n for node in tree.nodes for n in node.members}
             for node in tree.nodes:
                 if node.id == ROOT:
                     continue
-                self._parents[node.id] = node.parent or ROOT
+                self.parents[node.id] = node.parent or ROOT
                 if node.is_leaf:
-                    seen = self._seen(tree, node.id)
-                    self.leaves.append(Leaf(person, node.id, node.id, node.id, node.id, seen))
+                    leaf = self.new_leaf(person, node.id)
+                    leaf.id = leaf.primitive = leaf.founded = node.id
                 else:
-                    self._above[node.id] = node
+                    self.above[node.id] = node
         if self.leaves:
-            _, _, self._unit = self._solved()
+            self.regroup()
 
     # ---- looking
 
@@ -73,41 +88,57 @@ class Sharing:
         """Ids of the primitives, in the order of their birth."""
         return tuple(sorted({leaf.primitive for leaf in self.leaves}))
 
-    def leaves_of(self, id: int) -> list[tuple[int, int]]:
-        """Return the leaves of a primitive, or that one leaf, as person and id in its tree."""
-        return [
-            (leaf.person, leaf.local) for leaf in self.leaves if id in (leaf.id, leaf.primitive)
-        ]
+    def leaves_of(self, id: int) -> list[Leaf]:
+        """Return the leaves of a primitive, or that one leaf."""
+        return [leaf for leaf in self.leaves if id in (leaf.id, leaf.primitive)]
+
+    def own(self) -> set[tuple[int, int]]:
+        """Return person and primitive of all leaves."""
+        return {(leaf.person, leaf.primitive) for leaf in self.leaves}
+
+    def distances(self, leaves: Sequence[Leaf]) -> FloatArray:
+        """Return the distances among some leaves, shape (n, n)."""
+        slots = self._slots(leaves)
+        return self.table.distances(self._levels(leaves), slots, self.rules.posture)[0]
+
+    def members(self, leaf: Leaf) -> list[int]:
+        """Return the numbers here of a leaf's kept exemplars."""
+        own = self.numbers[leaf.person]
+        return [own[n] for n in self.trees[leaf.person].node(leaf.local).members]
 
     @property
     def nodes(self) -> tuple[Node, ...]:
         """All nodes, by id: the root, what was split, primitives, and leaves below those."""
-        above, parents = self._above, self._parents
-        return nodes_of(self.leaves, self._trees, self._numbers, above, parents, self._n_seen)
+        return nodes_of(
+            self.leaves, self.trees, self.numbers, self.above, self.parents, self.n_seen
+        )
 
     # ---- learning
 
     def follow(self, person: int, placement: Placement, frames: FloatArray) -> Placement:
         """Take note of what a person's tree did with a segment; return what it means for all."""
-        tree = self._trees[person]
-        number = self._n_seen
-        self._n_seen += 1
-        numbers = self._numbers.setdefault(person, {})
-        numbers[placement.number] = number
-        shape = shape_of([frames], self.config.form)
-        before = {(leaf.person, leaf.local): leaf.primitive for leaf in self.leaves}
-        said, ratio = ROOT, float("inf")
+        number = self.n_seen
+        self.n_seen += 1
+        self.numbers.setdefault(person, {})[placement.number] = number
+        before = {leaf.key: leaf.primitive for leaf in self.leaves}
         nearest = before.get((person, placement.nearest or ROOT))
-        if not placement.recognised:
+        said, ratio = ROOT, float("inf")
+        if placement.recognised:
+            said = before.get((person, recognised_as(placement)), ROOT)
+        else:
+            shape = shape_of([frames], self.config.form)
             other, ratio = self._nearest(person, shape)
             nearest = other if nearest is None else nearest
             if other is not None and ratio <= 1:
-                self._joined[number] = said = nearest = other
-        if placement.recognised:
-            said = before.get((person, recognised_as(placement)), ROOT)
-        changed = self._take_up(person, tree, placement)
-        born, splits, merges, moved = self._solve(before, person, placement) if changed else _NONE
-        self._tidy(person, tree)
+                said = nearest = other
+                self.waiting.join(person, other, {number: shape})
+        joined = self.waiting.homes()
+        change = Change()
+        if self._take_up(person, placement):
+            change = self._solve(before, joined, person, placement)
+        elif number in joined:
+            self._measure_offsets()
+        self._tidy(person)
         home = self._home(person, placement.node_id, number)
         return Placement(
             number,
@@ -115,192 +146,248 @@ class Sharing:
             said != ROOT,
             placement.distance,
             min(placement.ratio, ratio),
-            born,
-            splits,
-            merges,
-            tuple(move for move in moved if move[0] != number),
+            **change._replace(moved=tuple(m for m in change.moved if m[0] != number))._asdict(),
             nearest=nearest,
-            like=None if placement.like is None else numbers.get(placement.like),
+            like=None if placement.like is None else self.numbers[person].get(placement.like),
         )
 
-    def edited(self, person: int, change: Change) -> Change:
-        """Take note of a change by hand in a person's tree; return what it means for all."""
-        before = {(leaf.person, leaf.local): leaf.primitive for leaf in self.leaves}
-        told = Placement(-1, ROOT, False, np.inf, np.inf, **change._asdict())
-        self._take_up(person, self._trees[person], told)
-        if not self.leaves:
-            return Change(removed=tuple(sorted(set(before.values()))))
-        born, splits, merges, moved = self._solve(before, person, told)
-        gone = set(before.values()) - {leaf.primitive for leaf in self.leaves}
-        gone -= {merge.absorbed for merge in merges} | {split.node for split in splits}
-        return Change(born, splits, merges, moved, removed=tuple(sorted(gone)))
-
     def _nearest(self, person: int, shape: Shape) -> tuple[int | None, float]:
-        """Return the nearest primitive, and how far out a segment lies: up to 1 it joins it."""
+        """Return the nearest primitive in which a segment's person has no leaf.
+
+        Returns:
+            Its id, and how far out the segment lies: up to 1 it joins it.
+        """
         if not np.isfinite(self._unit):
             return None, float("inf")
-        ids, matrix = self._to_primitives(person, shape)
-        at = int(matrix.argmin())
-        nearest = matrix[at] / self._unit
-        second = np.delete(matrix, at).min(initial=np.inf) / self._unit
-        ratio = float(tension(nearest, second, self.rules.reach)) / self.rules.join
-        return ids[at], ratio
-
-    def _to_primitives(self, person: int, shape: Shape) -> tuple[list[int], FloatArray]:
-        """Return the distance from a shape to each primitive, averaged over its leaves."""
-        own = Shape((shape.posture - self._offset(person))[None], shape.movement[None])
-        row = distances(own, self._corrected(), self.rules.posture)[0]
+        level = Shape(shape.posture - self._offset(person), shape.movement)
+        slots = self._slots(self.leaves)
+        rows = self.table.distances_to(level, self._levels(self.leaves), slots, self.rules.posture)
         ids, place = np.unique([leaf.primitive for leaf in self.leaves], return_inverse=True)
-        mean = np.bincount(place, row) / np.bincount(place)
-        return [int(id) for id in ids], mean
+        mean, image = (np.bincount(place, row) / np.bincount(place) / self._unit for row in rows)
+        own = [id for whose, id in self.own() if whose == person]
+        barred = np.isin(ids, own) | (image < self.rules.sided * mean)
+        if barred.all():
+            return None, float("inf")
+        at = int(np.where(barred, np.inf, mean).argmin())
+        second = float(np.delete(mean, at).min(initial=np.inf))
+        return int(ids[at]), tension(float(mean[at]), second, self.rules.reach) / self.rules.join
 
-    def _take_up(self, person: int, tree: PrimitiveTree, placement: Placement) -> bool:
+    def _take_up(self, person: int, placement: Placement) -> bool:
         """Bring a person's leaves up to date; say whether any came or went."""
-        known = {leaf.local for leaf in self.leaves if leaf.person == person}
+        tree = self.trees[person]
+        known = {leaf.local: leaf for leaf in self.leaves if leaf.person == person}
         now = set(tree.leaves)
-        touched = {placement.node_id, *(node for _, node in placement.moved)}
-        self.leaves = [leaf for leaf in self.leaves if leaf.person != person or leaf.local in now]
-        for leaf in self.leaves:
-            if leaf.person == person and leaf.local in touched:
-                leaf.shape = self._seen(tree, leaf.local)
-        for local in sorted(now - known):
-            self.leaves.append(Leaf(person, local, ROOT, ROOT, ROOT, self._seen(tree, local)))
-        return now != known
+        placed = {placement.number: placement.node_id, **dict(placement.moved)}
+        for local in sorted((set(placed.values()) & known.keys()) & now):
+            self.look_again(known[local])
+        for local in sorted(known.keys() - now):
+            self.drop_leaf(known[local])
+        for local in sorted(now - known.keys()):
+            self.new_leaf(person, local)
+        heirs = {(person, each.absorbed): [(person, each.kept)] for each in placement.merges}
+        heirs |= {(person, s.node): [(person, to) for to in s.into] for s in placement.splits}
+        self.pins.follow(heirs)
+        own = self.numbers[person]
+        self.waiting.leave(person, {own[n] for n, node in placed.items() if node != ROOT})
+        return now != known.keys()
 
     def _solve(
-        self, before: Mapping[tuple[int, int], int], person: int, placement: Placement
-    ) -> tuple[tuple[int, ...], tuple[Split, ...], tuple[Merge, ...], tuple[tuple[int, int], ...]]:
+        self,
+        before: Mapping[tuple[int, int], int],
+        joined: Mapping[int, int],
+        person: int,
+        placement: Placement,
+    ) -> Change:
         """Find again which leaves are one primitive, and say what changed by it."""
-        found, offsets, self._unit = self._solved()
-        groups: list[int] = found.tolist()
-        self._offsets = dict(zip(self._trees, offsets, strict=True))
+        groups, of_waiting = self.regroup()
         held = executions_held(
-            self.leaves,
-            groups,
-            before,
-            self._trees,
-            self._numbers,
-            self._joined,
-            person,
-            placement,
+            self.leaves, groups, before, self.trees, self.numbers, joined, person, placement
         )
         ids = identities(held)
         born, merges, splits = [], [], []
         for group in dict.fromkeys(groups):
             if group not in ids:
-                ids[group] = self._next_id
-                self._next_id += 1
+                ids[group] = self.new_id()
                 born.append(ids[group])
                 self.leaves[group].founded = ids[group]
-                self._parents[ids[group]] = ROOT
+                self.parents[ids[group]] = ROOT
         gone = set(before.values()) - set(ids.values())
         for id in sorted(gone):
             heirs = Counter({g: counts[id] for g, counts in held.items() if counts[id]})
             into = split_into(id, self.leaves, groups, ids, before, person, placement)
             if into:
                 splits.append(Split(id, into))
-                self._above[id] = Node(id, None, self._n_seen, history=[("split", self._n_seen)])
-                for child in into:
-                    if child in born:
-                        self._parents[child] = id
+                self.put_above(id, [child for child in into if child in born])
             elif heirs:
                 merges.append(Merge(ids[heirs.most_common(1)[0][0]], id))
         moved: list[tuple[int, int]] = []
         absorbed = {merge.absorbed: merge.kept for merge in merges}
         for leaf, group in zip(self.leaves, groups, strict=True):
-            old = before.get((leaf.person, leaf.local), ROOT)
+            old = before.get(leaf.key, ROOT)
             leaf.primitive = ids[group]
             if absorbed.get(old, old) != leaf.primitive:
-                members = self._trees[leaf.person].node(leaf.local).members
-                moved += [(self._numbers[leaf.person][n], leaf.primitive) for n in members]
-        self._joined = {
-            number: absorbed.get(id, id)
-            for number, id in self._joined.items()
-            if absorbed.get(id, id) not in gone
-        }
-        self._name_leaves()
-        return tuple(born), tuple(splits), tuple(merges), tuple(moved)
+                moved += [(n, leaf.primitive) for n in self.members(leaf)]
+        homes = [ids.get(group, ROOT) for group in of_waiting]
+        moved += self.waiting.move(homes, absorbed, self.own())
+        self.name_leaves()
+        change = Change(tuple(born), tuple(splits), tuple(merges), tuple(moved))
+        return change.then(tidied(self.above, self.parents, self.primitives))
 
-    def _name_leaves(self) -> None:
+    def regroup(self) -> tuple[list[int], list[int]]:
+        """Find again what is one primitive; return the groups of leaves, and of what waits."""
+        found = solve(self.table, self._known(), len(self.trees), self.rules)
+        self._unit = found.unit
+        self._offsets = dict(zip(self.trees, found.offsets, strict=True))
+        groups: list[int] = found.groups.tolist()
+        return groups[: len(self.leaves)], groups[len(self.leaves) :]
+
+    def _known(self) -> Known:
+        """Return all leaves, and what waits, for the search of what is one motion."""
+        places = {person: place for place, person in enumerate(self.trees)}
+        entries = [*self.leaves, *self.waiting]
+        n, n_leaves = len(entries), len(self.leaves)
+        together, apart = np.zeros((2, n, n), dtype=np.bool_)
+        for all_pairs, pairs in zip(
+            (together, apart), self.pins.among([leaf.key for leaf in self.leaves]), strict=True
+        ):
+            all_pairs[:n_leaves, :n_leaves] = pairs
+        people = np.array([places[each.person] for each in entries], dtype=np.int64)
+        return Known(self._slots(entries), people, np.arange(n) < n_leaves, together, apart)
+
+    def _measure_offsets(self) -> None:
+        """Learn from what joined how its person deviates from others."""
+        known = self._known()
+        primitives = [each.primitive for each in (*self.leaves, *self.waiting)]
+        offsets = offsets_of(
+            self.table.postures(known.slots),
+            known.people,
+            len(self.trees),
+            np.array(primitives, dtype=np.int64),
+            self.rules.offset_prior,
+        )
+        self._offsets = dict(zip(self.trees, offsets, strict=True))
+
+    # ---- leaves come and go
+
+    def new_id(self) -> int:
+        """Return an id that was never used."""
+        self.next_id += 1
+        return self.next_id - 1
+
+    def new_leaf(self, person: int, local: int) -> Leaf:
+        """Take a leaf of a person's tree, of no primitive yet."""
+        slot = self.table.add(self._seen(person, local))
+        self.leaves.append(Leaf(person, local, ROOT, ROOT, ROOT, slot))
+        return self.leaves[-1]
+
+    def look_again(self, leaf: Leaf) -> None:
+        """Take note of a leaf's new exemplars."""
+        self.table.put(leaf.slot, self._seen(*leaf.key))
+
+    def found(self, leaves: Sequence[Leaf], below: int = ROOT) -> int:
+        """Form a primitive of some leaves; return its id."""
+        id = self.new_id()
+        leaves[0].founded = id
+        self.parents[id] = below
+        for leaf in leaves:
+            leaf.primitive = id
+        return id
+
+    def drop_leaf(self, leaf: Leaf) -> None:
+        """Forget a leaf that is gone."""
+        self.leaves.remove(leaf)
+        self.table.drop(leaf.slot)
+
+    def put_above(self, id: int, children: Iterable[int]) -> None:
+        """Let what was a primitive be a node above others."""
+        self.above[id] = Node(id, None, self.n_seen, history=[("split", self.n_seen)])
+        for child in children:
+            self.parents[child] = id
+
+    def name_leaves(self) -> None:
         """Give a leaf an id of its own as soon as it shares its primitive."""
         sizes = Counter(leaf.primitive for leaf in self.leaves)
         for leaf in self.leaves:
             alone = sizes[leaf.primitive] == 1 and leaf.id in (ROOT, leaf.primitive)
             if alone:
                 leaf.id = leaf.primitive
-            elif leaf.id in (ROOT, leaf.primitive) or leaf.id in sizes:
-                leaf.id = self._next_id
-                self._next_id += 1
+            elif leaf.id in (ROOT, leaf.primitive) or leaf.id in sizes or leaf.id in self.above:
+                leaf.id = self.new_id()
+
+    def _tidy(self, person: int) -> None:
+        """Forget the numbers of segments that the tree has forgotten."""
+        tree = self.trees[person]
+        if tree.n_seen % TIDY:
+            return
+        held = {n for node in tree.nodes for n in node.members}
+        own = self.numbers[person]
+        self.numbers[person] = {there: here for there, here in own.items() if there in held}
+        self.waiting.leave(person, {here for there, here in own.items() if there not in held})
 
     # ---- keeping
 
     def state(self) -> dict[str, Any]:
         """Return everything as plain values and arrays."""
         return {
-            "next_id": self._next_id,
-            "n_seen": self._n_seen,
+            "next_id": self.next_id,
+            "n_seen": self.n_seen,
             "unit": self._unit,
-            "leaves": [leaf.state() for leaf in self.leaves],
+            "leaves": [leaf.state(self.table[leaf.slot]) for leaf in self.leaves],
+            "waiting": self.waiting.state(),
             "numbers": [
                 [person, [list(pair) for pair in numbers.items()]]
-                for person, numbers in self._numbers.items()
+                for person, numbers in self.numbers.items()
             ],
-            "above": [node.state() for node in self._above.values()],
-            "parents": [list(pair) for pair in self._parents.items()],
-            "joined": [list(pair) for pair in self._joined.items()],
+            "above": [node.state() for node in self.above.values()],
+            "parents": [list(pair) for pair in self.parents.items()],
+            "pins": self.pins.state(),
             "offsets": [[person, offset] for person, offset in self._offsets.items()],
         }
 
     def load_state(self, state: dict[str, Any]) -> None:
         """Resume from what `state` returned, with the same trees."""
-        self._next_id, self._n_seen = int(state["next_id"]), int(state["n_seen"])
+        self.next_id, self.n_seen = int(state["next_id"]), int(state["n_seen"])
         self._unit = float(state["unit"])
-        self.leaves = [Leaf.from_state(leaf) for leaf in state["leaves"]]
-        self._numbers = {
+        self.table = ShapeTable(self.table.mirror)
+        self.leaves = []
+        for *ids, posture, movement in state["leaves"]:
+            slot = self.table.add(Shape(np.array(posture), np.array(movement)))
+            person, local, id, primitive, founded = map(int, ids)
+            self.leaves.append(Leaf(person, local, id, primitive, founded, slot))
+        self.waiting = WaitingRoom(self.table)
+        self.waiting.load_state(state["waiting"])
+        self.numbers = {
             int(person): {int(there): int(here) for there, here in pairs}
             for person, pairs in state["numbers"]
         }
-        above = [Node.from_state(node) for node in state["above"]]
-        self._above = {node.id: node for node in above}
-        self._parents = {int(id): int(parent) for id, parent in state["parents"]}
-        self._joined = {int(number): int(id) for number, id in state["joined"]}
+        self.above = {node.id: node for node in map(Node.from_state, state["above"])}
+        self.parents = {int(id): int(parent) for id, parent in state["parents"]}
+        self.pins = Pins.from_state(state["pins"])
         self._offsets = {int(person): np.array(offset) for person, offset in state["offsets"]}
 
     # ---- inside
 
-    def _solved(self) -> tuple[IntArray, FloatArray, float]:
-        return solve(stacked(self.leaves), self._whose(), len(self._trees), self.rules)
-
-    def _seen(self, tree: PrimitiveTree, leaf: int) -> Shape:
-        return shape_of(tree.exemplars(leaf), self.config.form)
+    def _seen(self, person: int, leaf: int) -> Shape:
+        return shape_of(self.trees[person].exemplars(leaf), self.config.form)
 
     def _home(self, person: int, node: int, number: int) -> int:
         for leaf in self.leaves:
-            if (leaf.person, leaf.local) == (person, node):
+            if leaf.key == (person, node):
                 return leaf.primitive
-        return self._joined.get(number, ROOT)
+        return self.waiting.homes().get(number, ROOT)
 
     def _offset(self, person: int) -> FloatArray:
         known = self._offsets.get(person)
-        return np.zeros(self.leaves[0].shape.posture.shape) if known is None else known
+        return np.zeros(self.trees[person].n_channels) if known is None else known
 
-    def _corrected(self) -> Shape:
-        offsets = np.array([self._offset(person) for person in self._trees])
-        return corrected(stacked(self.leaves), self._whose(), offsets)
+    def _levels(self, leaves: Sequence[Leaf]) -> FloatArray:
+        """Return the postures of some leaves, less their people's usual deviations."""
+        offsets = np.array([self._offset(leaf.person) for leaf in leaves])
+        return np.asarray(self.table.postures(self._slots(leaves)) - offsets)
 
-    def _whose(self) -> IntArray:
-        places = {person: place for place, person in enumerate(self._trees)}
-        return np.array([places[leaf.person] for leaf in self.leaves], dtype=np.int64)
-
-    def _tidy(self, person: int, tree: PrimitiveTree) -> None:
-        """Forget the numbers of segments that the tree has forgotten."""
-        if tree.n_seen % TIDY:
-            return
-        numbers = self._numbers[person]
-        held = {n for node in tree.nodes for n in node.members}
-        for n in numbers.keys() - held:
-            self._joined.pop(numbers.pop(n), None)
+    @staticmethod
+    def _slots(entries: Iterable[Leaf | Waiting]) -> IntArray:
+        return np.array([each.slot for each in entries], dtype=np.int64)
 
 
 TIDY = 32  # segments after which those are forgotten that the tree has forgotten
-_NONE: tuple[tuple[()], tuple[()], tuple[()], tuple[()]] = ((), (), (), ())

@@ -9,9 +9,11 @@ from hypothesis import strategies as st
 
 from mplearn.errors import InvalidValueError
 from mplearn.people import PeopleConfig
-from mplearn.people.links import agglomerate, solve, tension, unit_of
-from mplearn.people.shapes import Shape, distances, shape_of
-from mplearn.tree import FormConfig
+from mplearn.people.links import Known, agglomerate, solve, tension, unit_of
+from mplearn.people.offsets import offsets_of
+from mplearn.people.shape_table import ShapeTable
+from mplearn.people.shapes import Shape, mirrored, shape_of
+from mplearn.tree import FormConfig, MirrorMap
 
 RULES = PeopleConfig(repertoire=5)
 FORM = FormConfig()
@@ -35,10 +37,35 @@ def same_groups(a, b):
     return np.array_equal(a[:, None] == a, b[:, None] == b)
 
 
+def known_of(people, together=(), apart=()):
+    n = len(people)
+    pairs = np.zeros((2, n, n), dtype=bool)
+    for matrix, listed in zip(pairs, (together, apart), strict=True):
+        for i, j in listed:
+            matrix[i, j] = matrix[j, i] = True
+    return Known(np.arange(n), people, np.ones(n, dtype=bool), *pairs)
+
+
+def table_of(shapes, mirror=None):
+    table = ShapeTable(mirror)
+    for row in zip(shapes.posture, shapes.movement, strict=True):
+        table.add(Shape(*row))
+    return table
+
+
+def found(shapes, people, n_people, rules=RULES, mirror=None, **pins):
+    return solve(table_of(shapes, mirror), known_of(people, **pins), n_people, rules)
+
+
+def distances(shapes, posture):
+    table = table_of(shapes)
+    return table.distances(shapes.posture, np.arange(len(shapes.posture)), posture)[0]
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_what_is_the_same_motion_is_found_whoever_does_it(seed):
     shapes, people, motions = made(seed=seed)
-    groups, offsets, unit = solve(shapes, people, 3, RULES)
+    groups, offsets, unit = found(shapes, people, 3)
     assert same_groups(groups, motions)
     assert np.isfinite(unit)
     assert offsets.shape == (3, 8)
@@ -46,14 +73,13 @@ def test_what_is_the_same_motion_is_found_whoever_does_it(seed):
 
 def test_a_persons_habit_is_learned_from_what_is_shared():
     shapes, people, motions = made(habit=1.0, noise=0.01)
-    _, offsets, _ = solve(shapes, people, 3, RULES)
+    _, offsets, _ = found(shapes, people, 3)
     habits = [
         np.mean([shapes.posture[(people == p) & (motions == m)][0] for m in range(5)], axis=0)
         for p in range(3)
     ]
     share = 5 / (5 + RULES.offset_prior)
-    found = offsets[0] - offsets[1]
-    assert np.allclose(found, share * (habits[0] - habits[1]), atol=0.02)
+    assert np.allclose(offsets[0] - offsets[1], share * (habits[0] - habits[1]), atol=0.02)
 
 
 @settings(max_examples=25, deadline=None)
@@ -61,40 +87,99 @@ def test_a_persons_habit_is_learned_from_what_is_shared():
 def test_the_order_of_leaves_does_not_matter(seed):
     shapes, people, _ = made(seed=seed, noise=0.4)
     order = np.random.default_rng(seed).permutation(len(people))
-    matrix = distances(shapes, shapes, RULES.posture)
-    matrix /= unit_of(matrix, people, 2)
-    groups = agglomerate(matrix, people, RULES)
-    shuffled = agglomerate(matrix[np.ix_(order, order)], people[order], RULES)
+    matrix = distances(shapes, RULES.posture)
+    matrix /= unit_of(matrix, people, replace(RULES, repertoire=2))
+    never = np.full_like(matrix, np.inf)
+    groups = agglomerate(matrix, never, known_of(people), RULES)
+    shuffled = agglomerate(matrix[np.ix_(order, order)], never, known_of(people[order]), RULES)
     assert same_groups(groups[order], shuffled)
 
 
 def test_two_motions_of_one_person_stay_two():
     shapes, people, _ = made(n_people=1, n_motions=4)
-    groups, _, _ = solve(shapes, people, 1, RULES)
+    groups, _, _ = found(shapes, people, 1)
     assert len(set(groups.tolist())) == 4
 
 
 def test_left_and_right_stay_apart():
     rng = np.random.default_rng(3)
-    left = rng.normal(size=40)
-    right = np.concatenate((left[20:], left[:20]))  # the other side's channels
-    shapes = Shape(np.zeros((4, 8)), np.stack((left, right, left + 0.1, right + 0.1)))
-    groups, _, _ = solve(shapes, np.array([0, 0, 1, 1]), 2, replace(RULES, repertoire=2))
-    assert same_groups(groups, np.array([0, 1, 0, 1]))
+    mirror = MirrorMap((1, 0, 3, 2), (1, 1, -1, -1))
+    shared, own = rng.normal(size=(2, 40))
+    left = Shape(np.zeros(4), 2 * mirrored(Shape(np.zeros(4), shared), mirror).movement)
+    left = Shape(left.posture, left.movement + 2 * shared + 0.4 * own)  # a side, but hardly so
+    right = mirrored(left, mirror)
+    others = rng.normal(size=(2, 40)) * 3
+    movements = [left.movement, others[0], others[1], right.movement + 0.01, *(others + 0.01)]
+    shapes, people = Shape(np.zeros((6, 4)), np.array(movements)), np.repeat([0, 1], 3)
+    blind = found(shapes, people, 2).groups
+    assert same_groups(blind, np.array([0, 1, 2, 0, 1, 2]))
+    groups = found(shapes, people, 2, mirror=mirror).groups
+    assert same_groups(groups, np.array([0, 1, 2, 3, 1, 2]))
+
+
+def brute_force(matrix, barred, link, reach):
+    """Average link over all pairs of groups, with nothing kept from one step to the next."""
+    groups = [[i] for i in range(len(matrix))]
+    while True:
+        mean = np.array([[matrix[np.ix_(a, b)].mean() for b in groups] for a in groups])
+        np.fill_diagonal(mean, np.inf)
+        best = (np.inf, None)
+        for i in range(len(groups)):
+            for j in range(i):
+                if not barred[np.ix_(groups[i], groups[j])].any():
+                    rest = np.concatenate((np.delete(mean[i], j), np.delete(mean[j], i)))
+                    doubt = mean[i, j] ** 2 / min(rest.min(initial=np.inf), reach)
+                    best = min(best, (doubt, (j, i)))
+        if not best[0] <= link:
+            return groups
+        j, i = best[1]
+        groups[j] += groups.pop(i)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000))
+def test_leaves_are_joined_as_by_brute_force(seed):
+    shapes, people, _ = made(seed=seed, n_motions=3, noise=0.6)
+    matrix = distances(shapes, RULES.posture)
+    matrix /= unit_of(matrix, people, RULES)
+    groups = agglomerate(matrix, np.full_like(matrix, np.inf), known_of(people), RULES)
+    barred = (people[:, None] == people) & (matrix > RULES.link_own)
+    wanted = np.empty(len(people), dtype=int)
+    for k, group in enumerate(brute_force(matrix, barred, RULES.link, RULES.reach)):
+        wanted[group] = k
+    assert same_groups(groups, wanted)
+
+
+def test_what_a_person_said_counts_more():
+    shapes, people, _ = made()
+    groups = found(shapes, people, 3, together=[(0, 6)], apart=[(2, 7)]).groups
+    assert groups[0] == groups[6]
+    assert groups[2] != groups[7]
+
+
+def test_offsets_are_deviations_from_the_mean_of_who_shares():
+    postures = np.array([[1.0], [3.0], [10.0], [12.0], [50.0]])
+    people, groups = np.array([0, 1, 0, 1, 1]), np.array([7, 7, 4, 4, 9])
+    offsets = offsets_of(postures, people, 3, groups, 1e-9)
+    assert offsets[1, 0] - offsets[0, 0] == pytest.approx(2.0)
+    assert offsets[2, 0] == 0.0
+    assert not offsets_of(postures[:1], people[:1], 2, groups[:1], 1.0).any()
 
 
 def test_the_unit_is_how_far_a_persons_own_motions_lie_apart():
     at = np.array([0.0, 1.0, 4.0, 10.0, 13.0])
     people = np.array([0, 0, 0, 1, 1])
     matrix = np.abs(at[:, None] - at)
-    assert unit_of(matrix, people, 2) == np.median([1, 1, 3, 3, 3])
-    assert unit_of(matrix, people, 20) == pytest.approx(3 * (2.6 / 20) ** (1 / 3))
-    assert unit_of(np.zeros((1, 1)), np.array([0]), 20) == np.inf
+    assert unit_of(matrix, people, replace(RULES, repertoire=2)) == np.median([1, 1, 3, 3, 3])
+    assert unit_of(matrix, people, replace(RULES, repertoire=20)) == pytest.approx(
+        3 * (2.6 / 20) ** (1 / 3)
+    )
+    assert unit_of(np.zeros((1, 1)), np.array([0]), RULES) == np.inf
 
 
 def test_a_clear_winner_may_be_farther_off():
-    assert tension(np.array(1.1), np.array(3.0), 1.5) < tension(np.array(1.0), np.array(1.05), 1.5)
-    assert tension(np.array(1.0), np.array(np.inf), 1.5) == pytest.approx(1 / 1.5)
+    assert tension(1.1, 3.0, 1.5) < tension(1.0, 1.05, 1.5)
+    assert tension(1.0, np.inf, 1.5) == pytest.approx(1 / 1.5)
 
 
 def test_a_shape_is_posture_and_movement():
@@ -105,9 +190,8 @@ def test_a_shape_is_posture_and_movement():
     assert np.allclose(higher.movement, shape.movement)
     stretched = shape_of([np.repeat(frames, 2, axis=0)], FORM)
     assert np.allclose(stretched.movement, shape.movement, atol=0.02)
-    one = Shape(shape.posture[None], shape.movement[None])
-    two = Shape(higher.posture[None], higher.movement[None])
-    assert distances(one, two, 0.5)[0, 0] == pytest.approx(np.sqrt(0.5))
+    both = Shape(*(np.stack(parts) for parts in zip(shape, higher, strict=True)))
+    assert distances(both, 0.5)[0, 1] == pytest.approx(np.sqrt(0.5))
 
 
 @pytest.mark.parametrize("wrong", [{"link": 0.0}, {"posture": 2.0}, {"join": np.nan}])

@@ -9,7 +9,7 @@ import pytest
 from mplearn.errors import InvalidValueError, UnknownPrimitiveError
 from mplearn.people import PeopleConfig, PeopleTree
 from mplearn.people.sharing import TIDY
-from mplearn.tree import ROOT, PrimitiveTree, TreeConfig
+from mplearn.tree import ROOT, MirrorMap, PrimitiveTree, TreeConfig
 
 D, N_MOTIONS = 6, 5
 RULES = PeopleConfig(repertoire=N_MOTIONS)
@@ -157,7 +157,7 @@ def test_memory_does_not_grow_with_the_stream():
         tree.insert(teacher(i % 2, int(teacher.rng.integers(N_MOTIONS))), i % 2)
     kept = tree.state()["sharing"]
     assert all(len(numbers) <= most < 160 for _, numbers in kept["numbers"])
-    assert len(kept["joined"]) <= most
+    assert sum(len(shapes) for *_, shapes in kept["waiting"]) <= 2 * most
 
 
 def test_what_is_unknown_is_named():
@@ -170,24 +170,26 @@ def test_what_is_unknown_is_named():
         tree.of(7)
 
 
-def test_a_person_can_split_merge_and_remove_what_is_ones_own():
-    teacher = Teacher(2)
-    tree = PeopleTree(QUICK, D, 100.0, people=RULES)
-    for i in range(60):  # the second person does two motions that the first one never does
-        person = i % 2
-        motion = int(teacher.rng.integers(3)) if person == 0 else int(teacher.rng.integers(3, 5))
-        tree.insert(teacher(person, motion), person)
-    mine = [id for id in tree.leaves if tree._own(id)[0] == 1]
-    theirs = [id for id in tree.leaves if tree._own(id)[0] == 0]
-    change = tree.merge(*mine)
-    kept, absorbed = change.merges[0]
-    assert {kept, absorbed} == set(mine)
-    assert set(tree.leaves) == {*theirs, kept}
-    change = tree.split(kept)
-    assert change.splits[0].node == kept
-    assert set(change.born) == set(change.splits[0].into)
-    gone = change.born[0]
-    assert tree.remove(gone).removed == (gone,)
-    assert gone not in tree.leaves
-    with pytest.raises(InvalidValueError, match="person"):
-        tree.merge(theirs[0], change.born[1])
+@pytest.mark.parametrize("sided", [False, True])
+def test_left_is_not_right_if_it_is_known_which_is_which(sided):
+    rng = np.random.default_rng(4)
+    mirror = MirrorMap((1, 0, 3, 2, 4, 5), (1, 1, 1, 1, 1, 1))
+    tree = PeopleTree(QUICK, D, 100.0, people=RULES, mirror=mirror if sided else None)
+    motions = rng.normal(size=(3, 2, D))
+    motions = 0.5 * (motions + mirror.apply(motions)) + 0.12 * (motions - mirror.apply(motions))
+
+    def perform(motion: int, side: int) -> np.ndarray:
+        t = np.linspace(0, 1, int(rng.integers(70, 130)))[:, None]
+        a, b = motions[motion] + 0.02 * rng.normal(size=(2, D))
+        frames = a + b * np.sin(np.pi * t)
+        return frames if side == 0 else mirror.apply(frames)
+
+    for i in range(30):
+        tree.insert(perform(i % 3, 0), 0)
+    known = tree.leaves
+    assert len(known) == 3
+    others = [tree.insert(perform(i % 3, int(i % 3 == 0)), 1) for i in range(18)]
+    assert others[0].recognised != sided
+    assert others[1].recognised
+    assert (set(tree.leaves) > set(known)) == sided
+    assert tree.insert(perform(0, 0), 2).node_id in known

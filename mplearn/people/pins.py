@@ -1,0 +1,99 @@
+"""What a person said of leaves: that they are one motion, or different ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..recording import BoolArray
+
+Key = tuple[int, int]  # person, and id of the leaf in that person's tree
+Pair = tuple[Key, Key]
+
+
+class Pins:
+    """Pairs of leaves that are, or are not, one motion; the rules respect them.
+
+    The latest word counts.
+    """
+
+    def __init__(self) -> None:
+        self._together: set[Pair] = set()
+        self._apart: set[Pair] = set()
+
+    def join(self, keys: Iterable[Key]) -> None:
+        """Note that some leaves are one motion."""
+        pairs = _pairs(keys)
+        self._together |= pairs
+        self._apart -= pairs
+
+    def part(self, sides: Sequence[Iterable[Key]]) -> None:
+        """Note that leaves on different sides are different motions."""
+        groups = [list(side) for side in sides]
+        pairs = _pairs(key for side in groups for key in side)
+        pairs -= {pair for side in groups for pair in _pairs(side)}
+        self._apart |= pairs
+        self._together -= pairs
+
+    def follow(self, heirs: Mapping[Key, Sequence[Key]]) -> None:
+        """Note what became of leaves that are gone: what holds of one holds of its heirs."""
+        for old, new in heirs.items():
+            for name in ("_together", "_apart"):
+                pairs: set[Pair] = getattr(self, name)
+                mine = {pair for pair in pairs if old in pair}
+                others = {one if two == old else two for one, two in mine}
+                taken = {_pair(key, other) for key in new for other in others if key != other}
+                setattr(self, name, (pairs - mine) | taken)
+        self._apart -= self._together
+
+    def among(self, keys: Sequence[Key]) -> tuple[BoolArray, BoolArray]:
+        """Return which of some leaves are together, and which apart, shape (n, n) each."""
+        places = {key: place for place, key in enumerate(keys)}
+        together, apart = np.zeros((2, len(keys), len(keys)), dtype=np.bool_)
+        for pairs, matrix in ((self._together, together), (self._apart, apart)):
+            for one, two in pairs:
+                i, j = places[one], places[two]
+                matrix[i, j] = matrix[j, i] = True
+        return together, apart
+
+    def renamed(self, new_key: Mapping[Key, Key]) -> Pins:
+        """Return the same of leaves that have other names."""
+        pins = Pins()
+        for name in ("_together", "_apart"):
+            pairs = {_pair(new_key[one], new_key[two]) for one, two in getattr(self, name)}
+            setattr(pins, name, {pair for pair in pairs if pair[0] != pair[1]})
+        return pins
+
+    def united(self, other: Pins) -> Pins:
+        """Return what was said here and there; where that differs, leaves are together."""
+        pins = Pins()
+        pins._together = self._together | other._together
+        pins._apart = (self._apart | other._apart) - pins._together
+        return pins
+
+    def state(self) -> dict[str, Any]:
+        """Return everything as plain values."""
+        return {
+            "together": [[*one, *two] for one, two in sorted(self._together)],
+            "apart": [[*one, *two] for one, two in sorted(self._apart)],
+        }
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, Any]) -> Pins:
+        """Return what `state` described."""
+        pins = cls()
+        for name in ("together", "apart"):
+            pairs = {_pair((int(a), int(b)), (int(c), int(d))) for a, b, c, d in state[name]}
+            setattr(pins, f"_{name}", pairs)
+        return pins
+
+
+def _pair(one: Key, two: Key) -> Pair:
+    return (one, two) if one <= two else (two, one)
+
+
+def _pairs(keys: Iterable[Key]) -> set[Pair]:
+    listed = list(keys)
+    return {_pair(one, two) for i, one in enumerate(listed) for two in listed[:i]}

@@ -1,0 +1,126 @@
+"""Shapes by slot, and how far apart their movements are: rows change, the rest is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+
+from ..recording import FloatArray, IntArray
+from ..tree import MirrorMap
+from .shapes import Shape, mirrored, squares
+
+
+class ShapeTable:
+    """Holds shapes, and the squared distances of each movement to every other.
+
+    Those are sums in a fixed order, so that they do not depend on when which shape came.
+
+    Args:
+        mirror: Which channel is the mirror image of which; None where none is.
+    """
+
+    def __init__(self, mirror: MirrorMap | None = None) -> None:
+        self.mirror = mirror
+        self._free: list[int] = []
+        self._postures = self._movements = self._images = np.zeros((0, 0))
+        self._direct = self._mirrored = np.zeros((0, 0))
+
+    def add(self, shape: Shape) -> int:
+        """Take a shape; return its slot."""
+        if not self._free:
+            self._grow(shape)
+        slot = self._free.pop()
+        self.put(slot, shape)
+        return slot
+
+    def put(self, slot: int, shape: Shape) -> None:
+        """Replace a shape."""
+        self._postures[slot], self._movements[slot] = shape
+        image = shape if self.mirror is None else mirrored(shape, self.mirror)
+        self._images[slot] = image.movement
+        self._direct[slot] = self._direct[:, slot] = _row(self._movements, shape.movement)
+        if self.mirror is not None:
+            row = 0.5 * (_row(self._movements, image.movement) + _row(self._images, shape.movement))
+            self._mirrored[slot] = self._mirrored[:, slot] = row
+
+    def drop(self, slot: int) -> None:
+        """Forget a shape."""
+        self._free.append(slot)
+
+    def __getitem__(self, slot: int) -> Shape:
+        """Return a shape."""
+        return Shape(self._postures[slot], self._movements[slot])
+
+    def postures(self, slots: IntArray) -> FloatArray:
+        """Return the postures of some, shape (n, D)."""
+        return self._postures[slots]
+
+    def distances(
+        self, levels: FloatArray, slots: IntArray, posture: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the distances among shapes, and those from their mirror images, (n, n) each.
+
+        Args:
+            levels: Their postures, corrected, shape (n, D).
+            slots: Where they are, shape (n,).
+            posture: Weight of the postures.
+        """
+        at = np.ix_(slots, slots)
+        direct = np.sqrt(posture * squares(levels, levels) + self._direct[at])
+        if self.mirror is None:
+            return direct, np.full_like(direct, np.inf)
+        images = self.mirror.apply(levels)
+        return direct, np.sqrt(posture * squares(images, levels) + self._mirrored[at])
+
+    def distances_to(
+        self, shape: Shape, levels: FloatArray, slots: IntArray, posture: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the distances from one shape, and from its mirror image, shape (n,) each."""
+
+        def row(one: Shape) -> FloatArray:
+            across = ((levels - one.posture) ** 2).sum(axis=1)
+            return np.asarray(
+                np.sqrt(posture * across + _row(self._movements[slots], one.movement))
+            )
+
+        direct = row(shape)
+        if self.mirror is None:
+            return direct, np.full_like(direct, np.inf)
+        return direct, row(mirrored(shape, self.mirror))
+
+    def _grow(self, shape: Shape) -> None:
+        held = len(self._postures)
+        n = max(16, 2 * held)
+        for name, width in (
+            ("_postures", len(shape.posture)),
+            ("_movements", len(shape.movement)),
+            ("_images", len(shape.movement)),
+            ("_direct", n),
+            ("_mirrored", n),
+        ):
+            old, new = getattr(self, name), np.zeros((n, width))
+            new[:held, : old.shape[1]] = old
+            setattr(self, name, new)
+        self._free = list(range(n - 1, held - 1, -1))
+
+
+def stacked(shapes: Sequence[Shape]) -> ShapeTable:
+    """Return a table of shapes, whose slots are their places."""
+    table = ShapeTable()
+    for shape in shapes:
+        table.add(shape)
+    return table
+
+
+@njit(cache=True)
+def _row(rows: FloatArray, one: FloatArray) -> FloatArray:
+    """Return the squared distances from one to each row, shape (n, K) and (K,) to (n,)."""
+    out = np.empty(len(rows))
+    for i in range(len(rows)):
+        total = 0.0
+        for k in range(len(one)):
+            total += (rows[i, k] - one[k]) ** 2
+        out[i] = total
+    return out

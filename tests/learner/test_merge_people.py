@@ -1,0 +1,85 @@
+"""Learners that have seen several people, merged: bodies say who is who."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from mplearn import LearnerConfig, MotionLearner, Recording
+from mplearn.demonstrator import Person, demonstrate
+from mplearn.evaluation.sessions import join_people
+from mplearn.learner import PersonChanged, Recognised, SegmentClosed, merge
+
+SCRIPT = ("BAR", "BAL") * 6
+SIZES = {"small": 1.58, "middle": 1.70, "tall": 1.84}
+
+
+def performed(name: str, seed: int) -> Recording:
+    return demonstrate(SCRIPT, seed=seed, person=Person(name, SIZES[name])).recording
+
+
+def learned(*sessions: Recording) -> MotionLearner:
+    stream = join_people(sessions, np.random.default_rng(0), interleaved=True)
+    learner = MotionLearner(LearnerConfig(stream.channels, stream.rate_hz))
+    for _ in learner.learn_recording(stream):
+        pass
+    return learner
+
+
+@pytest.fixture(scope="module")
+def shards() -> tuple[MotionLearner, MotionLearner]:
+    """The tall one is in both, before other cameras and with another number."""
+    one = learned(performed("small", 1), performed("tall", 2))
+    return one, learned(performed("tall", 3), performed("middle", 4))
+
+
+@pytest.fixture(scope="module")
+def merged(shards) -> MotionLearner:
+    return merge(shards)
+
+
+def counts(learner: MotionLearner) -> Counter[tuple[int, int, int]]:
+    """How often which motion followed which; of two ones it does not matter which is which."""
+    first, second = learner.graph.ids
+    count = learner.graph.count
+    pairs = [(first, first, second), (second, second, first)]
+    return Counter((count(a, b), count(b, c), count(c, a)) for a, b, c in pairs)
+
+
+def test_who_is_in_both_is_one_person(shards, merged) -> None:
+    one, two = shards
+    assert len(one.tree.people) == len(two.tree.people) == 2
+    assert len(merged.tree.people) == 3
+    seen = sorted(merged.tree.of(person).n_seen for person in merged.tree.people)
+    both = [tree.of(person).n_seen for tree in (one.tree, two.tree) for person in tree.people]
+    assert sum(seen) == sum(both)
+    assert max(seen) > 1.5 * max(both)
+
+
+def test_each_motion_is_one_primitive_and_counts_add(shards, merged) -> None:
+    one, two = shards
+    assert len(merged.tree.leaves) == len(one.tree.leaves) == 2
+    assert merged.tree.leaves == one.tree.leaves
+    for id in merged.tree.leaves:
+        assert len(merged.tree.node(id).children) >= 2
+    assert merged.graph.n_transitions >= one.graph.n_transitions + two.graph.n_transitions
+    back = merge([two, one])
+    assert counts(back) == counts(merged)
+    assert back.graph.n_transitions == merged.graph.n_transitions
+    assert back.n_frames == merged.n_frames == one.n_frames + two.n_frames
+    assert len(merged.snapshot()) == 2
+
+
+def test_a_merged_learner_knows_everybody_and_goes_on(merged) -> None:
+    resumed = MotionLearner.from_state(merged.state())
+    stream = join_people(
+        [performed("middle", 5), performed("tall", 6)], np.random.default_rng(1), interleaved=False
+    )
+    events = [event for each in resumed.learn_recording(stream) for event in each]
+    again = MotionLearner.from_state(merged.state())
+    assert [event for each in again.learn_recording(stream) for event in each] == events
+    assert not any(event.new for event in events if isinstance(event, PersonChanged))
+    assert len(resumed.tree.people) == 3
+    moving = [e for e in events if isinstance(e, SegmentClosed) and e.placement]
+    assert sum(isinstance(e, Recognised) for e in events) >= 0.8 * len(moving)
+    assert resumed.tree.leaves == merged.tree.leaves
