@@ -15,9 +15,9 @@ class ActivityConfig:
     Attributes:
         step_s: Postures are averaged over steps of this length [s].
         apart_s: Nearer in time than this, postures are alike because little time has passed; they
-            are no neighbours [s].
+            are no neighbours [s]. An activity lasts twice as long at least: in less, nothing could
+            come back to the posture in its middle.
         reach_s: Within this time an activity comes back to its postures [s].
-        least_s: Shortest stretch of an activity [s].
         neighbours_s: Number of neighbours that are looked at, as the time that they fill [s].
         recurrence: Links that a stretch must hold, as a share of those that it would hold if they
             were spread evenly over `reach_s`.
@@ -28,13 +28,12 @@ class ActivityConfig:
     step_s: float = 0.1
     apart_s: float = 0.8
     reach_s: float = 8.0
-    least_s: float = 2.0
     neighbours_s: float = 1.0
     recurrence: float = 0.9
     mixing: float = 0.5
 
     def __post_init__(self) -> None:
-        times = ("step_s", "apart_s", "reach_s", "least_s", "neighbours_s")
+        times = ("step_s", "apart_s", "reach_s", "neighbours_s")
         check_positive(self, *times, "recurrence", "mixing")
         if not self.step_s <= self.apart_s < self.reach_s:
             raise InvalidValueError(

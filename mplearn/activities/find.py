@@ -51,7 +51,8 @@ def find_activities(
     first_of_step = np.flatnonzero(np.diff(step_of_frame, prepend=-1))
     sums = np.add.reduceat(_complete(frames), first_of_step, axis=0)
     points = sums / np.bincount(step_of_frame)[:, None]
-    least, apart = steps(config.least_s), steps(config.apart_s)
+    apart = steps(config.apart_s)
+    least = 2 * apart
     if len(points) < 2 * least:
         return np.zeros(len(frames), np.int64)
     reach, count = steps(config.reach_s), steps(config.neighbours_s)
