@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from functools import partial
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 
 import numpy as np
@@ -18,109 +18,12 @@ from mplearn.errors import InvalidValueError
 from mplearn.evaluation import Table
 from mplearn.recording import FloatArray
 
-from .contest import Contest, Game
+from .comparison import SLOW, Comparison
+from .contest import Contest
 from .episodes import Episode
-from .policies import NEEDS_TASK, POLICIES
-from .rl import TrainingConfig
-from .rl.config import AlgorithmName, PriorUse, usual_prior, usual_steps
 
 COLUMNS = ("task", "dynamics", "policy", "return", "success", "falls", "time")
 CONFIDENCE = 0.95
-SLOW = ("search",)  # plays as few episodes as the simulated robot does
-ROUND_STEPS = 20_000  # of a training: so much is lost at most when it is interrupted
-PROBES = 10  # episodes after each round, for the log
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """What is compared.
-
-    Attributes:
-        tasks: Names of tasks.
-        dynamics: "kinematic", "simulated" or both. Agents are trained kinematically.
-        policies: Names of policies; those that do not suit a task are left out there, as is
-            "search" in "follow", where it foresees the demonstrator.
-        algorithms: What agents are trained with.
-        priors: What the transition prior is to them; "dqn" knows "feature" only. None: what
-            suits the task, see `usual_prior`.
-        seeds: Of the episodes, and of the trainings: one agent a seed.
-        episodes: Episodes a seed, kinematic.
-        simulated_episodes: Episodes a seed, simulated; and of policies that think long.
-        steps: Macro steps of a training; None: what suits the task, see `usual_steps`.
-        library: File of the library; None is the built-in one.
-    """
-
-    tasks: tuple[str, ...] = ("goal", "follow", "recite", "free")
-    dynamics: tuple[str, ...] = ("kinematic",)
-    policies: tuple[str, ...] = tuple(POLICIES)
-    algorithms: tuple[AlgorithmName, ...] = ("maskable-ppo",)
-    priors: tuple[PriorUse, ...] | None = None
-    seeds: tuple[int, ...] = (100, 101, 102, 103, 104)
-    episodes: int = 50
-    simulated_episodes: int = 4
-    steps: int | None = None
-    library: str | None = None
-
-    def __post_init__(self) -> None:
-        unknown = [name for name in self.policies if name not in POLICIES]
-        if unknown:
-            raise InvalidValueError(f"policies must be among {tuple(POLICIES)}, not {unknown}")
-        if len(self.seeds) < 2:
-            raise InvalidValueError(f"an interval needs at least 2 seeds, not {self.seeds}")
-
-    @property
-    def n_contests(self) -> int:
-        """How many contests there are in all."""
-        return sum(len(self.contests(task)) for task in self.tasks) * len(self.seeds)
-
-    def contests(self, task: str) -> dict[str, list[Contest]]:
-        """Return the contests of a task: of each contestant, one a seed."""
-        trainings = self._trainings(task)
-        policies = [
-            name
-            for name in self.policies
-            if task in NEEDS_TASK.get(name, (task,)) and (name, task) != ("search", "follow")
-        ]
-        out = {}
-        for name in [*policies, *trainings]:
-            games = tuple(Game(dynamics, self._n(name, dynamics)) for dynamics in self.dynamics)
-            training = trainings.get(name)
-            out[name] = [
-                Contest(
-                    task, name, seed, games, self.library, training and replace(training, seed=seed)
-                )
-                for seed in self.seeds
-            ]
-        return out
-
-    def steps_of(self, task: str) -> int:
-        """Return the macro steps of a training."""
-        return usual_steps(task) if self.steps is None else self.steps
-
-    def _n(self, name: str, dynamics: str) -> int:
-        slow = dynamics == "simulated" or name in SLOW
-        return self.simulated_episodes if slow else self.episodes
-
-    def _trainings(self, task: str) -> dict[str, TrainingConfig]:
-        """Return how each agent is trained for a task, by its name; but for the seed."""
-        steps = self.steps_of(task)
-        uses: list[tuple[AlgorithmName, PriorUse]] = [
-            (algorithm, "feature" if algorithm == "dqn" else prior)
-            for algorithm in self.algorithms
-            for prior in self.priors or (usual_prior(task),)
-        ]
-        return {
-            f"{algorithm}, prior as {use}": TrainingConfig(
-                task=task,
-                algorithm=algorithm,
-                prior=use,
-                steps=steps,
-                library=self.library,
-                round_steps=min(steps, ROUND_STEPS),
-                episodes=PROBES,
-            )
-            for algorithm, use in uses
-        }
 
 
 def compare(
@@ -137,7 +40,12 @@ def compare(
             from there, so that a comparison that was interrupted goes on.
         jobs: Number of processes; None is the number of processors.
         done: Told of each contest that is over.
+
+    Raises:
+        InvalidValueError: ``jobs`` is less than 1.
     """
+    if jobs is not None and jobs < 1:
+        raise InvalidValueError(f"there is at least 1 job, not {jobs}")
     contests = {task: comparison.contests(task) for task in comparison.tasks}
     in_order = [each for of in contests.values() for entrants in of.values() for each in entrants]
     with _mapping(jobs or os.cpu_count() or 1) as mapped:
@@ -157,13 +65,20 @@ def _mapping(jobs: int) -> Iterator[Callable[..., Iterator[list[list[Episode]]]]
     if jobs == 1:
         yield map
         return
-    with ProcessPoolExecutor(jobs, get_context("spawn"), _work_alone) as pool:
-        yield pool.map
+    others = set(active_children())
+    with ProcessPoolExecutor(jobs, get_context("spawn"), _begin_work) as pool:
+        try:
+            yield pool.map
+        except BaseException:  # interrupted, too: what is not kept yet is given up
+            for worker in set(active_children()) - others:
+                worker.terminate()
+            raise
 
 
-def _work_alone() -> None:
-    """Use one thread; called in each process before torch is there."""
+def _begin_work() -> None:
+    """Use one thread (torch is not there yet), and leave interrupts to the parent."""
     os.environ["OMP_NUM_THREADS"] = "1"
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _table(

@@ -7,10 +7,7 @@ import pytest
 from standing_library import standing_library
 
 from mplearn.errors import InvalidValueError
-from mplearn_agents import contest
 from mplearn_agents.cli import main
-from mplearn_agents.episodes import play
-from mplearn_agents.policies import RandomWalk
 from mplearn_agents.rl import ProjectIllegal, TrainedPolicy, TrainingConfig
 from mplearn_agents.rl.config import VERSION
 from mplearn_agents.rl.projection import project
@@ -242,52 +239,3 @@ def test_the_commands(folder, capsys):
     assert "agent written to" in capsys.readouterr().out
     assert main(["perform", "--agent", out, "--dynamics", "kinematic", "--episodes", "2"]) == 0
     assert "of 2 episodes succeeded" in capsys.readouterr().out
-
-
-class Stroller(RandomWalk):
-    """In place of an agent."""
-
-    def require_fit(self, env):
-        pass
-
-
-def test_a_table_of_policies_and_agents_and_what_is_kept_of_it(folder, capsys, monkeypatch):
-    table = ["compare", "--library", str(folder / "small.mplearn"), "--out", str(folder / "table"),
-             "--tasks", "goal", "--policies", "random", "quick-path", "--seeds", "2",
-             "--episodes", "3", "--simulated-episodes", "1", "--steps", "1",
-             "--jobs", "1"]  # fmt: skip
-    assert main(table) == 0
-    file = folder / "table" / "compare.md"
-    written = file.read_text()
-    rows = [line for line in written.splitlines() if line.startswith("| goal")]
-    assert [row.split(" | ")[1:3] for row in rows] == [
-        [dynamics, policy]
-        for dynamics in ("kinematic", "simulated")
-        for policy in ("random", "quick-path", "maskable-ppo, prior as logits")
-    ]
-    assert all("100.0 ± 0.0 %" in row for row in rows if "quick-path" in row)
-    played = []
-    with monkeypatch.context() as patched:
-        patched.setattr(contest, "play", lambda *asked: played.append(asked) or play(*asked))
-        patched.setattr(contest, "train", None)  # nothing is trained again
-        assert main(table) == 0
-        assert file.read_text() == written and not played
-        lost = folder / "table" / "episodes" / "goal-simulated-random-101.json"
-        lost.write_text("[")
-        assert main([*table, "--episodes", "3"]) == 0
-        assert file.read_text() == written and len(played) == 1
-        patched.setattr(contest, "train", lambda *asked, resume: Stroller())
-        assert main([*table, "--policies", "random", "--dynamics", "kinematic", "--variants"]) == 0
-    rows = [line for line in file.read_text().splitlines() if line.startswith("| goal")]
-    agents = [row.split(" | ")[2] for row in rows]
-    assert agents == [
-        "random",
-        "maskable-ppo, prior as logits",
-        "maskable-ppo, prior as feature",
-        "maskable-ppo, prior as logits",
-        "maskable-ppo, prior as regulariser",
-        "maskable-ppo, prior as logits",
-        "ppo, prior as logits",
-        "dqn, prior as feature",
-    ]
-    assert rows[1] == rows[3] == rows[5]

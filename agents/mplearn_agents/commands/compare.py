@@ -51,7 +51,8 @@ def run(args: argparse.Namespace) -> None:
     from rich.progress import Progress
     from rich.table import Table as Shown
 
-    from mplearn_agents.compare import Comparison, compare
+    from mplearn_agents.compare import compare
+    from mplearn_agents.comparison import Comparison
     from mplearn_agents.policies import POLICIES
     from mplearn_agents.rl.config import AlgorithmName, PriorUse
 

@@ -1,0 +1,113 @@
+"""What is compared: which contestants play which tasks, how often, and how agents are trained."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import get_args
+
+from mplearn.errors import InvalidValueError
+from mplearn_envs.performer import Dynamics
+from mplearn_envs.tasks import TASKS
+
+from .contest import Contest, Game
+from .policies import NEEDS_TASK, POLICIES
+from .rl import TrainingConfig
+from .rl.config import AlgorithmName, PriorUse, usual_prior, usual_steps
+
+DYNAMICS = get_args(Dynamics)
+SLOW = ("search",)  # plays as few episodes as the simulated robot does
+ROUND_STEPS = 20_000  # of a training: so much is lost at most when it is interrupted
+PROBES = 10  # episodes after each round, for the log
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What is compared.
+
+    Attributes:
+        tasks: Names of tasks.
+        dynamics: "kinematic", "simulated" or both. Agents are trained kinematically.
+        policies: Names of policies; those that do not suit a task are left out there, as is
+            "search" in "follow", where it foresees the demonstrator.
+        algorithms: What agents are trained with.
+        priors: What the transition prior is to them; "dqn" knows "feature" only. None: what
+            suits the task, see `usual_prior`.
+        seeds: Of the episodes, and of the trainings: one agent a seed.
+        episodes: Episodes a seed, kinematic.
+        simulated_episodes: Episodes a seed, simulated; and of policies that think long.
+        steps: Macro steps of a training; None: what suits the task, see `usual_steps`.
+        library: File of the library; None is the built-in one.
+    """
+
+    tasks: tuple[str, ...] = ("goal", "follow", "recite", "free")
+    dynamics: tuple[str, ...] = ("kinematic",)
+    policies: tuple[str, ...] = tuple(POLICIES)
+    algorithms: tuple[AlgorithmName, ...] = ("maskable-ppo",)
+    priors: tuple[PriorUse, ...] | None = None
+    seeds: tuple[int, ...] = (100, 101, 102, 103, 104)
+    episodes: int = 50
+    simulated_episodes: int = 4
+    steps: int | None = None
+    library: str | None = None
+
+    def __post_init__(self) -> None:
+        for what, allowed in (("tasks", TASKS), ("policies", POLICIES), ("dynamics", DYNAMICS)):
+            unknown = [name for name in getattr(self, what) if name not in allowed]
+            if unknown:
+                raise InvalidValueError(f"{what} must be among {tuple(allowed)}, not {unknown}")
+        if len(self.seeds) < 2:
+            raise InvalidValueError(f"an interval needs at least 2 seeds, not {self.seeds}")
+
+    @property
+    def n_contests(self) -> int:
+        """How many contests there are in all."""
+        return sum(len(self.contests(task)) for task in self.tasks) * len(self.seeds)
+
+    def contests(self, task: str) -> dict[str, list[Contest]]:
+        """Return the contests of a task: of each contestant, one a seed."""
+        trainings = self._trainings(task)
+        policies = [
+            name
+            for name in self.policies
+            if task in NEEDS_TASK.get(name, (task,)) and (name, task) != ("search", "follow")
+        ]
+        out = {}
+        for name in [*policies, *trainings]:
+            games = tuple(Game(dynamics, self._n(name, dynamics)) for dynamics in self.dynamics)
+            training = trainings.get(name)
+            out[name] = [
+                Contest(
+                    task, name, seed, games, self.library, training and replace(training, seed=seed)
+                )
+                for seed in self.seeds
+            ]
+        return out
+
+    def steps_of(self, task: str) -> int:
+        """Return the macro steps of a training."""
+        return usual_steps(task) if self.steps is None else self.steps
+
+    def _n(self, name: str, dynamics: str) -> int:
+        slow = dynamics == "simulated" or name in SLOW
+        return self.simulated_episodes if slow else self.episodes
+
+    def _trainings(self, task: str) -> dict[str, TrainingConfig]:
+        """Return how each agent is trained for a task, by its name; but for the seed."""
+        steps = self.steps_of(task)
+        uses: list[tuple[AlgorithmName, PriorUse]] = [
+            (algorithm, "feature" if algorithm == "dqn" else prior)
+            for algorithm in self.algorithms
+            for prior in self.priors or (usual_prior(task),)
+        ]
+        return {
+            f"{algorithm}, prior as {use}": TrainingConfig(
+                task=task,
+                algorithm=algorithm,
+                prior=use,
+                steps=steps,
+                library=self.library,
+                round_steps=min(steps, ROUND_STEPS),
+                episodes=PROBES,
+            )
+            for algorithm, use in uses
+        }
