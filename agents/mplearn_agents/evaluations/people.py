@@ -27,15 +27,10 @@ def learning(setting: Setting) -> Iterator[Table]:
 
 def presentations(setting: Setting) -> Iterator[Table]:
     """Presented once, twice, by halves and all at once."""
-    import numpy as np
-
-    from mplearn.evaluation import make_session
-    from mplearn.evaluation.experiments import Seen, by_person, presentation_table
+    from mplearn.evaluation.experiments import Seen, presentation_table
 
     yield presentation_table(
-        (person or "unnamed", Seen.of(make_session(own, np.random.default_rng(order))))
-        for person, own in by_person(setting.takes).items()
-        for order in range(setting.orders)
+        (session.person or "unnamed", Seen.of(session)) for _, session in setting.sessions
     )
 
 
@@ -49,14 +44,16 @@ def together(setting: Setting) -> Iterator[Table]:
 
 def prediction(setting: Setting) -> Iterator[Table]:
     """What comes next, against perfect labels: each repetition once, then four times."""
-    from mplearn.evaluation.experiments import foretell_people, prediction_table
+    from mplearn.evaluation.experiments import (
+        foretell_sessions,
+        observed_sessions,
+        prediction_table,
+    )
 
-    for executions in (1, 4):
-        yield prediction_table(
-            f"The next primitive, in sessions made of each person's takes ({executions} executions "
-            "of each repetition)",
-            foretell_people(setting.takes, min(setting.orders, 2), executions),
-        )
+    title = "The next primitive, in sessions made of each person's takes"
+    yield prediction_table(title, foretell_sessions(setting.sessions))
+    often = observed_sessions(setting.takes, orders=1, executions=4)
+    yield prediction_table(f"{title}, each repetition used four times", foretell_sessions(often))
 
 
 def anomaly(setting: Setting) -> Iterator[Table]:
@@ -70,7 +67,9 @@ def scaffolding(setting: Setting) -> Iterator[Table]:
     """Boundaries with and without what is known."""
     from mplearn.evaluation.experiments import scaffolding_table
 
-    yield scaffolding_table(setting.takes)
+    yield scaffolding_table(
+        session for i, (_, session) in enumerate(setting.sessions) if i % setting.orders < 2
+    )
 
 
 def generation(setting: Setting) -> Iterator[Table]:

@@ -28,12 +28,11 @@ def presentations(setting: Setting) -> Iterator[Table]:
 
 def prediction(setting: Setting) -> Iterator[Table]:
     """What comes next, against perfect labels."""
-    from mplearn.evaluation import observe
-    from mplearn.evaluation.experiments import foretell, prediction_table
+    from mplearn.evaluation.experiments import foretell_sessions, prediction_table
 
     yield prediction_table(
         "The next primitive, in sessions as they were recorded",
-        ((take.name, foretell(observe(take), take.labels)) for take in setting.takes),
+        foretell_sessions((take.name, take) for take in setting.takes),
     )
 
 

@@ -100,3 +100,10 @@ class Setting:
         from mplearn.evaluation.experiments import learn_people
 
         return list(learn_people(self.takes, self.orders))
+
+    @cached_property
+    def sessions(self) -> list[tuple[str, Recording]]:
+        """Each person's takes as sessions, in all orders, as the learner sees them."""
+        from mplearn.evaluation.experiments import observed_sessions
+
+        return list(observed_sessions(self.takes, self.orders))

@@ -15,9 +15,8 @@ from .learning import learning_table as learning_table
 from .peers import peers_table as peers_table
 from .people import learn_together as learn_together
 from .people import people_table as people_table
-from .prediction import foretell as foretell
 from .prediction import foretell_paper_sessions as foretell_paper_sessions
-from .prediction import foretell_people as foretell_people
+from .prediction import foretell_sessions as foretell_sessions
 from .prediction import prediction_table as prediction_table
 from .presentations import Seen as Seen
 from .presentations import presentation_table as presentation_table
@@ -25,3 +24,4 @@ from .scaffolding import scaffolding_table as scaffolding_table
 from .sessions import by_person as by_person
 from .sessions import learn_paper_sessions as learn_paper_sessions
 from .sessions import learn_people as learn_people
+from .sessions import observed_sessions as observed_sessions

@@ -16,9 +16,7 @@ from ...recording import FloatArray, LabelledSegment, Recording
 from ...tree import TreeConfig
 from ..matching import match_segments
 from ..observing import observe
-from ..sessions import SessionConfig, make_session
 from ..table import Table, percent
-from .sessions import by_person
 
 TOP = 3
 _ALL = 1_000_000
@@ -100,16 +98,13 @@ def foretell_paper_sessions(seeds: Iterable[int]) -> Iterator[tuple[str, Foretol
         yield f"paper_session({seed})", foretell(observe(session.recording), session.truth)
 
 
-def foretell_people(
-    takes: Iterable[Recording], orders: int = 2, executions: int = 1
+def foretell_sessions(
+    sessions: Iterable[tuple[str, Recording]],
 ) -> Iterator[tuple[str, Foretold]]:
-    """Foretell sessions of each person's takes; each repetition comes ``executions`` times."""
-    for person, own in by_person(takes).items():
-        for order in range(orders):
-            rng = np.random.default_rng(order)
-            session = make_session(own, rng, SessionConfig(executions=executions))
-            name = f"{person or 'unnamed'}, order {order}, {len(session.labels)} motions"
-            yield name, foretell(observe(session), session.labels)
+    """Foretell sessions, each of which has a name and labels."""
+    for name, session in sessions:
+        features = observe(session)
+        yield f"{name}, {len(session.labels)} motions", foretell(features, session.labels)
 
 
 def prediction_table(title: str, outcomes: Iterable[tuple[str, Foretold]]) -> Table:

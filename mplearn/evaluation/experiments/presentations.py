@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...body import view_of
+from ...errors import InvalidValueError
 from ...recording import FloatArray, IntArray, LabelledSegment, Recording, Segment
 from ...segmentation import make_segmenter
 from ...tree import Placement, PrimitiveTree, TreeConfig, form
@@ -56,12 +57,21 @@ class Seen:
 
     @classmethod
     def of(cls, recording: Recording, truth: Sequence[LabelledSegment] | None = None) -> Seen:
-        """Observe and segment a session; its own labels are the truth where none is given."""
+        """Observe and segment a session; its own labels are the truth where none is given.
+
+        Raises:
+            InvalidValueError: Fewer than four segments are found: they cannot be halved.
+        """
         features = observe(recording)
         frames = view_of(features.channels).see(features.frames)
         segmenter = make_segmenter("kohlmorgen-lemm", frames.shape[1], recording.rate_hz)
         truth = recording.labels if truth is None else truth
-        return cls(frames, tuple(segmenter.segment(frames)), tuple(truth), recording.rate_hz)
+        segments = tuple(segmenter.segment(frames))
+        if len(segments) < 4:
+            raise InvalidValueError(
+                f"session {recording.name!r} has {len(segments)} segments; 4 are needed"
+            )
+        return cls(frames, segments, tuple(truth), recording.rate_hz)
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -161,6 +171,7 @@ def halves(seen: Seen, config: TreeConfig) -> Presented:
         else:
             wrong += not label or rates.classes[primitive] != label
     n_classes = len({label.label for label in seen.truth})
+    found = max(found, 1)
     return Presented(len(known), n_classes, wrong / found, missed / found, float("nan"))
 
 

@@ -18,9 +18,7 @@ from ...segmentation import make_segmenter
 from ...tree import PrimitiveTree, TreeConfig
 from ..boundaries import BoundaryScore, score_boundaries
 from ..observing import observe
-from ..sessions import make_session
 from ..table import Table, percent
-from .sessions import by_person
 
 QUARTERS = 4
 N_STATES = 8
@@ -30,12 +28,11 @@ SLACK = 0.3  # nat a frame and channel by which a known motion may lie below its
 SHARE = 0.5  # of a channel's weight that depends on what the known motion moves
 
 
-def scaffolding_table(takes: Iterable[Recording], orders: int = 2) -> Table:
-    """Segment sessions of people's takes with and without what a tree has learned so far.
+def scaffolding_table(sessions: Iterable[Recording]) -> Table:
+    """Segment sessions with and without what a tree has learned so far.
 
     Args:
-        takes: Recordings of markers with labelled repetitions, of any number of people.
-        orders: Sessions a person.
+        sessions: Sessions whose labels are primitives.
 
     Returns:
         Boundary F1 in each quarter of the sessions, as learning proceeds.
@@ -43,16 +40,14 @@ def scaffolding_table(takes: Iterable[Recording], orders: int = 2) -> Table:
     scores: dict[str, list[list[BoundaryScore]]] = defaultdict(
         lambda: [[] for _ in range(QUARTERS)]
     )
-    for own in by_person(takes).values():
-        for order in range(orders):
-            session = make_session(own, np.random.default_rng(order))
-            features = observe(session)
-            frames = view_of(features.channels).see(features.frames)
-            for kind, hints in (("without", False), ("with", True)):
-                segments = segment_and_learn(frames, session.rate_hz, hints=hints)
-                for q in range(QUARTERS):
-                    part = _quarter(session.labels, q, len(frames))
-                    scores[kind][q].append(score_boundaries(segments, part, session.rate_hz))
+    for session in sessions:
+        features = observe(session)
+        frames = view_of(features.channels).see(features.frames)
+        for kind, hints in (("without", False), ("with", True)):
+            segments = segment_and_learn(frames, session.rate_hz, hints=hints)
+            for q in range(QUARTERS):
+                part = _quarter(session.labels, q, len(frames))
+                scores[kind][q].append(score_boundaries(segments, part, session.rate_hz))
     rows = []
     for kind, quarters in scores.items():
         pooled = [BoundaryScore.pooled(quarter) for quarter in quarters]

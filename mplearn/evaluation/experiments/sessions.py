@@ -10,7 +10,8 @@ import numpy as np
 from ...demonstrator import paper_session
 from ...learner import LearnerConfig, MotionLearner
 from ...recording import Recording
-from ..sessions import make_session
+from ..observing import observe
+from ..sessions import SessionConfig, make_session
 from .learning import Outcome, learn_session
 
 ORDERS = 5
@@ -36,6 +37,23 @@ def learn_people(takes: Iterable[Recording], orders: int = ORDERS) -> Iterator[t
             if order == 0:
                 compile_kernels(session)
             yield f"{person or 'unnamed'}, order {order}", learn_session(session)
+
+
+def observed_sessions(
+    takes: Iterable[Recording], orders: int = ORDERS, executions: int = 1
+) -> Iterator[tuple[str, Recording]]:
+    """Join each person's takes into sessions in several orders, as the learner sees them.
+
+    Args:
+        takes: Recordings with labelled repetitions, of any number of people.
+        orders: Sessions a person.
+        executions: How often each repetition comes in a session.
+    """
+    for person, own in by_person(takes).items():
+        for order in range(orders):
+            rng = np.random.default_rng(order)
+            session = make_session(own, rng, SessionConfig(executions=executions))
+            yield f"{person or 'unnamed'}, order {order}", observe(session)
 
 
 def compile_kernels(recording: Recording) -> None:
