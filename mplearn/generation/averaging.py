@@ -13,6 +13,8 @@ from numba import njit
 from ..recording import FloatArray, IntArray
 from .banded import factorise, multiply
 
+_WHITE = 1e-10  # of the variance, added to it: frames may otherwise determine one another
+
 
 def average_of_motions(
     means: FloatArray,
@@ -32,6 +34,7 @@ def average_of_motions(
     """
     shares, products = stretched(stays, n_frames)
     covariances = products @ variances
+    covariances[:, 0] += _WHITE * covariances[:, 0].max(axis=0)
     factorise(covariances)
     noise = rng.standard_normal((n_frames, means.shape[1]))
     return np.asarray(shares @ means + multiply(covariances, noise))

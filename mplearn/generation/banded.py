@@ -11,18 +11,16 @@ from numba import njit
 
 from ..recording import FloatArray
 
-_SINGULAR = 1e-12  # of a diagonal element: if less than this is left of it, that is rounding
-
 
 @njit(cache=True, error_model="numpy")
 def factorise(columns: FloatArray) -> None:
-    """Replace matrices, shape (T, B, D), by L; they may be positive semi-definite."""
+    """Replace positive definite matrices, shape (T, B, D), by L."""
     n_rows, n_band, n_channels = columns.shape
-    least, scale = _SINGULAR * columns[:, 0], np.empty(n_channels)
+    scale = np.empty(n_channels)
     for t in range(n_rows):
         column = columns[t]
         for d in range(n_channels):
-            scale[d] = 1.0 / np.sqrt(column[0, d]) if column[0, d] > least[t, d] else 0.0
+            scale[d] = 1.0 / np.sqrt(column[0, d])
         n = min(n_band, n_rows - t)
         for i in range(n):
             for d in range(n_channels):
