@@ -11,8 +11,9 @@ from mplearn.errors import InvalidValueError, MPLearnError
 
 VERSION = 2  # of agents: changes with networks, what they see, and what tasks show
 AlgorithmName: TypeAlias = Literal["maskable-ppo", "ppo", "dqn"]
-#: What the transition prior is to the policy: nothing but a feature; its initial logits; or what
-#: it is drawn to by a penalty on the divergence from it (instead of the entropy bonus).
+#: What the transition prior is to the policy: nothing but a feature (untrained, it waits as often
+#: as not, and else draws evenly); its initial logits; or what it is drawn to by a penalty on the
+#: divergence from it (instead of the entropy bonus).
 PriorUse: TypeAlias = Literal["feature", "logits", "regulariser"]
 
 
@@ -27,7 +28,7 @@ def usual_prior(task: str) -> PriorUse:
 
 def usual_steps(task: str) -> int:
     """Return for how many macro steps to train for a task: more where more must be found out."""
-    return 100_000 if task == "follow" else 40_000
+    return 80_000 if task == "follow" else 40_000
 
 
 @dataclass(frozen=True)

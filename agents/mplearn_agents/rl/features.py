@@ -11,6 +11,7 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
 from .encoding import FAR, LEAST_PRIOR, PRIOR, Scaling, width_of_slots
 
+LEGAL, LOG_PRIOR = "action_mask 0", "log prior"  # parts, see `Feature`
 LARGEST = -math.log(LEAST_PRIOR)  # log prior, see `log_prior`
 
 
@@ -78,13 +79,14 @@ def features_of(observation_space: spaces.Dict, capacity: int) -> list[Feature]:
         n_slots = width_of_slots(part, capacity)
         out += [Feature(f"{key} {k // capacity}", None, k % capacity) for k in range(n_slots)]
         out += [Feature(key, k, None) for k in range(spaces.flatdim(part) - n_slots)]
-    return out + [Feature("log prior", None, slot) for slot in range(capacity)]
+    return out + [Feature(LOG_PRIOR, None, slot) for slot in range(capacity)]
 
 
-def blocks_of(observation_space: spaces.Dict, capacity: int) -> list[list[int]]:
-    """Return the places of each block of slots, but for the log prior, shape (B, capacity)."""
+def blocks_of(observation_space: spaces.Dict, capacity: int) -> dict[str, list[int]]:
+    """Return the places of each block of slots, but for the log prior, by part."""
     blocks: dict[str, list[int]] = {}
     for place, feature in enumerate(features_of(observation_space, capacity)):
         if feature.slot is not None:
             blocks.setdefault(feature.part, []).append(place)
-    return list(blocks.values())[:-1]
+    del blocks[LOG_PRIOR]
+    return blocks
