@@ -1,10 +1,9 @@
-"""Sessions: executions of many primitives in one stream, by one person or several, with the truth.
+"""Sessions: executions of many primitives in one stream, by one person, with the truth.
 
 Recorded takes repeat one movement. A session joins executions from all of a person's takes in a
 Markov order, as a teacher would mix them, so that segmentation, clustering and the graph have
 something to find. Nothing is resampled; only the head of an execution is bent, over 0.2-0.6 s, so
-that it leaves from the posture in which the one before it ended. Several people's sessions make one
-stream, in which one body is replaced by another from one frame to the next.
+that it leaves from the posture in which the one before it ended.
 """
 
 from __future__ import annotations
@@ -12,13 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from ..errors import InvalidValueError, RecordingError
 from ..recording import FloatArray, LabelledSegment, Recording
-from .executions import RigidFit, fit_standing, split_repetitions, without_gaps
+from .executions import fit_standing, split_repetitions, without_gaps
 
 
 @dataclass(frozen=True)
@@ -78,7 +76,7 @@ def make_session(
         RecordingError: There are no takes, they do not match, or hold too few repetitions.
     """
     config = config or SessionConfig()
-    _check_alike(takes, "session", ("channels", "rate_hz", "person"))
+    check_alike(takes, "session", ("channels", "rate_hz", "person"))
     first = takes[0]
     split = split_repetitions(takes)
     filled = [without_gaps(take.frames) for take in split]
@@ -116,75 +114,17 @@ def make_session(
     )
 
 
-def join_people(
-    sessions: Sequence[Recording],
-    rng: np.random.Generator,
-    *,
-    interleaved: bool,
-    motions: int = 2,
-) -> Recording:
-    """Join the sessions of several people into one stream, in which nobody is announced.
-
-    One person's session comes after another's; or, interleaved, each is cut after every so many
-    motions, and who goes on is drawn in proportion to what is left of each session: as often as
-    not it is somebody else. Where the person changes, another body stands there from one frame to
-    the next: nothing is blended, though marker sessions are turned and shifted horizontally so that
-    all stand in the same place.
+def check_alike(recordings: Sequence[Recording], what: str, attributes: tuple[str, ...]) -> None:
+    """Check that recordings can be joined.
 
     Args:
-        sessions: One recording a person, labelled, as `make_session` or the demonstrator make them;
-            same columns, same rate.
-        rng: Source of the order.
-        interleaved: Whether the person changes within a session.
-        motions: Motions after which the person may change: the two of a repetition.
-
-    Returns:
-        The stream; each label names its person.
+        recordings: The recordings.
+        what: What they are joined to.
+        attributes: What they must agree in.
 
     Raises:
-        RecordingError: There are no sessions, they do not match, or one holds no labels.
+        RecordingError: There are none, or they differ.
     """
-    _check_alike(sessions, "stream", ("channels", "rate_hz"))
-    pieces = [
-        _cut(session, motions if interleaved else len(session.labels)) for session in sessions
-    ]
-    left = [list(reversed(each)) for each in pieces]
-    frames: list[FloatArray] = []
-    labels: list[LabelledSegment] = []
-    end = 0
-    before = -1
-    fit: RigidFit | None = None
-    while any(left):
-        weights = np.array([len(each) for each in left], dtype=np.float64)
-        if not interleaved and before >= 0 and left[before]:
-            weights = np.eye(len(left))[before]
-        at = int(rng.choice(len(left), p=weights / weights.sum()))
-        piece = left[at].pop()
-        if at != before and frames and piece.is_markers:
-            fit = _fit_seen(piece.frames, frames[-1])
-        frames.append(piece.frames if fit is None else fit.apply(piece.frames))
-        labels += [
-            replace(
-                label,
-                start=label.start + end,
-                end=label.end + end,
-                person=label.person or sessions[at].person,
-            )
-            for label in piece.labels
-        ]
-        end += len(piece)
-        before = at
-    return Recording(
-        frames=np.concatenate(frames),
-        rate_hz=sessions[0].rate_hz,
-        channels=sessions[0].channels,
-        name="interleaved" if interleaved else "block-wise",
-        labels=tuple(labels),
-    )
-
-
-def _check_alike(recordings: Sequence[Recording], what: str, attributes: tuple[str, ...]) -> None:
-    """Check that recordings can be joined."""
     if not recordings:
         raise RecordingError(f"a {what} needs at least one take")
     first = recordings[0]
@@ -195,33 +135,6 @@ def _check_alike(recordings: Sequence[Recording], what: str, attributes: tuple[s
                     f"the recordings of a {what} must agree in {name}: {other.name!r} differs "
                     f"from {first.name!r}"
                 )
-
-
-def _cut(session: Recording, motions: int) -> list[Recording]:
-    """Cut a session after every so many motions; pauses belong to what comes before them."""
-    if not session.labels or motions < 1:
-        raise RecordingError(
-            f"session {session.name!r} needs labels and pieces of at least one motion, not "
-            f"{len(session.labels)} and {motions}"
-        )
-    ends = [label.end for label in session.labels[motions - 1 :: motions]]
-    ends = [*(end for end in ends if end < session.labels[-1].end), len(session)]
-    return [session.sliced(a, b) for a, b in pairwise([0, *ends])]
-
-
-def _fit_seen(frames: FloatArray, before: FloatArray) -> RigidFit:
-    """Fit the first frame of markers to the last one before, by the markers that both show."""
-    source, target = (
-        frame.reshape(-1, 3) for frame in (_held(frames[::-1])[-1], _held(before)[-1])
-    )
-    seen = np.isfinite(source).all(axis=1) & np.isfinite(target).all(axis=1)
-    return fit_standing(source[seen].ravel(), target[seen].ravel())
-
-
-def _held(frames: FloatArray) -> FloatArray:
-    """Return frames in which a missing measurement is the one before it, if there is one."""
-    rows = np.where(np.isnan(frames), 0, np.arange(len(frames))[:, None])
-    return np.take_along_axis(frames, np.maximum.accumulate(rows, axis=0), axis=0)
 
 
 def _continue(

@@ -8,7 +8,8 @@ from scipy.stats import mannwhitneyu
 
 from mplearn.demonstrator import demonstrate
 from mplearn.evaluation import observe
-from mplearn.evaluation.experiments.anomaly import Judged, anomaly_table, found_motions
+from mplearn.evaluation.experiments.anomaly import found_motions
+from mplearn.evaluation.experiments.judged import Judged, anomaly_table
 from mplearn.evaluation.experiments.prediction import foretell, prediction_table
 from mplearn.library import AnomalyScore
 

@@ -8,7 +8,6 @@ import pytest
 from mplearn.demonstrator import demonstrate
 from mplearn.evaluation.experiments.activities import activities_in, true_activities
 from mplearn.evaluation.experiments.presentations import (
-    Seen,
     all_at_once,
     first_presentation,
     halves,
@@ -16,6 +15,7 @@ from mplearn.evaluation.experiments.presentations import (
     presentation_table,
     second_presentation,
 )
+from mplearn.evaluation.experiments.seen import Seen
 from mplearn.evaluation.partitions import agreement
 from mplearn.tree import TreeConfig
 

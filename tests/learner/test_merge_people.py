@@ -7,7 +7,7 @@ import pytest
 
 from mplearn import LearnerConfig, MotionLearner, Recording
 from mplearn.demonstrator import Person, demonstrate
-from mplearn.evaluation.sessions import join_people
+from mplearn.evaluation.streams import join_people
 from mplearn.learner import PersonChanged, Recognised, SegmentClosed, merge
 
 SCRIPT = ("BAR", "BAL") * 6

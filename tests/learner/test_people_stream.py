@@ -8,7 +8,7 @@ import pytest
 from mplearn import LearnerConfig, MotionLearner, Recording
 from mplearn.demonstrator import Person, demonstrate
 from mplearn.evaluation.experiments.people import learn_stream, people_table
-from mplearn.evaluation.sessions import join_people
+from mplearn.evaluation.streams import join_people
 from mplearn.learner import PersonChanged, PrimitiveBorn, SegmentClosed, TransitionSeen
 
 SCRIPT = ("BAR", "BAL") * 7

@@ -1,4 +1,4 @@
-"""Planted anomalies: are wrong motions and wrong orders told from right ones, and at what cost."""
+"""Planted anomalies: are wrong motions and wrong orders told from right ones."""
 
 from __future__ import annotations
 
@@ -18,10 +18,9 @@ from ..matching import match_segments
 from ..observing import observe
 from ..rates import rate_learning
 from ..sessions import SessionConfig, make_session
-from ..table import Table, percent
+from .judged import Judged
 from .sessions import by_person
 
-ALARM = 0.05
 UNKNOWN = ("SAR", "SAL", "TLO", "TLR", "TRO", "TRR", "RHR", "RWO", "RWI", "RHL")
 _LEARNED_SHARE = 0.75
 _UNUSED_SHARE = 0.4  # of a session: before its movements begin to be used up
@@ -38,56 +37,6 @@ class Motion:
 
     label: str
     frames: FloatArray
-
-
-@dataclass(frozen=True)
-class Judged:
-    """Scores of what is right and of what is wrong in one way."""
-
-    right: tuple[AnomalyScore, ...]
-    wrong: tuple[AnomalyScore, ...]
-
-    @property
-    def auc(self) -> float:
-        """Chance that a wrong one scores higher than a right one; ties count half."""
-        right = np.array([each.score for each in self.right])
-        wrong = np.array([each.score for each in self.wrong])
-        if not (right.size and wrong.size):
-            return float("nan")
-        return float((right[:, None] < wrong).mean() + 0.5 * (right[:, None] == wrong).mean())
-
-    def alarms(self, which: str) -> float:
-        """Return the share of the ``"right"`` or the ``"wrong"`` ones that raise an alarm."""
-        scores: tuple[AnomalyScore, ...] = getattr(self, which)
-        return float(np.mean([each.p_value <= ALARM for each in scores])) if scores else np.nan
-
-
-def anomaly_table(results: Iterable[tuple[str, Mapping[str, Judged]]]) -> Table:
-    """Return a table of what `judge_paper_session` and `judge_people` yielded, and all together."""
-    rows = []
-    pooled: dict[str, list[Judged]] = {}
-    for name, kinds in results:
-        for kind, judged in kinds.items():
-            rows.append((name, *_cells(kind, judged, judged.auc)))
-            pooled.setdefault(kind, []).append(judged)
-    for kind, each in pooled.items():
-        right = tuple(score for judged in each for score in judged.right)
-        wrong = tuple(score for judged in each for score in judged.wrong)
-        areas = [judged.auc for judged in each if judged.right and judged.wrong]
-        auc = float(np.mean(areas)) if areas else float("nan")
-        rows.append(("mean", *_cells(kind, Judged(right, wrong), auc)))
-    return Table(
-        "Planted anomalies, told by a library from what is usual",
-        ("session", "planted", "right / wrong", "AUC", "false alarms", "found"),
-        tuple(rows),
-        f"Alarm at a p-value of {ALARM} at most. Right motions: those of the stream after the "
-        "three quarters of it that were learned, of classes that have a primitive. Wrong motions: "
-        "of classes never shown; right ones of which half the channels follow another motion; "
-        "right ones that go half as far; and the same person's incorrect executions of what was "
-        "learned, alone and as whole repetitions (mean score of the two halves). Wrong orders: a "
-        "recognised primitive is replaced by one that never follows in the truth; right ones are "
-        "the successions themselves.",
-    )
 
 
 def judge_paper_session(seed: int) -> tuple[str, dict[str, Judged]]:
@@ -290,13 +239,3 @@ def _wrong_orders(
             right.append(library.score_order([*history, now])[-1])
             wrong.append(library.score_order([*history, planted])[-1])
     return Judged(tuple(right), tuple(wrong))
-
-
-def _cells(kind: str, judged: Judged, auc: float) -> tuple[str, ...]:
-    return (
-        kind,
-        f"{len(judged.right)} / {len(judged.wrong)}",
-        f"{auc:.3f}",
-        percent(judged.alarms("right")),
-        percent(judged.alarms("wrong")),
-    )

@@ -13,7 +13,8 @@ from ...learner import LearnerConfig, MotionLearner, PersonChanged, SegmentClose
 from ...recording import LabelledSegment, Recording
 from ..boundaries import score_boundaries
 from ..rates import rate_learning
-from ..sessions import join_people, make_session
+from ..sessions import make_session
+from ..streams import join_people
 from ..table import Table, percent
 from .learning import COLUMNS, NOTE, Outcome, mean_row, outcome_row
 from .sessions import by_person

@@ -11,7 +11,7 @@ import numpy as np
 from ...recording import FloatArray
 from ...tree import PrimitiveTree, Recogniser, TreeConfig
 from ..table import Table, percent
-from .presentations import Seen
+from .seen import Seen
 
 RATES = (None, 0.1, 0.05)
 HALVES = 4
