@@ -17,6 +17,7 @@ from mplearn_envs.control.footwork import Footwork, Lift, read_footwork
 from mplearn_envs.control.gravity import holding_torques
 from mplearn_envs.control.kinematics import places
 from mplearn_envs.control.pendulum import JERK_WEIGHT, plan_cog, zmp_along
+from mplearn_envs.control.reference import soles
 from mplearn_envs.control.stride import landing, sole_middles
 from mplearn_envs.experiments.model_error import disturb
 from mplearn_envs.robot import humanoid
@@ -171,6 +172,38 @@ def test_the_weight_takes_the_time_it_needs_from_where_it_rests():
     assert np.all(plan.zmp_margin_m > config.zmp_margin_m + config.model_error * moving - 2e-3)
     bold = Planner(HUMANOID, PlannerConfig(zmp_margin_m=-1.0)).plan(here, other, 2.0)
     assert bold.zmp_margin_m.min() < 0.0 and bold.duration_s < plan.duration_s < 2.0
+
+
+LEG_AHEAD = {"hip_pitch_r": -1.6, "hip_roll_r": 0.1}
+
+
+def test_a_foot_passes_the_other_one_and_does_not_meet_it():
+    inwards = LEG_AHEAD | {"hip_roll_r": 0.25}
+    raise_it = PLANNER.motion(sweep({}, inwards, 1.0), RATE_HZ)
+    still = PLANNER.motion(np.stack([posture({})] * 50), RATE_HZ)
+    up = PLANNER.plan(REST, raise_it, 0.5)
+    down = PLANNER.plan(up.end, still, 0.5)
+    for plan in (up, down):
+        assert plan.error.max() < 0.01
+        for q in plan.q:
+            left, right = soles(HUMANOID, q)
+            apart = np.maximum(
+                left.min(axis=0) - right.max(axis=0), right.min(axis=0) - left.max(0)
+            )
+            assert apart.max() > 0.01 or apart[2] > 0.0
+    simulation = started(seed=4)
+    assert not simulation.perform(up).fallen and not simulation.perform(down).fallen
+
+
+def test_out_of_a_deep_squat_the_robot_rises_before_it_raises_a_leg():
+    deep = PLANNER.motion(sweep({}, {"base_height": -0.38, "base_pitch": 0.6}, 1.0), RATE_HZ)
+    held = PLANNER.motion(np.stack([posture(LEG_AHEAD)] * 50), RATE_HZ)
+    squat = PLANNER.plan(REST, deep, 0.5)
+    assert squat.error.max() < 1e-3
+    plan = PLANNER.plan(squat.end, held, 0.5)
+    assert plan.end.lifted == 1 and plan.error.max() < 0.01
+    simulation = started(seed=5)
+    assert not simulation.perform(squat).fallen and not simulation.perform(plan).fallen
 
 
 NARROW = [0.0, 0.18, 0.0]

@@ -9,7 +9,7 @@ import numpy as np
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.robot import Robot
 
-from .course import Course, lay_out, stretches
+from .course import Course, Stretch, lay_out, stretches
 from .kinematics import forward
 from .legs import balanced_path
 from .momentum import ground_reaction, momenta, velocities
@@ -38,10 +38,13 @@ class Pace(NamedTuple):
     Attributes:
         speed: As a share of the human's.
         patience: By how much shifts of the weight and swings of a foot take longer than at least.
+        in_turn: Whether the body goes to where the motion begins while both feet are down, after
+            one has been lowered and before another is raised, and not meanwhile.
     """
 
     speed: float
     patience: float = 1.0
+    in_turn: bool = False
 
 
 class Draft(NamedTuple):
@@ -87,6 +90,11 @@ class Drafter:
         knees = np.isin(robot.leg_joints, [robot.joint_names.index(name) for name in robot.knees])
         joints[knees, 0] = np.maximum(joints[knees, 0], 0.5 * robot.guard_knee_rad)
         self._limits = np.vstack((self._reference.limits, joints, [[0.0, np.inf]] * 2))
+        self._standing = np.append(self._reference.rest[7 + robot.leg_joints], np.zeros(2))
+        sides = np.repeat(np.arange(2), [len(leg) for leg in robot.legs])
+        self._leg_columns = [
+            len(self._reference.limits) + np.flatnonzero(sides == s) for s in (0, 1)
+        ]
         rates = robot.per_joint("velocity")[robot.leg_joints]
         self._rates = np.concatenate((self._reference.velocity, rates, [np.inf] * 2))
 
@@ -123,9 +131,7 @@ class Drafter:
         before = np.concatenate((start.target, start.swing))
         before_rate = np.concatenate((start.velocity, start.swing_velocity))
         if footwork is None:
-            swing = np.broadcast_to(
-                np.append(start.swing[:-2], (0.0, 0.0)), (n_frames, len(start.swing))
-            )
+            swing = np.broadcast_to(self._standing, (n_frames, len(self._standing)))
         else:
             swing = np.hstack((footwork.legs, footwork.rise))
         limits = self._limits
@@ -133,7 +139,10 @@ class Drafter:
         gap = before - frames[0]
         length_s = motion.duration_s / speed
         allowed = self.config.blend_velocity * self._rates
-        needed_s = float(np.max(1.875 * np.abs(gap) / allowed))  # a quintic's peak velocity
+        counts = np.ones(len(gap))
+        for side in range(2):  # a foot that is down does not follow its leg's motion
+            counts[self._leg_columns[side]] = start.up[side]
+        needed_s = float(np.max(1.875 * counts * np.abs(gap) / allowed))  # a quintic's peak
         blend_s = max(needed_s, min(self.config.blend_s, 0.6 * length_s))
         wait_s = max(0.0, needed_s - 0.6 * length_s)
 
@@ -142,6 +151,9 @@ class Drafter:
         apart = float(np.linalg.norm(middles[0] - middles[1]))
         rise = float(start.swing[-2:].max())
         parts = stretches(n_frames, footwork, start.lifted, rise, to_foot, apart)
+        lowers = parts[0].up >= 0 and parts[0].first == parts[0].last
+        if pace.in_turn:
+            parts.insert(int(lowers), Stretch(0, 0, -1, -1, blend_s))
         course = lay_out(parts, 1.0 / (motion.rate_hz * speed), knot_s, wait_s, pace.patience)
         at = course.progress
         time = np.arange(1.0, len(at) + 1.0) * knot_s
@@ -151,7 +163,16 @@ class Drafter:
         moves = wait_s == 0 and parts[0].first < parts[0].last
         first = (frames[1] - frames[0]) * motion.rate_hz * speed if moves else 0.0
         heights = path[:, -2:].copy()
-        path += fading(time, blend_s, gap, before_rate - first)
+        rate = before_rate - first
+        late_s = course.ends[0] * knot_s if pace.in_turn and lowers else 0.0
+        fades = fading(np.maximum(time - late_s, 0.0), blend_s, gap, 0.0 * rate)
+        fades += fading(time, blend_s, 0.0 * gap, rate)
+        for side, (begin_s, end_s) in self._swings(course).items():
+            of_it = self._leg_columns[side]
+            late = np.maximum(time - begin_s, 0.0)
+            at_once = rate[of_it] if begin_s == 0.0 else np.zeros(len(of_it))
+            fades[:, of_it] = fading(late, end_s - begin_s, gap[of_it], at_once)
+        path += fades
         path[:, -2:] = plan_rise(course, heights, start, path[:, -2:])
         path = np.clip(path, limits[:, 0], limits[:, 1])
         width = len(self._rates) - 2
@@ -159,6 +180,15 @@ class Drafter:
             path[:, :width], before[:width], self._rates[:width] * knot_s
         )
         return course, path
+
+    def _swings(self, course: Course) -> dict[int, tuple[float, float]]:
+        """Return when which foot is raised or lowered while the motion waits for it [s]."""
+        out, first = {}, 0
+        for part, last in zip(course.stretches, course.ends, strict=True):
+            if part.up >= 0 and part.first == part.last:
+                out[part.up] = (first * self.knot_s, last * self.knot_s)
+            first = last
+        return out
 
     def _follow(
         self, start: Reference, targets: FloatArray, ground: FloatArray, cog: FloatArray

@@ -12,6 +12,9 @@ from .reference import ReferenceRobot, base_rotation
 from .velocity_ik import Stance, advance, errors, rates
 
 TOLERANCE = 1e-8  # [m, rad] to which the feet, COG and base follow
+OFF_M = 0.08  # by no more than this a foot's height is its leg's and not the one it shall have
+APART_M = 0.02  # between a foot and the one that it passes, where it is
+LOW_M = 0.2  # not much higher than this
 _MAX_ITERATIONS = 12
 
 
@@ -76,7 +79,7 @@ def balanced_path(
         for iteration in range(_MAX_ITERATIONS + 1):
             pose = forward(robot.tree, q)
             for side in range(2):
-                _aim(robot, stance, side, q, ground[k, side], swing[k])
+                _aim(robot, stance, side, q, ground[k], swing[k])
             rows = errors(stance, pose, height, orientation)
             worst[k + 1] = np.max(np.abs(rows))
             if worst[k + 1] < TOLERANCE or iteration == _MAX_ITERATIONS:
@@ -99,13 +102,17 @@ def _aim(
     ground: FloatArray,
     swing: FloatArray,
 ) -> None:
-    """Write where a foot shall be: on the ground, or as the leg's motion has it, or in between."""
+    """Write where a foot shall be: on the ground, or as the leg's motion has it, or in between.
+
+    On its way it passes the other foot, and does not meet it.
+    """
     n_legs = stance.leg_joints.shape[0]
     rise, share = swing[n_legs + side], stance.carried[side]
     flat = robot.stance.foot_rotation[side]
-    rotation = about_vertical(ground[2], flat)
+    there_x, there_y, yaw = ground[side]
+    rotation = about_vertical(yaw, flat)
     height = robot.stance.foot_position[side, 2]
-    x, y, z = ground[0], ground[1], height + rise
+    x, y, z = there_x, there_y, height + rise
     if share > 0.0:
         there = q.copy()
         for i in range(n_legs):
@@ -118,11 +125,29 @@ def _aim(
         z += _lowest(robot.corners[side], flat) - _lowest(robot.corners[side], rotation)
         x += share * (pose.position[foot, 0] - x)
         y += share * (pose.position[foot, 1] - y)
-        z += share * (pose.position[foot, 2] - z)
+        low = min(max(1.5 - rise / LOW_M, 0.0), 1.0)
+        aside = share * low * _too_near(robot, side, x, y, ground[1 - side])
+        x -= aside * np.sin(ground[1 - side, 2])
+        y += aside * np.cos(ground[1 - side, 2])
+        z += share * OFF_M * np.tanh((pose.position[foot, 2] - z) / OFF_M)
     stance.foot_position[side, 0] = x
     stance.foot_position[side, 1] = y
     stance.foot_position[side, 2] = z
     stance.foot_rotation[side] = rotation
+
+
+@njit(cache=True)
+def _too_near(robot: ReferenceRobot, side: int, x: float, y: float, other: FloatArray) -> float:
+    """Return how far a foot must go to the left so that it clears the one that stands [m]."""
+    corners = robot.corners[side]
+    length = corners[:, 0].max() - corners[:, 0].min()
+    width = corners[:, 1].max() - corners[:, 1].min()
+    c, s = np.cos(other[2]), np.sin(other[2])
+    ahead = c * (x - other[0]) + s * (y - other[1])
+    aside = c * (y - other[1]) - s * (x - other[0])
+    beside = min(max(2.0 - abs(ahead) / length, 0.0), 1.0)
+    missing = (width + APART_M) * beside - (aside if side == 0 else -aside)
+    return max(missing, 0.0) * (1.0 if side == 0 else -1.0)
 
 
 @njit(cache=True)

@@ -164,7 +164,10 @@ class Planner:
         What moving masses add to the zero-moment point falls with the square of the pace.
         """
         if draft.error.max() > OUT_OF_REACH:
-            return pace
+            carries_on = motion.footwork is not None and start.lifted == motion.footwork.up_at(
+                False
+            )
+            return pace if start.lifted >= 0 and carries_on else pace._replace(in_turn=True)
         base = np.vstack((start.target[:N_BASE], draft.targets[:, :N_BASE]))
         velocity = np.diff(np.hstack((base, draft.q[:, 7:])), axis=0) / self._drafter.knot_s
         excess = float(np.max(np.abs(velocity) / self._velocity))
