@@ -125,9 +125,24 @@ def agglomerate(
     Returns:
         The group of each leaf, named by its first one, shape (n,).
     """
-    own = (known.people[:, None] == known.people) & (direct > config.link_own)
-    barred = own | (image < config.sided * direct) | known.apart
-    return np.asarray(_agglomerate(direct, known.together, barred, config.link, config.reach))
+    own = known.people[:, None] == known.people
+    barred = own & (direct > config.link_own) | (image < config.sided * direct) | known.apart
+    at = np.flatnonzero(known.firm | ~_covered(direct, own, known.firm))
+    pairs = np.ix_(at, at)
+    groups = np.arange(len(direct))
+    groups[at] = at[
+        _agglomerate(direct[pairs], known.together[pairs], barred[pairs], config.link, config.reach)
+    ]
+    return groups
+
+
+def _covered(direct: FloatArray, own: BoolArray, firm: BoolArray) -> BoolArray:
+    """Return what waits though its person has the leaf that it is nearest to by now."""
+    if not firm.any():
+        return np.zeros(len(direct), dtype=np.bool_)
+    leaves = np.flatnonzero(firm)
+    nearest = leaves[direct[:, leaves].argmin(axis=1)]
+    return np.asarray(~firm & own[np.arange(len(direct)), nearest])
 
 
 @njit(cache=True)

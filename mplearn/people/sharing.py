@@ -140,10 +140,11 @@ class Sharing:
             self._measure_offsets()
         self._tidy(person)
         home = self._home(person, placement.node_id, number)
+        new = home in change.born and not any(home in split.into for split in change.splits)
         return Placement(
             number,
             home if home != ROOT else said,
-            said != ROOT,
+            said != ROOT and not new,
             placement.distance,
             min(placement.ratio, ratio),
             **change._replace(moved=tuple(m for m in change.moved if m[0] != number))._asdict(),

@@ -198,3 +198,19 @@ def test_a_shape_is_posture_and_movement():
 def test_rules_out_of_range_are_refused(wrong):
     with pytest.raises(InvalidValueError, match=next(iter(wrong))):
         PeopleConfig(**wrong)
+
+
+def test_what_waits_does_not_bar_the_leaf_that_it_is_most_like():
+    rng = np.random.default_rng(5)
+    movements = 3 * rng.normal(size=(3, 40))
+    new = movements[0] + 0.3 * rng.normal(size=40)  # a leaf of the second person, and what waits
+    rows = [*movements, new, movements[1] + 0.1, 0.5 * (new + movements[0])]
+    shapes = Shape(np.zeros((6, 4)), np.array(rows))
+    known = known_of(np.array([0, 0, 0, 1, 1, 1]))
+    rules = replace(RULES, link_own=1e-6)
+    for firm, wanted in ((True, [0, 1, 2, 3, 1, 0]), (False, [0, 1, 2, 0, 1, 5])):
+        known = known._replace(firm=np.array([True] * 5 + [firm]))
+        movement = shapes.movement.copy()
+        movement[5] += 0.02 * (1 if firm else -1) * (movements[0] - new)
+        groups = solve(table_of(Shape(shapes.posture, movement)), known, 2, rules).groups
+        assert same_groups(groups, np.array(wanted))
