@@ -27,7 +27,7 @@ def retime(
 
     The postures passed through stay the same; only when they are passed changes. Each primitive
     has one slow-down, the smallest that limits allow while the others stay (a smaller one would
-    make the motion shorter by about 1 % at most); around a join it changes gradually. Limits hold
+    make the motion shorter by about 2 % at most); around a join it changes gradually. Limits hold
     for `Trajectory.velocities` and `Trajectory.accelerations` of what is returned.
 
     Args:
