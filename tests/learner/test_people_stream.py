@@ -106,3 +106,18 @@ def test_a_stream_holds_every_motion_once_in_its_persons_order(sessions, interle
     assert len(changes_of(stream)) == 1 if not interleaved else len(changes_of(stream)) > 3
     again = join_people(sessions, np.random.default_rng(0), interleaved=interleaved)
     assert np.array_equal(stream.frames, again.frames, equal_nan=True)
+
+
+def test_people_of_one_size_are_taken_for_one_and_nothing_is_mixed_up() -> None:
+    people = (
+        Person("brisk", tempo={"BAR": 0.9, "BAL": 0.9}, joint_reach={"elbow_l": 1.05}),
+        Person("calm", tempo={"BAR": 1.1, "BAL": 1.1}, joint_reach={"shoulder_pitch_r": 0.95}),
+    )
+    own = [demonstrate(SCRIPT, seed=i, person=p).recording for i, p in enumerate(people)]
+    stream = join_people(own, np.random.default_rng(3), interleaved=True)
+    outcome = learn_stream(stream, interleaved=True)
+    learner, rates = outcome.learning.learner, outcome.learning.rates
+    assert learner.tree.people == (0,)
+    assert sorted(rates.classes.values()) == ["BAL", "BAR"]
+    assert rates.n_wrong == 0
+    assert rates.n_inside >= 0.9 * rates.n_motions
