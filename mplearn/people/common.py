@@ -61,6 +61,7 @@ def common_recogniser(
             "floor": floor,
             "numbers": np.concatenate([begins[p] + bank["numbers"] for p, bank in banks.items()]),
             "columns": np.concatenate([bank["columns"] for bank in banks.values()]),
+            "duration": np.concatenate([bank["duration"] for bank in banks.values()]),
         },
         "index": next(iter(states.values()))["index"]
         | {

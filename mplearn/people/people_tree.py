@@ -67,9 +67,6 @@ class PeopleTree:
     def _new_tree(self) -> PrimitiveTree:
         return PrimitiveTree(self.config, self.n_channels, self.rate_hz, self.groups)
 
-    def _new_sharing(self) -> Sharing:
-        return Sharing(self.config, self.people_config, self._trees, self._next_id, self.mirror)
-
     # ---- looking
 
     @property
@@ -183,8 +180,7 @@ class PeopleTree:
         if self.n_seen == 0:
             self._trees = {person: next(iter(self._trees.values()))}
         elif person not in self._trees:
-            if self._sharing is None:
-                self._sharing = self._new_sharing()
+            self.sharing()
             self._trees[person] = self._new_tree()
         placement = self._trees[person].insert(frames)
         if placement.refused:
@@ -262,7 +258,9 @@ class PeopleTree:
     def sharing(self) -> Sharing:
         """Return what people share; where there is one person, as if others were to come."""
         if self._sharing is None:
-            self._sharing = self._new_sharing()
+            self._sharing = Sharing(
+                self.config, self.people_config, self._trees, self._next_id, self.mirror
+            )
         return self._sharing
 
     def adopt(self, trees: dict[int, PrimitiveTree], n_seen: int) -> None:
@@ -291,8 +289,7 @@ class PeopleTree:
             self._trees[int(person)].load_state(kept)
         self._sharing = None
         if state["sharing"] is not None:
-            self._sharing = self._new_sharing()
-            self._sharing.load_state(state["sharing"])
+            self.sharing().load_state(state["sharing"])
 
     # ---- inside
 
