@@ -17,6 +17,7 @@ from .control.planner import Planner
 from .control.reference import Reference, reference_robot, rest_reference
 
 SLOWER = 0.8  # share of the speed that is tried next
+_AT_LIMIT = 1e-3  # so near its limit a joint is what does not reach [rad]
 ProblemKind: TypeAlias = Literal["flight", "limit", "velocity", "reach", "torque", "balance"]
 
 
@@ -48,7 +49,7 @@ class Problem:
 
     Attributes:
         kind: What is violated.
-        where: The joint, channel or foot concerned.
+        where: The joints, channel or foot concerned.
         value: What the motion needs.
         allowed: What is allowed.
     """
@@ -192,10 +193,16 @@ class FeasibilityCheck:
         return (Problem("velocity", "the joints", wanted / speed, 1.0 / self.config.slowest),)
 
     def _out_of_reach(self, plan: Plan) -> tuple[Problem, ...]:
-        worst = float(plan.error.max())
+        knot = int(np.argmax(np.nan_to_num(plan.error, nan=np.inf)))
+        worst = float(plan.error[knot])
         if worst <= self.config.reach_error:
             return ()
-        return (Problem("reach", "feet, COG or base", worst, self.config.reach_error),)
+        robot = self.planner.robot
+        legs, limits = robot.leg_joints, reference_robot(robot).stance.limits
+        angles = plan.q[knot, 7:][legs]
+        at_limit = (angles < limits[:, 0] + _AT_LIMIT) | (angles > limits[:, 1] - _AT_LIMIT)
+        where = ", ".join(robot.joint_names[j] for j in legs[at_limit]) or "feet, COG or base"
+        return (Problem("reach", where, worst, self.config.reach_error),)
 
     def _load(self, plan: Plan) -> tuple[float, str]:
         """Return the largest share of a torque limit, and whose that is."""

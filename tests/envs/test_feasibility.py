@@ -68,6 +68,8 @@ def test_a_squat_too_deep_for_the_legs_is_out_of_reach():
     deep = sweep({}, {"base_height": -0.47}, 2.0)
     verdict = CHECK.judge(deep, RATE_HZ, 0.5)
     assert not verdict.feasible and "reach" in kinds(verdict)
+    where = next(each.where for each in verdict.problems if each.kind == "reach")
+    assert where.startswith("ankle_pitch_l, ankle_pitch_r")
 
 
 def test_torque_and_balance_limits_are_kept():

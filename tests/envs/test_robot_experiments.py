@@ -3,7 +3,13 @@
 import numpy as np
 from standing_library import standing_library
 
-from mplearn_envs.experiments import push_table, random_walks, speed_table, walk_table
+from mplearn_envs.experiments import (
+    learned_table,
+    push_table,
+    random_walks,
+    speed_table,
+    walk_table,
+)
 from mplearn_envs.experiments.model_error import disturb
 from mplearn_envs.robot import humanoid
 from mplearn_envs.simulation import Simulation
@@ -21,6 +27,14 @@ def test_random_walks_count_what_happened():
     assert [row[4] for row in table.rows] == ["0", "0"]
     performed = speed_table(library, speeds=(0.5,)).rows[0][1:4]
     assert sum(float(cell.split()[0]) for cell in performed) > 99.0
+
+
+def test_any_primitive_may_follow_any_other():
+    (row,) = learned_table([("me", standing_library())], seeds=(1, 2), n_primitives=4).rows
+    assert row[0] == "me" and row[3] == "2 x 4" and row[4] == "0"
+    feasible, learned = (int(number) for number in row[1].split(" of "))
+    assert feasible == learned - 1 and row[6].startswith("jump: flight")
+    assert 0 < int(row[2]) < feasible
 
 
 def test_the_model_error_is_what_was_asked_for():

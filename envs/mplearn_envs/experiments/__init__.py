@@ -1,5 +1,6 @@
 """Experiments with the robot: each returns a table."""
 
+from .learned import learned_table as learned_table
 from .pushes import push_table as push_table
 from .walks import Walk as Walk
 from .walks import primitive_table as primitive_table

@@ -111,14 +111,14 @@ def random_walks(
             for seed in seeds:
                 rng = np.random.default_rng(seed)
                 walk = Walk(speed, lifting)
-                _walk(walk, library, known, allowed, planner, n_primitives, error, rng)
+                go(walk, library, known, allowed, planner, n_primitives, error, rng)
                 out.append(walk)
     return out
 
 
-def _walk(
+def go(
     walk: Walk,
-    library: PrimitiveLibrary,
+    library: PrimitiveLibrary | None,
     known: dict[int, Skill],
     allowed: list[int],
     planner: Planner,
@@ -126,6 +126,18 @@ def _walk(
     error: float,
     rng: np.random.Generator,
 ) -> None:
+    """Walk, until the end or a fall.
+
+    Args:
+        walk: What came of it is written here.
+        library: Whose transitions are followed; None follows any primitive by any.
+        known: Its primitives.
+        allowed: Ids of those that may be performed.
+        planner: Plans for the robot.
+        n_primitives: Primitives in a row.
+        error: Largest model error, as a share.
+        rng: Source of randomness.
+    """
     simulation = Simulation(planner.robot)
     disturb(simulation.model, error, rng)
     simulation.reset()
@@ -147,10 +159,10 @@ def _walk(
 
 
 def _next(
-    library: PrimitiveLibrary, last: int | None, allowed: list[int], rng: np.random.Generator
+    library: PrimitiveLibrary | None, last: int | None, allowed: list[int], rng: np.random.Generator
 ) -> int:
     weight = np.ones(len(allowed))
-    if last is not None:
+    if last is not None and library is not None:
         prior = dict(zip(library.graph.ids, library.graph.prior(last), strict=True))
         chosen = np.array([prior.get(id, 0.0) for id in allowed])
         weight = chosen if chosen.sum() > 0 else weight
@@ -191,8 +203,8 @@ def _moved(place: FloatArray) -> FloatArray:
     return np.array([c * x + s * y, c * y - s * x, np.arctan2(np.sin(turn), np.cos(turn))])
 
 
-def walk_table(walks: Iterable[Walk]) -> Table:
-    """Return one row for each speed and choice of primitives."""
+def walk_table(walks: Iterable[Walk], robot: str = "robot") -> Table:
+    """Return one row for each speed and choice of primitives; ``robot`` names who walks."""
     rows = []
     for speed, lifting, group in _grouped(walks):
         steps = [step for walk in group for step in walk.steps]
@@ -210,7 +222,7 @@ def walk_table(walks: Iterable[Walk]) -> Table:
             )
         )
     return Table(
-        "Random walks in simulation, masses, gains and friction wrong by up to 10 %",
+        f"Random walks of {robot!r} in simulation, masses, gains and friction wrong by up to 10 %",
         ("speed", "feet", "walks x primitives", "kinds", "falls", *_COLUMNS, "minutes"),
         tuple(rows),
         _NOTE,

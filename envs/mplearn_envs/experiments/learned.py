@@ -1,0 +1,69 @@
+"""What a robot performs of libraries learned from people, in any order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from mplearn.evaluation.table import Table
+from mplearn.library import PrimitiveLibrary
+from mplearn_envs.control import Planner
+from mplearn_envs.robot import Robot, humanoid
+
+from .walks import Walk, go, skills
+
+
+def learned_table(
+    libraries: Iterable[tuple[str, PrimitiveLibrary]],
+    seeds: Sequence[int],
+    n_primitives: int = 60,
+    speed: float = 0.5,
+    error: float = 0.1,
+    robot: Robot | None = None,
+) -> Table:
+    """Return what is feasible of each library, why the rest is not, and walks in any order.
+
+    Any primitive follows any other, which asks more of the robot than what was demonstrated: out of
+    a squat it must raise a leg.
+
+    Args:
+        libraries: What was learned, by name.
+        seeds: One walk each; masses, gains and friction are drawn anew for each.
+        n_primitives: Primitives in a row.
+        speed: As a share of the human's.
+        error: Largest model error, as a share.
+        robot: Who performs; None is the humanoid.
+    """
+    planner = Planner(robot or humanoid())
+    rows = []
+    for name, library in libraries:
+        known = skills(library, planner, speed)
+        able = [id for id, skill in known.items() if skill.verdict.feasible]
+        walks = [Walk(speed, lifting=True) for _ in seeds]
+        for walk, seed in zip(walks, seeds, strict=True):
+            if able:
+                rng = np.random.default_rng(seed)
+                go(walk, None, known, able, planner, n_primitives, error, rng)
+        steps = [step for walk in walks for step in walk.steps]
+        lifting = sum(known[id].lifts for id in able)
+        refused = (s for s in known.values() if not s.verdict.feasible)
+        rows.append(
+            (
+                name,
+                f"{len(able)} of {len(known)}",
+                str(lifting),
+                f"{len(walks)} x {max(len(walk.steps) for walk in walks)}",
+                str(sum(bool(walk.fell) for walk in walks)),
+                f"{100 * max((step[1] for step in steps), default=np.nan):.2f}",
+                "; ".join(f"{s.name}: {s.verdict.problems[0]}" for s in refused) or "-",
+            )
+        )
+    return Table(
+        f"What robot {planner.robot.name!r} performs of what it learned from people",
+        ("learned from", "feasible", "lift a foot", "walks", "falls", "COG off [cm]", "refused"),
+        tuple(rows),
+        f"At {speed:g} of the human's speed; masses, gains and friction wrong by up to "
+        f"{100 * error:.0f} %; any primitive follows any other. Feet that stand apart in the "
+        "recording stand side by side here, and soles are flat.",
+    )
