@@ -94,8 +94,9 @@ def inverse_kinematics(setting: Setting) -> Iterator[Table]:
 
 
 def walks(setting: Setting) -> Iterator[Table]:
-    """The robot walks at random on what was learned."""
+    """The robot walks at random on what was learned, and in any order."""
     from mplearn.learner import LearnerConfig, MotionLearner
+    from mplearn_envs.experiments import learned_table
 
     from ..walk_table import walk_table
 

@@ -23,6 +23,22 @@ def walks(setting: Setting) -> Iterator[Table]:
     yield speed_table(library)
 
 
+def other_robots(setting: Setting) -> Iterator[Table]:
+    """The same walks of the Unitree G1 at half speed, where its model is installed."""
+    from mplearn.errors import MissingDependencyError
+    from mplearn_envs.experiments import random_walks, speed_table, walk_table
+    from mplearn_envs.library_source import LibrarySource
+    from mplearn_envs.robot import unitree_g1
+
+    try:
+        robot = unitree_g1()
+    except MissingDependencyError:
+        return
+    library = LibrarySource(None).now()
+    yield walk_table(random_walks(library, setting.seeds, speeds=(0.5,), robot=robot), robot.name)
+    yield speed_table(library, robot)
+
+
 def pushes(_: Setting) -> Iterator[Table]:
     """The largest impulse at the chest that the robot survives."""
     from mplearn_envs.experiments import push_table
@@ -30,4 +46,4 @@ def pushes(_: Setting) -> Iterator[Table]:
     yield push_table()
 
 
-EVALUATIONS = {"walks": walks, "pushes": pushes}
+EVALUATIONS = {"walks": walks, "other-robots": other_robots, "pushes": pushes}
