@@ -112,6 +112,7 @@ def walks(setting: Setting) -> Iterator[Table]:
     performable = [(name, library) for name, library in walked if library.body and len(library)]
     if performable:
         yield walk_table(performable, setting.seeds)
+        yield learned_table(performable, setting.seeds)
 
 
 def _filled(table: Table) -> Iterator[Table]:
