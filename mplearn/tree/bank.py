@@ -15,6 +15,8 @@ from . import form
 from .config import TreeConfig
 from .rows import Rows
 
+_STEEPNESS = 4.0  # a segment twice as long, as two motions in one are, is three times as far
+
 
 class Exemplar(NamedTuple):
     """A segment in the form in which it is compared, and its model.
@@ -27,6 +29,7 @@ class Exemplar(NamedTuple):
         log_stay: Shape (N,).
         log_next: Shape (N,).
         own: Log-likelihood of the points under the model, shape ().
+        duration: How long the segment lasts [frame], shape ().
     """
 
     columns: FloatArray
@@ -36,6 +39,7 @@ class Exemplar(NamedTuple):
     log_stay: FloatArray
     log_next: FloatArray
     own: FloatArray
+    duration: FloatArray
 
 
 class ExemplarBank:
@@ -59,7 +63,7 @@ class ExemplarBank:
             (n_channels, config.form.n_points),
             *(per_state, per_state, per_state),
             *(per_transition, per_transition),
-            (),
+            *((), ()),
         )
 
     def __contains__(self, number: int) -> bool:
@@ -74,8 +78,10 @@ class ExemplarBank:
         """Return an exemplar."""
         return Exemplar(*self._rows.read(self._slots[number]))
 
-    def model(self, points: FloatArray) -> Exemplar:
+    def model(self, points: FloatArray, duration: float = 1.0) -> Exemplar:
         """Model the points of a segment, shape (P, D); the bank does not remember it.
+
+        Its duration may be in any unit; by default all last equally long.
 
         They are rounded to single precision first, so that a stored recogniser is small and yet
         decides as the tree does.
@@ -94,7 +100,7 @@ class ExemplarBank:
         own = np.array(model.score(points, self._weights))
         columns = np.ascontiguousarray(points.T)
         parts = model.means, model.variances, model.log_norms, model.log_stay, model.log_next
-        return Exemplar(columns, *parts, own)
+        return Exemplar(columns, *parts, own, np.array(float(duration)))
 
     def add(self, number: int, exemplar: Exemplar) -> None:
         """Remember an exemplar."""
@@ -109,7 +115,8 @@ class ExemplarBank:
         """Model all exemplars again, with another variance floor."""
         self.floor = np.array(floor, dtype=np.float64)
         for number, slot in self._slots.items():
-            self._rows.write(slot, self.model(self[number].columns.T))
+            exemplar = self[number]
+            self._rows.write(slot, self.model(exemplar.columns.T, float(exemplar.duration)))
 
     def profile(self, exemplar: Exemplar) -> FloatArray:
         """Return the points times the root of their weights, shape (D * P,); 0 where missing."""
@@ -126,22 +133,31 @@ class ExemplarBank:
             mean = np.nan_to_num(columns).mean(axis=0)
         return np.asarray((mean * self._roots).ravel())
 
-    def distances(self, exemplar: Exemplar, others: Sequence[int]) -> FloatArray:
+    def distances(
+        self, exemplar: Exemplar, others: Sequence[int], *, forms_only: bool = False
+    ) -> FloatArray:
         """Return the distance from an exemplar to others of the bank, shape (k,).
 
-        It is the symmetric likelihood distance [nat a frame] to the configured power.
+        It is the symmetric likelihood distance [nat a frame] to the configured power; it grows
+        where one lasts longer than the other by more than motions do, unless forms only count.
         """
         slots = self._slots_of(others)
         raw = np.empty(len(slots))
         for arrays, rows, here in self._rows.parted(slots):
             raw[here] = _distances(exemplar, arrays, rows, self._weights)
-        return np.asarray(np.maximum(raw, 0.0) ** self.config.power)
+        distances = np.maximum(raw, 0.0) ** self.config.power
+        if not forms_only and np.isfinite(self.config.tempo):
+            longer = self._rows.gather(slots, _DURATION) / exemplar.duration
+            beyond = np.maximum(longer, 1 / longer) / self.config.tempo
+            distances *= np.maximum(beyond, 1.0) ** _STEEPNESS
+        return np.asarray(distances)
 
-    def matrix(self, numbers: Sequence[int]) -> FloatArray:
+    def matrix(self, numbers: Sequence[int], *, forms_only: bool = False) -> FloatArray:
         """Return the distances among exemplars, shape (k, k)."""
         matrix = np.zeros((len(numbers), len(numbers)))
         for i, number in enumerate(numbers[1:], start=1):
-            matrix[i, :i] = matrix[:i, i] = self.distances(self[number], numbers[:i])
+            row = self.distances(self[number], numbers[:i], forms_only=forms_only)
+            matrix[i, :i] = matrix[:i, i] = row
         return matrix
 
     def subset(self, numbers: Iterable[int]) -> ExemplarBank:
@@ -151,11 +167,12 @@ class ExemplarBank:
     def points(self, numbers: Iterable[int] | None = None) -> dict[str, Any]:
         """Return what `from_points` needs of all exemplars, or of some; models follow from it."""
         numbers = sorted(self._slots if numbers is None else numbers)
-        columns = self._rows.gather(self._slots_of(numbers), _COLUMNS)
+        slots = self._slots_of(numbers)
         return {
             "floor": self.floor.copy(),
             "numbers": np.array(numbers, np.int64),
-            "columns": columns,
+            "columns": self._rows.gather(slots, _COLUMNS),
+            "duration": self._rows.gather(slots, _DURATION),
         }
 
     @classmethod
@@ -163,8 +180,10 @@ class ExemplarBank:
         """Return the bank that `points` described."""
         floor = np.array(points["floor"], dtype=np.float64)
         bank = cls(config, len(floor), floor)
-        for number, columns in zip(points["numbers"], points["columns"], strict=True):
-            bank.add(int(number), bank.model(np.asarray(columns, dtype=np.float64).T))
+        parts = (points[name] for name in ("numbers", "columns", "duration"))
+        for number, columns, duration in zip(*parts, strict=True):
+            columns = np.asarray(columns, dtype=np.float64)
+            bank.add(int(number), bank.model(columns.T, float(duration)))
         return bank
 
     def state(self) -> dict[str, Any]:
@@ -188,6 +207,7 @@ class ExemplarBank:
 
 
 _COLUMNS = Exemplar._fields.index("columns")
+_DURATION = Exemplar._fields.index("duration")
 
 
 @njit(cache=True)
@@ -202,7 +222,7 @@ def _score(columns: FloatArray, model: Any, weights: FloatArray) -> float:
 @njit(cache=True)
 def _distances(exemplar: Any, arrays: Any, others: IntArray, weights: FloatArray) -> FloatArray:
     """Return eq. 5 in both directions, averaged, per unit of weight."""
-    columns, means, variances, norms, stay, following, own = arrays
+    columns, means, variances, norms, stay, following, own, _ = arrays
     mine = exemplar[1:6]
     mass = weights.sum()
     out = np.empty(len(others))

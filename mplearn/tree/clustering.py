@@ -7,6 +7,8 @@ import numpy as np
 from ..recording import FloatArray, IntArray
 from .spread import pairs
 
+_COPY = 1e-6  # share of the mean distance below which one segment is a copy of another
+
 
 def clusters_below(matrix: FloatArray, cutoff: float, least: int) -> list[IntArray]:
     """Return the clusters whose largest distance is at most ``cutoff``, tightest first.
@@ -25,8 +27,14 @@ def clusters_below(matrix: FloatArray, cutoff: float, least: int) -> list[IntArr
         return []
     labels = fcluster(linkage(pairs(matrix), "complete"), cutoff, "distance")
     groups = [np.flatnonzero(labels == label) for label in np.unique(labels)]
-    large = [group for group in groups if len(group) >= least]
+    large = [group for group in groups if evidence(matrix[np.ix_(group, group)]) >= least]
     return sorted(large, key=lambda group: float(matrix[np.ix_(group, group)].max()))
+
+
+def evidence(matrix: FloatArray) -> float:
+    """Return how many demonstrations a group is worth; a copy of an earlier member counts half."""
+    copies = np.tril(matrix <= _COPY * matrix.mean(), -1).any(axis=1)
+    return len(matrix) - 0.5 * float(copies.sum())
 
 
 def two_branches(matrix: FloatArray, least: int) -> tuple[IntArray, IntArray] | None:

@@ -52,6 +52,8 @@ class TreeConfig:
             ever seen (of the channel's group).
         power: Power of the likelihood distance [nat] that everything below is measured in; 1 is
             eq. 5 itself, 0.5 makes it grow linearly with the difference of postures.
+        tempo: Two segments, one of which lasts longer than the other by more than this factor, are
+            the farther apart for it; inf for durations that do not matter.
         local: Whether a cluster is formed below mu - cutoff * sigma of the node that grew, as
             printed (eq. 7), or below a scale taken from a sample of all segments ever seen.
         cutoff: K_cutoff of eq. 7.
@@ -89,6 +91,7 @@ class TreeConfig:
     max_chains: int = 1
     variance_floor: float = 0.6
     power: float = 0.5
+    tempo: float = 1.5
     local: bool = False
     cutoff: float = 1.0
     spread: float = 6.0
@@ -117,6 +120,7 @@ class TreeConfig:
             cls(),
             form=FormConfig(n_points=32, head=0.0, ramp=0.0, centring=0.0),
             power=1.0,
+            tempo=math.inf,
             local=True,
             reach_cap=math.inf,
             n_nearest=1_000,
@@ -129,6 +133,7 @@ class TreeConfig:
         for name in (
             "variance_floor",
             "power",
+            "tempo",
             "spread",
             "mean_share",
             "reach",

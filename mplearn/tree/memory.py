@@ -43,7 +43,8 @@ class SegmentMemory:
         self._spread.update(points)
         if not self._sample.numbers:
             self.rescale()
-        self.bank.add(number, self.bank.model(form.centred(points, self.config.form)))
+        seen = form.centred(points, self.config.form)
+        self.bank.add(number, self.bank.model(seen, len(frames)))
         self.frames[number] = frames
         self.hold(number)
         place = self._sample.place_for(number)

@@ -102,7 +102,7 @@ class Recogniser:
         if refusal(frames, self.shortest_frames):
             return Recognition(None, float("inf"), float("inf"), ())
         points = form.centred(form.points_of(frames, self.config.form), self.config.form)
-        matches = self._index.search(self._bank.model(points), self._bank)
+        matches = self._index.search(self._bank.model(points, len(frames)), self._bank)
         if not matches:
             return Recognition(None, float("inf"), float("inf"), ())
         best = matches[0]

@@ -21,13 +21,14 @@ def split_mixed(structure: Structure, leaf: Node, when: int) -> Change:
     config = structure.config
     if leaf.whole or len(leaf.members) < config.max_exemplars:
         return Change()
-    branches = two_branches(leaf.matrix, config.min_branch)
+    matrix = structure.memory.bank.matrix(leaf.members, forms_only=True)
+    branches = two_branches(matrix, config.min_branch)
     if branches is None:
         return Change()
-    between = float(leaf.matrix[np.ix_(*branches)].mean())
+    between = float(matrix[np.ix_(*branches)].mean())
     if (
-        separation(leaf.matrix, *branches) <= config.split_ratio
-        or gap(leaf.matrix, *branches) <= config.split_gap
+        separation(matrix, *branches) <= config.split_ratio
+        or gap(matrix, *branches) <= config.split_gap
         or between <= config.split_scale * structure.index.scale(but=leaf.id)
     ):
         return Change()

@@ -88,14 +88,16 @@ class DistanceSample:
             self.numbers.append(number)
         else:
             self.numbers[place] = number
-        row = bank.distances(bank[number], self.numbers)
+        row = bank.distances(bank[number], self.numbers, forms_only=True)
         row[place] = 0.0
         self._matrix[place, : len(row)] = self._matrix[: len(row), place] = row
         return gone
 
     def measure(self, bank: ExemplarBank) -> None:
         """Measure all distances again."""
-        self._matrix[: len(self.numbers), : len(self.numbers)] = bank.matrix(self.numbers)
+        self._matrix[: len(self.numbers), : len(self.numbers)] = bank.matrix(
+            self.numbers, forms_only=True
+        )
 
     def scale(self, spread: float, mean_share: float) -> float:
         """Return the largest distance expected between executions of one motion.

@@ -122,7 +122,8 @@ def _joined(tree: PrimitiveTree, a: dict[str, Any], b: dict[str, Any]) -> dict[s
     shared = np.bincount(groups, variances) / np.maximum(np.bincount(groups), 1)
     floor = config.variance_floor**2 * np.maximum(shared[groups], 1e-18)
     points = {
-        name: np.concatenate([a["bank"][name], b["bank"][name]]) for name in ("numbers", "columns")
+        name: np.concatenate([a["bank"][name], b["bank"][name]])
+        for name in ("numbers", "columns", "duration")
     }
     n_a, n_b = int(a["n_seen"]), int(b["n_seen"])
     rng = np.random.default_rng((config.seed, n_a, n_b))
@@ -142,7 +143,7 @@ def _joined(tree: PrimitiveTree, a: dict[str, Any], b: dict[str, Any]) -> dict[s
         "n_seen": n_a + n_b,
         "next_id": int(b["next_id"]) + int(a["next_id"]) - 1,
         "spread": spread,
-        "sample": {"numbers": numbers, "matrix": bank.matrix(numbers.tolist())},
+        "sample": {"numbers": numbers, "matrix": bank.matrix(numbers.tolist(), forms_only=True)},
         "bank": bank.state(),
         "frames": [each for each, keep in zip(frames, kept, strict=True) if keep],
         "nodes": nodes,

@@ -239,7 +239,7 @@ def test_poison_leaves_no_trace():
 
 
 def test_gaps_and_short_segments_are_recognised_all_the_same():
-    tree, _, _, motions = learned(4, 6)
+    tree, _, _, motions = learned(4, 6, tempo=np.inf)
     frames = motions.perform(1)
     whole = tree.recogniser().recognise(frames)
     gaps = frames.copy()
@@ -251,6 +251,31 @@ def test_gaps_and_short_segments_are_recognised_all_the_same():
     assert tree.recogniser().recognise(few).primitive == whole.primitive
     assert tree.insert(few).recognised
     assert tree.model(whole.primitive).n_states <= 8
+
+
+def test_a_segment_far_longer_than_a_motion_is_another_one_and_a_little_longer_is_not():
+    strict, _, _, motions = learned(4, 6)
+    free, *_ = learned(4, 6, tempo=np.inf)
+    for m in range(4):
+        leaf = free.recogniser().recognise(motions.perform(m, seconds=1.1)).primitive
+        assert leaf is not None
+        for seconds, told_apart in ((0.95, False), (1.15, False), (0.3, True), (3.6, True)):
+            frames = motions.perform(m, seconds=seconds)
+            found, any_tempo = (t.recogniser().recognise(frames) for t in (strict, free))
+            assert any_tempo.primitive == leaf
+            assert found.primitive == (None if told_apart else leaf)
+            if not told_apart:
+                assert found.distance == pytest.approx(any_tempo.distance, rel=0.1)
+
+
+def test_a_recording_seen_again_is_no_second_demonstration_but_half_a_one():
+    motions = Motions(3, D, 3)
+    tree = new_tree()
+    two = [motions.perform(0), motions.perform(0)]
+    for frames in (*two, motions.perform(1), motions.perform(2), *two):
+        assert not tree.insert(frames).born
+    assert not tree.insert(two[0]).born  # two, and three copies
+    assert tree.insert(two[1]).born
 
 
 def test_identical_segments_make_one_primitive():
