@@ -56,7 +56,8 @@ class WaitingRoom:
         each = self._all.get((person, primitive))
         if each is None:
             slot = self._table.add(mean_shape(list(shapes.values())))
-            each = self._all[person, primitive] = Waiting(person, primitive, slot)
+            self._all[person, primitive] = Waiting(person, primitive, slot, dict(shapes))
+            return
         each.shapes |= shapes
         self._table.put(each.slot, mean_shape(list(each.shapes.values())))
 
