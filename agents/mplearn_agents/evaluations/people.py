@@ -27,11 +27,9 @@ def learning(setting: Setting) -> Iterator[Table]:
 
 def presentations(setting: Setting) -> Iterator[Table]:
     """Presented once, twice, by halves and all at once."""
-    from mplearn.evaluation.experiments import Seen, presentation_table
+    from mplearn.evaluation.experiments import presentation_table
 
-    yield presentation_table(
-        (session.person or "unnamed", Seen.of(session)) for _, session in setting.sessions
-    )
+    yield presentation_table(setting.seen)
 
 
 def together(setting: Setting) -> Iterator[Table]:
@@ -54,6 +52,13 @@ def prediction(setting: Setting) -> Iterator[Table]:
     yield prediction_table(title, foretell_sessions(setting.sessions))
     often = observed_sessions(setting.takes, orders=1, executions=4)
     yield prediction_table(f"{title}, each repetition used four times", foretell_sessions(often))
+
+
+def rejection(setting: Setting) -> Iterator[Table]:
+    """Motions of unknown kinds against the stated rate at which they may be accepted."""
+    from mplearn.evaluation.experiments import rejection_table
+
+    yield rejection_table(setting.seen)
 
 
 def anomaly(setting: Setting) -> Iterator[Table]:
@@ -127,6 +132,7 @@ EVALUATIONS = {
     "presentations": presentations,
     "together": together,
     "prediction": prediction,
+    "rejection": rejection,
     "anomaly": anomaly,
     "generation": generation,
     "inverse-kinematics": inverse_kinematics,

@@ -12,7 +12,7 @@ from mplearn.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from mplearn.evaluation import LabelKind
-    from mplearn.evaluation.experiments import Outcome
+    from mplearn.evaluation.experiments import Outcome, Seen
     from mplearn.recording import Recording
 
 
@@ -107,3 +107,19 @@ class Setting:
         from mplearn.evaluation.experiments import observed_sessions
 
         return list(observed_sessions(self.takes, self.orders))
+
+    @cached_property
+    def seen(self) -> list[tuple[str, Seen]]:
+        """The same sessions, segmented."""
+        from mplearn.evaluation.experiments import Seen
+
+        return [(session.person or "unnamed", Seen.of(session)) for _, session in self.sessions]
+
+    @cached_property
+    def paper_seen(self) -> list[tuple[str, Seen]]:
+        """Sessions like the paper's, segmented."""
+        from mplearn.demonstrator import paper_session
+        from mplearn.evaluation.experiments import Seen
+
+        shown = (paper_session(seed) for seed in self.seeds)
+        return [("paper_session", Seen.of(each.recording, each.truth)) for each in shown]

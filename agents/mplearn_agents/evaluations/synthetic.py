@@ -22,13 +22,9 @@ def learning(setting: Setting) -> Iterator[Table]:
 
 def presentations(setting: Setting) -> Iterator[Table]:
     """Presented once, twice, by halves and all at once."""
-    from mplearn.demonstrator import paper_session
-    from mplearn.evaluation.experiments import Seen, presentation_table
+    from mplearn.evaluation.experiments import presentation_table
 
-    shown = (paper_session(seed) for seed in setting.seeds)
-    yield presentation_table(
-        ("paper_session", Seen.of(session.recording, session.truth)) for session in shown
-    )
+    yield presentation_table(setting.paper_seen)
 
 
 def peers(setting: Setting) -> Iterator[Table]:
@@ -45,6 +41,13 @@ def prediction(setting: Setting) -> Iterator[Table]:
     yield prediction_table(
         "The next primitive, in sessions like the paper's", foretell_paper_sessions(setting.seeds)
     )
+
+
+def rejection(setting: Setting) -> Iterator[Table]:
+    """Motions of unknown kinds against the stated rate at which they may be accepted."""
+    from mplearn.evaluation.experiments import rejection_table
+
+    yield rejection_table(setting.paper_seen)
 
 
 def anomaly(setting: Setting) -> Iterator[Table]:
@@ -74,6 +77,7 @@ EVALUATIONS = {
     "presentations": presentations,
     "walks": walks,
     "prediction": prediction,
+    "rejection": rejection,
     "anomaly": anomaly,
     "peers": peers,
     "inverse-kinematics": inverse_kinematics,

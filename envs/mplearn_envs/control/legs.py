@@ -147,7 +147,7 @@ def _too_near(robot: ReferenceRobot, side: int, x: float, y: float, other: Float
     aside = c * (y - other[1]) - s * (x - other[0])
     beside = min(max(2.0 - abs(ahead) / length, 0.0), 1.0)
     missing = (width + APART_M) * beside - (aside if side == 0 else -aside)
-    return max(missing, 0.0) * (1.0 if side == 0 else -1.0)
+    return float(max(missing, 0.0) * (1.0 if side == 0 else -1.0))
 
 
 @njit(cache=True)

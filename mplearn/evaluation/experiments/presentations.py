@@ -125,8 +125,8 @@ def all_at_once(seen: Seen, config: TreeConfig) -> Presented:
         spread.update(each)
     floor = config.variance_floor**2 * spread.variances()
     bank = ExemplarBank(config, len(floor), floor)
-    for number, each in enumerate(points):
-        bank.add(number, bank.model(form.centred(each, config.form)))
+    for number, (each, (frames, _)) in enumerate(zip(points, chosen, strict=True)):
+        bank.add(number, bank.model(form.centred(each, config.form), len(frames)))
     distances = pairs(bank.matrix(range(len(points))))
     merges = linkage(distances, "average")
     cuts = np.linspace(0.1, 0.7, 31) * distances.mean()
