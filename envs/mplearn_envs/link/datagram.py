@@ -12,7 +12,7 @@ offset size type    field
 8      4    uint32  robot: CRC-32 of the upper joints' names, joined by commas
 12     4    uint32  stream: drawn at random by the sender when it starts
 16     4    uint32  sequence number, from 0, one more each datagram
-20     8    float64 time on the sender's clock [s]
+20     8    float64 when the posture is due, on the sender's clock [s]
 28     56   float64 desired frame of the base: x, y, z [m], w, x, y, z
 84     8 n  float64 angles of the upper joints [rad]
 84+8n  4    uint32  CRC-32 of all bytes before
@@ -59,7 +59,7 @@ class Datagram(NamedTuple):
     Attributes:
         stream: Which run of the sender it is of.
         sequence: Its number in the stream.
-        time_s: When it was sent, on the sender's clock [s].
+        time_s: When it is due, on the sender's clock [s].
         base: Desired frame of the base, shape (7,): position [m] and quaternion (w, x, y, z).
         angles: Angles of the upper joints, shape (n,) [rad].
         last: Whether the stream ends with it.

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from mplearn.errors import InvalidValueError
+from mplearn.generation.joins import drawn_from
 from mplearn.recording import FloatArray
 from mplearn_envs.control import StandingController, reference_robot, rest_reference
 from mplearn_envs.control.controller import tracked_columns
 from mplearn_envs.robot import Robot
 
 from .datagram import base_coordinates
+from .playback import Playback
 from .receiver import Receiver
 
 Phase: TypeAlias = Literal["waiting", "following", "holding", "settling"]
@@ -21,9 +24,10 @@ Phase: TypeAlias = Literal["waiting", "following", "holding", "settling"]
 class LowerBody:
     """Balances, one call a control period; survives whatever the link does.
 
-    Where no newer posture comes for ``hold_s``, the last one is held; after ``settle_s`` the robot
-    goes back to standing, slowly. When postures come again it follows them again, within the
-    velocity limits of the robot: never a jump, never a command outside the joints' limits.
+    Postures are followed as `Playback` plays them, evenly, however they come. Where no newer one
+    comes for ``hold_s``, the last one is held; after ``settle_s`` the robot goes back to standing.
+    When postures come again it follows them again. All these pass into each other within
+    ``fade_s``: never a jump, never a command outside the joints' limits.
 
     Args:
         robot: The robot.
@@ -31,7 +35,7 @@ class LowerBody:
         period_s: Control period [s].
         hold_s: Silence after which the link counts as broken [s].
         settle_s: Silence after which the robot goes back to standing [s].
-        settle_share: Share of the velocity limits that it takes for that.
+        fade_s: How long it takes to join a stream, or to go back to standing [s].
 
     Attributes:
         phase: "waiting" for the first posture, "following", "holding" or "settling".
@@ -46,14 +50,14 @@ class LowerBody:
         *,
         hold_s: float = 0.05,
         settle_s: float = 0.5,
-        settle_share: float = 0.15,
+        fade_s: float = 2.0,
     ) -> None:
         if not 0 < hold_s <= settle_s:
             raise InvalidValueError(f"0 < hold_s <= settle_s is needed, not {hold_s}, {settle_s}")
-        if not 0 < settle_share <= 1:
-            raise InvalidValueError(f"settle_share must lie in (0, 1], not {settle_share}")
+        if not period_s < fade_s < np.inf:
+            raise InvalidValueError(f"fade_s must be longer than a period, not {fade_s}")
         self.robot, self.receiver, self.period_s = robot, receiver, period_s
-        self.hold_s, self.settle_s, self.settle_share = hold_s, settle_s, settle_share
+        self.hold_s, self.settle_s, self.fade_s = hold_s, settle_s, fade_s
         self.controller = StandingController(robot, period_s)
         self.phase: Phase = "waiting"
         self.spent_s: dict[Phase, float] = dict.fromkeys(
@@ -61,8 +65,11 @@ class LowerBody:
         )
         self._columns = tracked_columns(robot)
         self._rest = rest_reference(robot).target
-        self._settling_step = settle_share * reference_robot(robot).velocity * period_s
-        self._wanted = self._rest.copy()
+        self._limits = reference_robot(robot).limits
+        self._playback = Playback(period_s)
+        self._plays = False
+        self._wanted, self._velocity = self._rest, np.zeros_like(self._rest)
+        self._fade: Iterator[FloatArray] = iter(())
         self._heard_s = -np.inf
 
     def update(self, now_s: float) -> FloatArray:
@@ -71,10 +78,7 @@ class LowerBody:
         Args:
             now_s: The time on this machine's clock [s].
         """
-        datagram = self.receiver.receive(now_s)
-        if datagram is not None:
-            self._wanted = np.concatenate((base_coordinates(datagram.base), datagram.angles))
-            self._heard_s = now_s
+        anew = self._listen(now_s)
         silence_s = now_s - self._heard_s
         if self._heard_s == -np.inf:
             self.phase = "waiting"
@@ -84,9 +88,31 @@ class LowerBody:
             self.phase = "holding"
         else:
             self.phase = "settling"
-            way = self._rest - self._wanted
-            self._wanted = self._wanted + np.clip(way, -self._settling_step, self._settling_step)
         self.spent_s[self.phase] += self.period_s
+        plays = self.phase in ("following", "holding")
+        source = self._playback.advance() if plays else self._rest
+        if anew or plays != self._plays:
+            self._fade = self._fading(source)
+        self._plays = plays
+        before, self._wanted = self._wanted, source + next(self._fade, 0.0)
+        self._velocity = (self._wanted - before) / self.period_s
         frame = np.zeros(len(self.robot.channels))
         frame[self._columns] = self._wanted
         return self.controller.update(frame)
+
+    def _listen(self, now_s: float) -> bool:
+        """Take what has come; returns whether it does not follow what came before."""
+        anew = False
+        for datagram in self.receiver.receive(now_s):
+            posture = np.concatenate((base_coordinates(datagram.base), datagram.angles))
+            posture = np.clip(posture, self._limits[:, 0], self._limits[:, 1])
+            anew |= self._playback.add(datagram.stream, datagram.time_s, posture)
+            self._heard_s = now_s
+        return anew
+
+    def _fading(self, source: FloatArray) -> Iterator[FloatArray]:
+        """Return what to add to a source, period by period, to pass into it without a jump."""
+        off = self._wanted + self.period_s * self._velocity - source
+        n = 1 + round(self.fade_s / self.period_s)
+        still = np.zeros((n, len(source)))
+        return iter(drawn_from(still, off, self._velocity, 1.0 / self.period_s, self.fade_s))

@@ -1,4 +1,4 @@
-"""The receiving end of the link: the newest posture, and what went wrong on the way."""
+"""The receiving end of the link: the new postures, and what went wrong on the way."""
 
 from __future__ import annotations
 
@@ -95,20 +95,22 @@ class Receiver:
             raise LinkError(f"cannot listen at {host}, port {port}: {error}") from error
         self.port: int = self._socket.getsockname()[1]
 
-    def receive(self, now_s: float) -> Datagram | None:
-        """Read what has come and return the newest posture; None where nothing newer came.
+    def receive(self, now_s: float) -> list[Datagram]:
+        """Read what has come and return the postures that are newer than all before, in order.
 
         Args:
             now_s: The time on this machine's clock [s].
         """
-        newest = None
+        newer = []
         for _ in range(_MOST_A_CALL):
             try:
                 data, _ = self._socket.recvfrom(_LARGEST)
             except (BlockingIOError, ConnectionError):
                 break
-            newest = self.take(data, now_s) or newest
-        return newest
+            datagram = self.take(data, now_s)
+            if datagram is not None:
+                newer.append(datagram)
+        return newer
 
     def take(self, data: bytes, now_s: float) -> Datagram | None:
         """Judge one datagram; return it where it is the newest of the stream, else count it."""

@@ -11,7 +11,9 @@ import numpy as np
 
 from mplearn.errors import InvalidValueError
 from mplearn.generation import retime
+from mplearn.generation.joins import drawn_from
 from mplearn.recording import FloatArray
+from mplearn_envs.control import rest_reference
 from mplearn_envs.library_source import LibrarySource
 from mplearn_envs.robot import Retargeting, Robot, humanoid, unitree_g1
 from mplearn_envs.simulation import Simulation
@@ -23,8 +25,9 @@ from .sender import HOST, PORT
 from .upper_body import UpperBody
 
 PATH = ("both arms raise", "both arms lower", "bow down", "bow up", "squat down", "squat raise")
-_REST_S = 1.0  # how long the lower body goes on after the last posture
+_REST_S = 2.0  # how long the lower body goes on after the last posture
 _START_S = 0.3  # how long the upper body sends the first posture
+_BLEND_S = 0.5  # within which the first primitive passes from rest into its own course
 _DROP_M = 0.2  # below the reference it has fallen
 
 
@@ -84,9 +87,9 @@ def run_upper(
     with DisturbedSender(robot, disturbance or Disturbance(), rng, host, port) as sender:
         upper = UpperBody(robot, sender, period_s)
         n_waiting = round(_START_S / period_s)
-        for k in _periods(period_s, n_waiting + len(frames)):
+        for k, due_s in _periods(period_s, n_waiting + len(frames)):
             at = max(k - n_waiting, 0)
-            upper.update(frames[at], time.monotonic(), at == len(frames) - 1)
+            upper.update(frames[at], due_s, at == len(frames) - 1)
     return sender
 
 
@@ -128,7 +131,7 @@ def run_lower(
 
 
 def path_frames(robot: Robot, path: Sequence[str], speed: float, period_s: float) -> FloatArray:
-    """Return a path of the built-in library, frame by frame, as the robot shall perform it.
+    """Return a path of the built-in library, frame by frame, as the robot performs it from rest.
 
     Shape (T, 3 + n) [m, rad], one frame a period.
     """
@@ -136,16 +139,20 @@ def path_frames(robot: Robot, path: Sequence[str], speed: float, period_s: float
     ids = [library[name].id for name in path]
     motion = library.generate(ids, style="smooth", rate_hz=1.0 / period_s)
     motion = retime(motion, speed=speed)
-    return Retargeting(library.channels, library.body, robot)(motion.frames)
+    frames = Retargeting(library.channels, library.body, robot)(motion.frames)
+    rest = np.zeros(frames.shape[1])
+    rest[0] = rest_reference(robot).target[0]
+    return drawn_from(frames, rest, np.zeros_like(rest), 1.0 / period_s, _BLEND_S)
 
 
-def _periods(period_s: float, n: int | None) -> Iterator[int]:
-    """Yield 0, 1, 2, ... at the beginning of each period; late ones follow at once."""
+def _periods(period_s: float, n: int | None) -> Iterator[tuple[int, float]]:
+    """Yield 0, 1, 2, ... and when each period is due; late ones follow at once."""
     begin = time.monotonic()
     k = 0
     while n is None or k < n:
-        wait_s = begin + k * period_s - time.monotonic()
+        due_s = begin + k * period_s
+        wait_s = due_s - time.monotonic()
         if wait_s > 0:
             time.sleep(wait_s)
-        yield k
+        yield k, due_s
         k += 1
