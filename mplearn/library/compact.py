@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,3 +76,7 @@ class CompactMotion:
         frames = values if len(values) == self.n_frames else interpolate(values, places)
         frames.flags.writeable = False
         return frames
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the frames, which can be worked out again."""
+        return {name: value for name, value in self.__dict__.items() if name != "frames"}

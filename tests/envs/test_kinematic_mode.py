@@ -97,6 +97,8 @@ def test_environments_of_one_library_share_what_they_know():
     assert copy.deepcopy(first).repertoire is first.repertoire
     twin = pickle.loads(pickle.dumps(first))
     assert twin.repertoire is not first.repertoire
+    for id in first.repertoire.library.ids:  # what is worked out on the way stays here
+        first.repertoire.feasibility(id)
     assert len(pickle.dumps(first)) < 2_000_000
 
 
