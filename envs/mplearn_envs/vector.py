@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import os
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import Any, cast
 
 import gymnasium
@@ -22,8 +21,8 @@ from .primitive_humanoid import PrimitiveHumanoidEnv
 class PrimitiveHumanoidVectorEnv(SyncVectorEnv):
     """Environments that are stepped in threads; results are those of single ones, bit for bit.
 
-    While a robot is simulated, MuJoCo leaves Python to the other threads; where there is a thread
-    for every processor, each keeps to its own. What is known of the library is shared.
+    While a robot is simulated, MuJoCo leaves Python to the other threads. What is known of the
+    library is shared.
     ``gymnasium.make_vec("mplearn/PrimitiveHumanoid-v0", num_envs=8)`` makes it; it is a
     `gymnasium.vector.SyncVectorEnv` in all else, autoreset and seeds included.
 
@@ -51,14 +50,14 @@ class PrimitiveHumanoidVectorEnv(SyncVectorEnv):
         if max_episode_steps is not None:
             options["max_steps"] = max_episode_steps
         self.options = options
-        self.n_threads = n_threads or len(_processors())
+        self.n_threads = n_threads or _n_processors()
         self._pool: ThreadPoolExecutor | None = None
         super().__init__([_maker(options)] * num_envs, autoreset_mode=autoreset_mode)
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Step all environments at a time; see `gymnasium.vector.SyncVectorEnv.step`."""
         if self._pool is None:
-            self._pool = self._threads()
+            self._pool = ThreadPoolExecutor(self.n_threads, "mplearn-env")
         next_step = self.autoreset_mode == AutoresetMode.NEXT_STEP
         actions = np.asarray(actions)
         if actions.shape != (self.num_envs,):
@@ -69,16 +68,9 @@ class PrimitiveHumanoidVectorEnv(SyncVectorEnv):
             if not (over and next_step)
         ]
         # the longest first, so that no thread is left with a long one at the end
-        for env, action in sorted(waiting, key=lambda each: -each[0].expected_s(each[1])):
-            env.begin(self._pool, action)
+        waiting.sort(key=lambda each: -each[0].expected_s(each[1]))
+        wait([env.begin(self._pool, action) for env, action in waiting])  # out of their way
         return super().step(actions)
-
-    def _threads(self) -> ThreadPoolExecutor:
-        """Return the threads; the system's scheduler lets two share a processor for a while."""
-        name, processors = "mplearn-env", _processors()
-        if self.n_threads == len(processors) <= self.num_envs:
-            return ThreadPoolExecutor(self.n_threads, name, _keep_to_next, (iter(processors),))
-        return ThreadPoolExecutor(self.n_threads, name)
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return which actions are legal, shape (num_envs, capacity)."""
@@ -104,9 +96,10 @@ class _Begun(gymnasium.Wrapper[Any, Any, Any, Any]):
         id = env.repertoire.primitive(int(action)) if known else None
         return env.hold_s if id is None else env.repertoire.duration_s(id)
 
-    def begin(self, pool: ThreadPoolExecutor, action: np.int64) -> None:
+    def begin(self, pool: ThreadPoolExecutor, action: np.int64) -> Future[Any]:
         """Begin the step that `step` will be asked for."""
         self._result = pool.submit(self.env.step, action)
+        return self._result
 
     def step(self, action: Any) -> Any:
         """Return what came of it."""
@@ -124,15 +117,8 @@ def _maker(options: dict[str, Any]) -> Callable[[], gymnasium.Env[Any, Any]]:
     return make
 
 
-def _processors() -> list[int]:
-    """Return the processors that may be used."""
+def _n_processors() -> int:
+    """Return how many processors may be used."""
     if hasattr(os, "sched_getaffinity"):
-        return sorted(os.sched_getaffinity(0))
-    return list(range(os.cpu_count() or 1))
-
-
-def _keep_to_next(processors: Iterator[int]) -> None:
-    """Keep this thread to the next processor, where the system allows it."""
-    if hasattr(os, "sched_setaffinity"):
-        with contextlib.suppress(OSError):
-            os.sched_setaffinity(0, {next(processors)})
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

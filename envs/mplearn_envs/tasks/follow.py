@@ -118,7 +118,7 @@ class FollowTask(Task):
         self._go_on(scene.time_s)
 
     def observe(self) -> FloatArray:
-        """Return what was recognised and when, what is predicted, and the time left; see the table."""
+        """Return what was recognised and when, what is predicted, and the time left."""
         n, capacity = self._n_recognised, self._repertoire.capacity
         out = np.zeros(3 * capacity + 2)
         usual_s = self._median_s
