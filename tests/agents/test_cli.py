@@ -58,6 +58,7 @@ def test_perform_writes_a_film(renderer, library_file, tmp_path):
         "1",
         "--speed",
         "1",
+        "--balance",
     ]
     done = subprocess.run([*command, "--video", video], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -73,6 +74,8 @@ def test_bad_input_is_one_line_and_exit_code_2(library_file, tmp_path, capsys):
     assert "no primitive 'XYZ'" in refused(capsys, "rename", library_file, "XYZ", "name")
     assert "printable" in refused(capsys, "rename", library_file, "BAR", " ")
     assert "at least 1 step" in refused(capsys, "perform", library_file, "--steps", "0")
+    assert "give --video" in refused(capsys, "perform", library_file, "--balance")
+    assert "robot must be one of" in refused(capsys, "perform", library_file, "--robot", "nao")
     assert "need each other" in refused(capsys, "perform", library_file, "--goal", "BAR")
     assert "no primitive 'jump'" in refused(
         capsys, "perform", library_file, "--policy", "path", "--goal", "jump"

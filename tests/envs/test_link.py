@@ -29,9 +29,9 @@ from mplearn_envs.link import (
 from mplearn_envs.link.datagram import base_coordinates, base_frame
 from mplearn_envs.link.disturbance import Disturbance, DisturbedSender
 from mplearn_envs.link.playback import Playback
-from mplearn_envs.link.run import make_robot, path_frames
+from mplearn_envs.link.run import path_frames
 from mplearn_envs.link.sender import LinkError
-from mplearn_envs.robot import humanoid
+from mplearn_envs.robot import humanoid, make_robot
 from mplearn_envs.simulation import Simulation
 
 ROBOT = humanoid()

@@ -40,7 +40,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--speed", type=float, default=0.5, help="share of the human's speed (default: 0.5)"
     )
+    parser.add_argument("--robot", default="humanoid", help="humanoid (default) or unitree_g1")
     parser.add_argument("--video", type=Path, metavar="FILE.mp4", help="write a film of it")
+    parser.add_argument(
+        "--balance",
+        action="store_true",
+        help="draw support polygon, centre of gravity and zero-moment point in the film",
+    )
 
 
 def run(args: argparse.Namespace) -> None:
@@ -50,6 +56,8 @@ def run(args: argparse.Namespace) -> None:
 
     if (args.policy == _GOAL) != (args.goal is not None):
         raise InvalidValueError(f"--policy {_GOAL} and --goal need each other")
+    if args.balance and not args.video:
+        raise InvalidValueError("--balance is drawn in a film: give --video, too")
     if args.video:
         require("imageio_ffmpeg", "report")
         if not choose_backend():
@@ -63,6 +71,7 @@ def run(args: argparse.Namespace) -> None:
     from mplearn_agents.rl import TrainingConfig
     from mplearn_agents.rl.trained import CONFIG
     from mplearn_agents.walk import walk
+    from mplearn_envs.robot import make_robot
 
     trained = TrainingConfig(task="free")
     if args.agent is not None:
@@ -73,6 +82,7 @@ def run(args: argparse.Namespace) -> None:
         task=args.task or trained.task,
         dynamics=args.dynamics,
         speed=args.speed,
+        robot=make_robot(args.robot),
         disable_env_checker=True,
     )
     policy = _policy(args, env)
@@ -92,7 +102,7 @@ def run(args: argparse.Namespace) -> None:
 
         robot = env.unwrapped.robot  # type: ignore[attr-defined]
         names = [step.name for step in result.steps]
-        pictures = with_captions(film(result, robot.xml), result, names)
+        pictures = with_captions(film(result, robot.xml, balance=args.balance), result, names)
         n_pictures = write_video(args.video, pictures, result.rate_hz)
         print(f"film of {n_pictures} pictures written to {args.video}")
     env.close()

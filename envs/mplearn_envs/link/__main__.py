@@ -13,6 +13,7 @@ import sys
 from functools import partial
 
 from mplearn.errors import MPLearnError
+from mplearn_envs.robot import ROBOTS
 
 from .disturbance import Disturbance
 from .run import PATH, run_lower, run_upper
@@ -29,7 +30,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("role", choices=("upper", "lower", "both"))
     parser.add_argument("--host", default=HOST, help="the lower body's address")
     parser.add_argument("--port", type=int, default=PORT, help="its UDP port")
-    parser.add_argument("--robot", choices=("humanoid", "unitree_g1"), default="humanoid")
+    parser.add_argument("--robot", choices=tuple(ROBOTS), default="humanoid")
     parser.add_argument("--path", nargs="+", default=PATH, help="primitives, by name")
     parser.add_argument("--speed", type=float, default=0.5, help="share of the human's")
     parser.add_argument(

@@ -9,13 +9,12 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from mplearn.errors import InvalidValueError
 from mplearn.generation import retime
 from mplearn.generation.joins import drawn_from
 from mplearn.recording import FloatArray
 from mplearn_envs.control import rest_reference
 from mplearn_envs.library_source import LibrarySource
-from mplearn_envs.robot import Retargeting, Robot, humanoid, unitree_g1
+from mplearn_envs.robot import Retargeting, Robot, make_robot
 from mplearn_envs.simulation import Simulation
 
 from .disturbance import Disturbance, DisturbedSender
@@ -56,18 +55,6 @@ class LinkReport(NamedTuple):
         lines.append(f"{'outside':>12} {self.outside}")
         lines.append(f"{'period':>12} {1e3 * self.slowest_period_s:.1f} ms at most")
         return "\n".join(lines)
-
-
-def make_robot(name: str) -> Robot:
-    """Return a robot by name.
-
-    Raises:
-        InvalidValueError: There is none of that name.
-    """
-    robots: dict[str, Callable[[], Robot]] = {"humanoid": humanoid, "unitree_g1": unitree_g1}
-    if name not in robots:
-        raise InvalidValueError(f"robot must be one of {tuple(robots)}, not {name!r}")
-    return robots[name]()
 
 
 def run_upper(
