@@ -1,5 +1,6 @@
 """Prints all timings. Run with one core to oneself: ``make bench``."""
 
+import argparse
 import os
 
 os.environ.setdefault("NUMBA_NUM_THREADS", "1")  # before numba is imported: one core for all peers
@@ -15,27 +16,35 @@ from . import (
     graph,
     hmm,
     inverse_kinematics,
+    memory,
     performing,
     segmentation,
     tree,
 )
 
+TITLES = {
+    chain: "The learning chain (processor time, one core)",
+    inverse_kinematics: "Inverse kinematics",
+    segmentation: "Segmentation (one core)",
+    hmm: "Hidden Markov models (interleaved, one core)",
+    tree: "The tree",
+    graph: "The graph",
+    generation: "Generation",
+    performing: "Planning and performing",
+    environment: "The environment",
+    memory: "Memory of a stream of ten hours",
+}
+
 
 def main() -> None:
+    tables = {module.__name__.rpartition(".")[2]: module for module in TITLES}
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("names", nargs="*", choices=[*tables, []], help="tables (default: all)")
     console = Console(width=130)
-    for title, module in (
-        ("The learning chain (processor time, one core)", chain),
-        ("Inverse kinematics", inverse_kinematics),
-        ("Segmentation (one core)", segmentation),
-        ("Hidden Markov models (interleaved, one core)", hmm),
-        ("The tree", tree),
-        ("The graph", graph),
-        ("Generation", generation),
-        ("Planning and performing", performing),
-        ("The environment", environment),
-    ):
+    for name in parser.parse_args().names or tables:
+        title = TITLES[tables[name]]
         table = Table("what", "took", "against", "ratio", title=title, title_justify="left")
-        for row in module.rows():
+        for row in tables[name].rows():
             table.add_row(*row)
         console.print(table)
 
