@@ -2,130 +2,39 @@
 
 import importlib.util
 import re
-import struct
 import subprocess
 import sys
-import zlib
 
 import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from link_world import PERIOD_S, ROBOT, N, posture
 
 from mplearn.errors import FrameError, InvalidValueError
 from mplearn_envs.control import reference_robot, rest_reference
 from mplearn_envs.control.reference import soles
 from mplearn_envs.link import (
-    Datagram,
-    DatagramError,
     LowerBody,
     Receiver,
     Sender,
     UpperBody,
     decode,
-    encode,
 )
-from mplearn_envs.link.datagram import base_coordinates, base_frame
+from mplearn_envs.link.datagram import base_frame
 from mplearn_envs.link.disturbance import Disturbance, DisturbedSender
 from mplearn_envs.link.playback import Playback
 from mplearn_envs.link.run import path_frames
 from mplearn_envs.link.sender import LinkError
-from mplearn_envs.robot import humanoid, make_robot
+from mplearn_envs.robot import make_robot
 from mplearn_envs.simulation import Simulation
-
-ROBOT = humanoid()
-N = len(ROBOT.upper_joints)
-CODE = 77
-PERIOD_S = 0.004
-
-
-def posture(seed=0):
-    rng = np.random.default_rng(seed)
-    return base_frame(0.8, *rng.normal(0, 0.3, 2)), rng.normal(0, 0.5, N)
 
 
 @pytest.fixture
 def link():
     with Receiver(ROBOT, port=0) as receiver, Sender(ROBOT, port=receiver.port) as sender:
         yield sender, receiver
-
-
-finite = st.floats(allow_nan=False, allow_infinity=False, width=64)
-
-
-@given(
-    stream=st.integers(0, 2**32 - 1),
-    sequence=st.integers(0, 2**32 - 1),
-    time_s=finite,
-    angles=st.lists(finite, max_size=8),
-    last=st.booleans(),
-)
-def test_a_datagram_says_what_it_was_told(stream, sequence, time_s, angles, last):
-    base = base_frame(0.8, 0.2, -0.4)
-    told = Datagram(stream, sequence, time_s, base, np.array(angles), last)
-    data = encode(told, CODE)
-    assert len(data) == 84 + 8 * len(angles) + 4
-    found = decode(data, CODE, len(angles))
-    assert (found.stream, found.sequence, found.last) == (stream, sequence, last)
-    assert found.time_s == time_s
-    np.testing.assert_array_equal(found.base, base)
-    np.testing.assert_array_equal(found.angles, angles)
-
-
-def test_the_layout_is_the_documented_one():
-    base, angles = posture()
-    data = encode(Datagram(5, 6, 7.5, base, angles, True), CODE)
-    assert data[:4] == b"MPLU"
-    assert struct.unpack(">BBHIIId", data[4:28]) == (1, 1, N, CODE, 5, 6, 7.5)
-    np.testing.assert_array_equal(np.frombuffer(data[28:84], ">f8"), base)
-    np.testing.assert_array_equal(np.frombuffer(data[84:-4], ">f8"), angles)
-    assert data[-4:] == struct.pack(">I", zlib.crc32(data[:-4]))
-
-
-@given(st.binary(max_size=400))
-def test_any_bytes_are_refused_by_one_error(data):
-    with pytest.raises(DatagramError):
-        decode(data, CODE, N)
-
-
-@settings(max_examples=200)
-@given(st.data())
-def test_damaged_datagrams_are_refused(data):
-    base, angles = posture()
-    whole = bytearray(encode(Datagram(1, 2, 3.0, base, angles), CODE))
-    place = data.draw(st.integers(0, len(whole) - 1))
-    whole[place] ^= data.draw(st.integers(1, 255))
-    with pytest.raises(DatagramError):
-        decode(bytes(whole), CODE, N)
-    with pytest.raises(DatagramError):
-        decode(bytes(whole[:place]), CODE, N)
-
-
-@pytest.mark.parametrize("wrong", ["nan", "infinite time", "no rotation", "robot", "size"])
-def test_what_is_no_posture_for_this_robot_is_refused(wrong):
-    base, angles = posture()
-    time_s, code = 1.0, CODE
-    if wrong == "nan":
-        angles[3] = np.nan
-    elif wrong == "infinite time":
-        time_s = np.inf
-    elif wrong == "no rotation":
-        base[3:7] *= 1.1
-    elif wrong == "robot":
-        code += 1
-    else:
-        angles = angles[1:]
-    with pytest.raises(DatagramError) as caught:
-        decode(encode(Datagram(1, 2, time_s, base, angles), code), CODE, N)
-    assert caught.value.fault == ("foreign" if wrong == "robot" else "malformed")
-
-
-@given(st.floats(-1.5, 1.5), st.floats(-3.1, 3.1))
-def test_frames_and_coordinates_are_inverse(roll, pitch):
-    np.testing.assert_allclose(
-        base_coordinates(base_frame(0.7, roll, pitch)), (0.7, roll, pitch), atol=1e-7
-    )
 
 
 def test_postures_arrive_in_order(link):
@@ -264,46 +173,6 @@ def test_postures_in_bunches_are_followed_as_evenly_as_others(length):
     speeds = [np.abs(np.diff(commands, axis=0)).max(axis=0) for commands in (even, bunched)]
     assert (speeds[1] < 1.1 * speeds[0] + 1e-4).all()
     np.testing.assert_allclose(bunched[-1], even[-1], atol=1e-3)
-
-
-@settings(deadline=None)
-@given(
-    gaps=st.lists(st.integers(0, 40), min_size=1, max_size=60),
-    late=st.lists(st.integers(0, 30), min_size=60, max_size=60),
-)
-def test_played_time_never_jumps_nor_overtakes(gaps, late):
-    """A posture that tells its time stamp tells what time is played."""
-    playback = Playback(PERIOD_S, delay_s=0.1, longest_s=1.0)
-    due = PERIOD_S * np.cumsum(np.array(gaps) + 1)
-    comes = np.maximum.accumulate(due + PERIOD_S * np.array(late[: len(due)]))
-    anew = [playback.add(7, 0.0, np.zeros(1))]
-    played, newest, sent = [0.0], 0.0, 0
-    for k in range(int(comes[-1] / PERIOD_S) + 500):
-        while sent < len(due) and comes[sent] <= k * PERIOD_S:
-            newest = due[sent]
-            anew.append(playback.add(7, newest, np.array([newest])))
-            sent += 1
-        played.append(float(playback.advance()[0]))
-        assert played[-1] <= newest + 1e-9
-    assert sum(anew) == 1
-    speed = np.diff(played) / PERIOD_S
-    assert speed.min() > -1e-9 and speed.max() < 1.05 + 1e-6
-    assert np.diff(speed, prepend=0.0).max() < PERIOD_S / 0.1 + 1e-6
-    assert played[-1] == pytest.approx(due[-1], abs=1e-6)
-
-
-def test_playing_begins_anew_where_a_posture_does_not_follow():
-    playback = Playback(PERIOD_S)
-    here, there = np.zeros(2), np.ones(2)
-    assert playback.add(1, 5.0, here) and not playback.add(1, 5.1, there)
-    assert playback.add(1, 5.1, here)  # time stands still
-    assert playback.add(1, 2.0, here)  # or runs back
-    assert playback.add(1, 1e300, here) and playback.add(1, 3.1, here)
-    assert playback.add(2, 3.2, there)  # another stream
-    np.testing.assert_array_equal(playback.advance(), there)
-    for k in range(100_000):  # an endless stream that is never played stays small
-        playback.add(2, 3.2 + 1e-7 * (k + 1), there)
-    assert len(playback._waiting) <= 4096
 
 
 @pytest.mark.skipif(
