@@ -1,10 +1,13 @@
 import csv
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from mplearn.errors import InvalidValueError
+from mplearn.demonstrator import demonstrate
+from mplearn.errors import InvalidValueError, RecordingError
+from mplearn.recording import Recording
 from mplearn_agents.cli import main
 from mplearn_agents.evaluations import Setting, evaluations_for
 
@@ -62,3 +65,16 @@ def test_too_short_repetitions_cannot_be_evaluated(tmp_path):
     write(tmp_path / "short.csv", np.zeros((16, 3)), ["m"] * 16, np.arange(16) // 8)
     with pytest.raises(InvalidValueError, match="no two labelled repetitions"):
         _ = Setting(str(tmp_path)).takes
+
+
+def test_markers_without_labels_show_inverse_kinematics():
+    shown = replace(demonstrate(("BAD", "BAU"), 1).recording, labels=())
+    markers, angles = Setting("markers"), Setting("angles")
+    markers.__dict__["recordings"] = (shown,)
+    assert list(evaluations_for(markers)) == ["inverse-kinematics"]
+    (table,) = evaluations_for(markers)["inverse-kinematics"](markers)
+    assert [row[1] for row in table.rows] == ["human", "robot"]
+    assert all(float(row[3].removesuffix(" mm")) < 20 for row in table.rows)
+    angles.__dict__["recordings"] = (Recording(np.zeros((50, 1)), 100.0, ("knee",)),)
+    with pytest.raises(RecordingError, match="no recording has labels"):
+        evaluations_for(angles)

@@ -50,6 +50,12 @@ class Setting:
 
         return kind_of_labels(self.recordings)
 
+    @property
+    def only_markers(self) -> bool:
+        """Whether there are markers, and no labels at all."""
+        labelled = any(each.labels for each in self.recordings)
+        return not labelled and any(each.is_markers for each in self.recordings)
+
     @cached_property
     def takes(self) -> tuple[Recording, ...]:
         """The recordings that are evaluated.
@@ -82,6 +88,8 @@ class Setting:
     def _suitable(self, recordings: Sequence[Recording]) -> tuple[Recording, ...]:
         from mplearn.evaluation import alike, repeating
 
+        if self.only_markers:
+            return alike([each for each in recordings if each.is_markers])
         if self.kind == "repetitions":
             return alike(repeating(recordings))
         labelled = tuple(each for each in recordings if each.labels)

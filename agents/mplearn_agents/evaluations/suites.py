@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from .activities import EVALUATIONS as ACTIVITIES
 from .people import EVALUATIONS as PEOPLE
+from .people import inverse_kinematics
 from .robot import EVALUATIONS as ROBOT
 from .sessions import EVALUATIONS as SESSIONS
 from .setting import Setting
@@ -28,7 +29,12 @@ OF_LABELS: Mapping[LabelKind, Mapping[str, Evaluation]] = {
     "activities": ACTIVITIES,
 }
 
+#: Experiments on markers without labels.
+UNLABELLED: Mapping[str, Evaluation] = {"inverse-kinematics": inverse_kinematics}
+
 
 def evaluations_for(setting: Setting) -> Mapping[str, Evaluation]:
     """Return the experiments on a source of data, by name, in the order they are run."""
-    return BUILT_IN[setting.data] if setting.data in BUILT_IN else OF_LABELS[setting.kind]
+    if setting.data in BUILT_IN:
+        return BUILT_IN[setting.data]
+    return UNLABELLED if setting.only_markers else OF_LABELS[setting.kind]
