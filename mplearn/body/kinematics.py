@@ -8,30 +8,13 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from mplearn.maths.rotation_kernels import quaternion_matrix
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
 
 def first_joints(joint_body: IntArray, n_bodies: int) -> IntArray:
     """Return, for each body, its first joint; body b has joints [first[b], first[b + 1])."""
     return np.searchsorted(joint_body, np.arange(n_bodies + 1)).astype(np.int64)
-
-
-@njit(cache=True)
-def quaternion_matrix(q: FloatArray) -> FloatArray:
-    """Return the rotation matrix (3, 3) of a quaternion (w, x, y, z), which need not be normal."""
-    norm = np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    w, x, y, z = q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm
-    m = np.empty((3, 3))
-    m[0, 0] = 1 - 2 * (y * y + z * z)
-    m[0, 1] = 2 * (x * y - w * z)
-    m[0, 2] = 2 * (x * z + w * y)
-    m[1, 0] = 2 * (x * y + w * z)
-    m[1, 1] = 1 - 2 * (x * x + z * z)
-    m[1, 2] = 2 * (y * z - w * x)
-    m[2, 0] = 2 * (x * z - w * y)
-    m[2, 1] = 2 * (y * z + w * x)
-    m[2, 2] = 1 - 2 * (x * x + y * y)
-    return m
 
 
 @njit(cache=True)

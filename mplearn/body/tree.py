@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mplearn.errors import BodyError
+from mplearn.maths.rotations import quaternion_to_matrix
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
 from .kinematics import first_joints, point_jacobian
 from .kinematics import forward_kinematics as forward_kinematics
-from .kinematics import quaternion_matrix as quaternion_matrix
 
 if TYPE_CHECKING:
     import mujoco
@@ -81,12 +81,11 @@ class KinematicTree:
         def name(kind: int, i: int) -> str:
             return mujoco.mj_id2name(model, kind, i) or ""
 
-        quats = model.body_quat[1:].astype(np.float64)
         return cls(
             body_names=tuple(name(mujoco.mjtObj.mjOBJ_BODY, i) for i in range(1, model.nbody)),
             parent=model.body_parentid[1:].astype(np.int64) - 1,
             offset=model.body_pos[1:].astype(np.float64),
-            rotation=np.array([quaternion_matrix(q) for q in quats]),
+            rotation=quaternion_to_matrix(model.body_quat[1:]),
             joint_names=tuple(name(mujoco.mjtObj.mjOBJ_JOINT, i) for i in range(1, model.njnt)),
             joint_body=model.jnt_bodyid[1:].astype(np.int64) - 1,
             slides=kinds[1:] == int(mujoco.mjtJoint.mjJNT_SLIDE),

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ..maths.rotations import euler_to_matrix
 from ..recording import FloatArray
 from .files import bad_file, read_text
-from .kinematics import Joint, rotation_about
+from .kinematics import Joint
 from .numbers import number
 from .skeletal import Column
 
@@ -232,7 +233,4 @@ def _euler(path: Path, words: list[str], turn: float, where: str) -> FloatArray:
         raise bad_file(
             path, f"{where} is {' '.join(words)!r}", "three angles and an order like XYZ"
         )
-    matrix = np.eye(3)
-    for angle, axis in zip(_vector(path, words[:3], where) * turn, order, strict=True):
-        matrix = rotation_about(np.eye(3)["xyz".index(axis)], np.array([angle]))[0] @ matrix
-    return matrix
+    return euler_to_matrix(order, _vector(path, words[:3], where) * turn)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..maths.rotations import quaternion_to_matrix
 from ..recording import FloatArray, Recording, marker_channels
 from .files import bad_file, cmu_subject, stem
 from .kinematics import Joint, joint_positions
@@ -56,9 +57,8 @@ def cmu_humanoid_positions(
     qpos, model = _converted(angles, unit_m)
     joints = tuple(_joint(model, body) for body in range(1, model.nbody))
     local = joint_positions(joints, qpos)  # (T, J, 3), the root at the origin
-    points = (
-        np.einsum("tij,tkj->tki", _quaternion_rotation(qpos[:, 3:7]), local) + qpos[:, None, :3]
-    )
+    turned = np.einsum("tij,tkj->tki", quaternion_to_matrix(qpos[:, 3:7]), local)
+    points = turned + qpos[:, None, :3]
     points = points @ _DM_CONTROL_AXES.T
     names = tuple(joint.name for joint in joints)
     checked_markers(path, points, names)
@@ -99,12 +99,5 @@ def _joint(model: Any, body: int) -> Joint:
         int(model.body_parentid[body]) - 1,
         np.array(model.body_pos[body]),
         tuple((np.array(model.jnt_axis[i]), int(model.jnt_qposadr[i])) for i in hinges),
-        before=_quaternion_rotation(np.array(model.body_quat[body])[None])[0],
+        before=quaternion_to_matrix(model.body_quat[body]),
     )
-
-
-def _quaternion_rotation(quaternions: FloatArray) -> FloatArray:
-    """Return the rotations (T, 3, 3) of quaternions w, x, y, z, shape (T, 4)."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_quat(quaternions, scalar_first=True).as_matrix())

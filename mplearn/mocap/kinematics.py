@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..maths.rotations import axis_angle_to_matrix
 from ..recording import FloatArray
 
 _IDENTITY = np.eye(3)
@@ -56,7 +57,7 @@ def joint_positions(joints: tuple[Joint, ...], values: FloatArray) -> FloatArray
                 place[:, axis] = values[:, column]
         rotation = joint.before
         for direction, column in joint.rotations:
-            rotation = rotation @ rotation_about(direction, values[:, column])
+            rotation = rotation @ axis_angle_to_matrix(direction, values[:, column])
         rotation = rotation @ joint.after  # (3, 3) or (T, 3, 3)
         if joint.parent < 0:
             positions[:, index] = place
@@ -66,20 +67,3 @@ def joint_positions(joints: tuple[Joint, ...], values: FloatArray) -> FloatArray
             rotation = parent @ rotation
         frames.append(rotation)
     return positions
-
-
-def rotation_about(axis: FloatArray, angles: FloatArray) -> FloatArray:
-    """Return the rotations about an axis (Rodrigues' formula).
-
-    Args:
-        axis: Unit vector, shape (3,).
-        angles: Shape (T,) [rad].
-
-    Returns:
-        Rotation matrices, shape (T, 3, 3).
-    """
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine, versine = np.sin(angles)[:, None, None], (1.0 - np.cos(angles))[:, None, None]
-    rotations: FloatArray = _IDENTITY + sine * cross + versine * (cross @ cross)
-    return rotations

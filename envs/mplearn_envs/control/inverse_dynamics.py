@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mplearn.body.tree import quaternion_matrix
+from mplearn.maths.rotation_kernels import quaternion_matrix
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.robot import Robot
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mplearn.body.tree import quaternion_matrix
 from mplearn.errors import RobotError
+from mplearn.maths.rotations import quaternion_to_matrix
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.robot import Robot
 
@@ -143,7 +143,7 @@ def reference_robot(robot: Robot) -> ReferenceRobot:
     upper = robot.upper_joints
     lowest = 0.45 * straight[2]
     base_limits = np.array([[lowest, straight[2]], [-0.6, 0.6], [-0.6, 1.6]])
-    turn = np.array([quaternion_matrix(quat) for quat in model.body_iquat[1:]])
+    turn = quaternion_to_matrix(model.body_iquat[1:])
     return ReferenceRobot(
         tree,
         np.einsum("bij,bj,bkj->bik", turn, model.body_inertia[1:], turn),

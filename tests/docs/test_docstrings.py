@@ -1,0 +1,32 @@
+"""The examples in docstrings run; a module joins by having one."""
+
+import doctest
+import importlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mplearn
+import mplearn_agents
+import mplearn_envs
+
+MODULES = [
+    ".".join(path.relative_to(root.parent).with_suffix("").parts).removesuffix(".__init__")
+    for root in (Path(package.__path__[0]) for package in (mplearn, mplearn_envs, mplearn_agents))
+    for path in sorted(root.rglob("*.py"))
+    if ">>> " in path.read_text(encoding="utf-8")
+]
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with np.printoptions():
+        failed, tried = doctest.testmod(importlib.import_module(name))
+    assert tried
+    assert not failed
+
+
+def test_the_ground_floor_has_examples() -> None:
+    assert "mplearn.maths.rotations" in MODULES
