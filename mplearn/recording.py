@@ -73,6 +73,54 @@ class LabelledSegment:
 
 
 @dataclass(frozen=True)
+class Skeleton:
+    """The joints that a recording of a skeleton has, as a tree.
+
+    Attributes:
+        names: Name of each joint, length J; parents stand before their children.
+        parents: Index of each joint's parent, length J; -1 for a root.
+        offsets: Where each joint is from its parent while all angles are zero, shape (J, 3) [m], in
+            the recording's axes (z up). A root's is from the origin.
+        ends: Whether it is an end site: a point where a chain ends, which turns nothing; length J.
+
+    Raises:
+        RecordingError: The four do not belong together, or a parent follows its child.
+
+    Example:
+        >>> leg = Skeleton(("hip", "knee"), (-1, 0), np.array([[0, 0, 0.9], [0, 0, -0.4]]))
+        >>> leg.children(0)
+        (1,)
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    offsets: FloatArray
+    ends: tuple[bool, ...] = ()
+
+    def __post_init__(self) -> None:
+        n_joints = len(self.names)
+        offsets = np.asarray(self.offsets, dtype=np.float64)
+        ends = tuple(self.ends) or (False,) * n_joints
+        if offsets.shape != (n_joints, 3) or {len(self.parents), len(ends)} != {n_joints}:
+            raise RecordingError(
+                f"{n_joints} joints need as many parents, offsets and ends, not "
+                f"{len(self.parents)}, {offsets.shape} and {len(ends)}"
+            )
+        if not all(-1 <= parent < joint for joint, parent in enumerate(self.parents)):
+            raise RecordingError(f"parents must stand before their children, not {self.parents}")
+        object.__setattr__(self, "offsets", offsets)
+        object.__setattr__(self, "ends", ends)
+
+    def __len__(self) -> int:
+        """Number of joints."""
+        return len(self.names)
+
+    def children(self, joint: int) -> tuple[int, ...]:
+        """Return the indices of the joints that hang on a joint."""
+        return tuple(child for child, parent in enumerate(self.parents) if parent == joint)
+
+
+@dataclass(frozen=True)
 class Recording:
     """A stretch of measured motion.
 
@@ -84,6 +132,8 @@ class Recording:
         name: What the recording is called (a file's stem, a take's id).
         person: Who moves; empty where unknown.
         labels: What is known about its segments, in order of their start.
+        skeleton: The joints whose angles or positions it holds; None for plain markers, and
+            where angles come without their skeleton. Positions are its joints', in the same order.
     """
 
     frames: FloatArray
@@ -92,6 +142,7 @@ class Recording:
     name: str = ""
     person: str = ""
     labels: tuple[LabelledSegment, ...] = field(default=())
+    skeleton: Skeleton | None = None
 
     def __post_init__(self) -> None:
         frames = np.asarray(self.frames, dtype=np.float64)

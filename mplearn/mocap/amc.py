@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..recording import FloatArray, Recording
-from .asf import Skeleton, read_asf
+from .asf import ASFSkeleton, read_asf
 from .cmu_humanoid import CMU_COLUMNS, CMU_UNIT_M, cmu_humanoid_positions
 from .files import bad_file, cmu_subject, read_text, stem
 from .kinematics import joint_positions
@@ -44,7 +44,7 @@ class AMCReader(Reader):
             angles = _in_si(values, columns, True if degrees is None else degrees, unit)
             if positions:
                 return cmu_humanoid_positions(path, angles, rate_hz, unit)
-            return angle_recording(path, columns, angles, axes, rate_hz)
+            return angle_recording(path, columns, (), angles, axes, rate_hz)
 
         skeleton = read_asf(skeleton_file, hints.unit_m)
         _check_size(skeleton_file, skeleton)
@@ -57,7 +57,7 @@ class AMCReader(Reader):
         )
         if positions:
             return position_recording(path, skeleton.joints, angles, axes, rate_hz)
-        return angle_recording(path, skeleton.columns, angles, axes, rate_hz)
+        return angle_recording(path, skeleton.columns, skeleton.joints, angles, axes, rate_hz)
 
 
 def _skeleton_file(path: Path, hints: Hints) -> Path | None:
@@ -149,6 +149,6 @@ def _in_si(
     return values * factors
 
 
-def _check_size(path: Path, skeleton: Skeleton) -> None:
+def _check_size(path: Path, skeleton: ASFSkeleton) -> None:
     rest = joint_positions(skeleton.joints, np.zeros((1, len(skeleton.columns))))[0]
     check_skeleton(path, rest, skeleton.unit_m)

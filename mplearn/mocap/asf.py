@@ -30,7 +30,7 @@ class _Bone:
 
 
 @dataclass(frozen=True)
-class Skeleton:
+class ASFSkeleton:
     """An ASF skeleton.
 
     Attributes:
@@ -47,7 +47,7 @@ class Skeleton:
     degrees: bool
 
 
-def read_asf(path: Path, unit_m: float | None = None) -> Skeleton:
+def read_asf(path: Path, unit_m: float | None = None) -> ASFSkeleton:
     """Read a skeleton, plain or gzipped.
 
     Args:
@@ -74,7 +74,7 @@ def read_asf(path: Path, unit_m: float | None = None) -> Skeleton:
     joints, columns = _tree(
         path, root, columns, bones, _children(path, sections["hierarchy"], bones)
     )
-    return Skeleton(columns, joints, unit_m, degrees)
+    return ASFSkeleton(columns, joints, unit_m, degrees)
 
 
 def _sections(path: Path) -> dict[str, list[list[str]]]:
@@ -204,7 +204,7 @@ def _tree(
         index = len(joints) - 1
         below = children.get(name, ())
         if not below:
-            joints.append(Joint(f"{name}_end", index, ends[name]))
+            joints.append(Joint(f"{name}_end", index, ends[name], is_end=True))
         waiting.extend((child, index) for child in reversed(below))
     unreached = sorted(set(bones) - set(ends))
     if unreached:

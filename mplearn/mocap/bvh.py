@@ -41,7 +41,7 @@ class BVHReader(Reader):
         rate_hz = hints.rate_hz or file_rate_hz
         if positions:
             return position_recording(path, joints, values, axes, rate_hz)
-        return angle_recording(path, columns, values, axes, rate_hz)
+        return angle_recording(path, columns, joints, values, axes, rate_hz)
 
 
 def _at_rest(joint: Joint) -> Joint:
@@ -83,10 +83,10 @@ class _Hierarchy:
         joints: list[Joint] = []
         columns: list[Column] = []
         open_joints: list[int] = []
-        name, parent = next(words), -1
+        name, parent, is_end = next(words), -1, False
         while True:
             self._expect(next(words), "{")
-            joint, own = self._body(words, name, parent, len(columns))
+            joint, own = self._body(words, name, parent, is_end, len(columns))
             if any(joint.name == other.name for other in joints):
                 raise bad_file(self.path, f"two joints named {joint.name!r}", "a name for each")
             open_joints.append(len(joints))
@@ -103,21 +103,22 @@ class _Hierarchy:
                     return tuple(joints), tuple(columns)
                 word = next(words)
             parent = open_joints[-1]
+            is_end = word.upper() == "END"
             if word.upper() == "JOINT":
                 name = next(words)
-            elif word.upper() == "END":
+            elif is_end:
                 self._expect(next(words), "SITE")
                 name = f"{joints[parent].name}_end"
             else:
                 raise bad_file(self.path, f"{word!r} in the hierarchy", "JOINT, End Site or }")
 
     def _body(
-        self, words: Iterator[str], name: str, parent: int, first: int
+        self, words: Iterator[str], name: str, parent: int, is_end: bool, first: int
     ) -> tuple[Joint, list[Column]]:
         self._expect(next(words), "OFFSET")
         offset = np.array([self._number(next(words), f"OFFSET of {name}") for _ in range(3)])
         own: list[Column] = []
-        if not name.endswith("_end"):
+        if not is_end:
             self._expect(next(words), "CHANNELS")
             count = self._number(next(words), f"CHANNELS of {name}")
             if count not in range(7):
@@ -127,7 +128,7 @@ class _Hierarchy:
                 raise bad_file(self.path, f"a channel of {name!r} twice", "each channel once")
         turning = tuple((np.eye(3)[c.axis], first + i) for i, c in enumerate(own) if c.rotates)
         moving = tuple((c.axis, first + i) for i, c in enumerate(own) if not c.rotates)
-        return Joint(name, parent, offset * self.unit_m, turning, moving), own
+        return Joint(name, parent, offset * self.unit_m, turning, moving, is_end=is_end), own
 
     def _column(self, word: str, name: str, of_root: bool) -> Column:
         axis, kind = word[:1].lower(), word[1:].lower()

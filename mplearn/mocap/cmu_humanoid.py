@@ -12,7 +12,7 @@ import numpy as np
 from ..maths.rotations import quaternion_to_matrix
 from ..recording import FloatArray, Recording, marker_channels
 from .files import bad_file, cmu_subject, stem
-from .kinematics import Joint, joint_positions
+from .kinematics import Joint, joint_positions, skeleton_of
 from .skeletal import Column
 from .space import checked_markers, to_z_up
 
@@ -64,7 +64,10 @@ def cmu_humanoid_positions(
     checked_markers(path, points, names)
     channels = marker_channels(names)
     frames = points.reshape(len(points), -1)
-    return Recording(frames, rate_hz, channels, stem(path), cmu_subject(stem(path)))
+    skeleton = skeleton_of(joints, qpos, _DM_CONTROL_AXES)
+    return Recording(
+        frames, rate_hz, channels, stem(path), cmu_subject(stem(path)), skeleton=skeleton
+    )
 
 
 def _converted(angles: FloatArray, unit_m: float) -> tuple[FloatArray, Any]:

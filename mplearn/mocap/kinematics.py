@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..maths.rotations import axis_angle_to_matrix
-from ..recording import FloatArray
+from ..recording import FloatArray, Skeleton
 
 _IDENTITY = np.eye(3)
 
@@ -26,6 +26,7 @@ class Joint:
         translations: Axis 0-2 and column [m] of each moving coordinate; they replace the offset's.
         before: Rotation from the parent's frame to that of the angles, shape (3, 3).
         after: Rotation from the frame of the angles to the bone's, shape (3, 3).
+        is_end: Whether it is where a chain ends, and turns nothing.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Joint:
     translations: tuple[tuple[int, int], ...] = ()
     before: FloatArray = field(default_factory=lambda: _IDENTITY)
     after: FloatArray = field(default_factory=lambda: _IDENTITY)
+    is_end: bool = False
 
 
 def joint_positions(joints: tuple[Joint, ...], values: FloatArray) -> FloatArray:
@@ -67,3 +69,35 @@ def joint_positions(joints: tuple[Joint, ...], values: FloatArray) -> FloatArray
             rotation = parent @ rotation
         frames.append(rotation)
     return positions
+
+
+def skeleton_of(joints: tuple[Joint, ...], values: FloatArray, axes: FloatArray) -> Skeleton:
+    """Return the joints as a recording names them.
+
+    A place that the recording moves (a joint's position channels) is taken at its median: most
+    files that move more than the root repeat the bone's length in every frame.
+
+    Args:
+        joints: J joints, parents first.
+        values: Angles [rad] and translations [m], shape (T, C).
+        axes: Rotation from the file's axes to z up, shape (3, 3).
+    """
+    offsets = np.array([joint.offset for joint in joints])
+    for joint, offset in zip(joints, offsets, strict=True):
+        for axis, column in joint.translations:
+            offset[axis] = np.nanmedian(values[:, column]) if joint.parent >= 0 else offset[axis]
+    still = tuple(
+        Joint(joint.name, joint.parent, offset, (), (), joint.before, joint.after)
+        for joint, offset in zip(joints, offsets, strict=True)
+    )
+    rest = joint_positions(still, np.zeros((1, 0)))[0] @ axes.T
+    parents = tuple(joint.parent for joint in joints)
+    hanging = [index for index, parent in enumerate(parents) if parent >= 0]
+    from_parent = rest.copy()
+    from_parent[hanging] -= rest[[parents[index] for index in hanging]]
+    return Skeleton(
+        tuple(joint.name for joint in joints),
+        parents,
+        from_parent,
+        tuple(joint.is_end for joint in joints),
+    )

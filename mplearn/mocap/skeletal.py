@@ -9,7 +9,7 @@ import numpy as np
 
 from ..recording import FloatArray, Recording, marker_channels
 from .files import bad_file, cmu_subject, stem
-from .kinematics import Joint, joint_positions
+from .kinematics import Joint, joint_positions, skeleton_of
 from .space import checked_markers
 
 
@@ -40,17 +40,24 @@ class Column:
 
 
 def angle_recording(
-    path: Path, columns: tuple[Column, ...], values: FloatArray, axes: FloatArray, rate_hz: float
+    path: Path,
+    columns: tuple[Column, ...],
+    joints: tuple[Joint, ...],
+    values: FloatArray,
+    axes: FloatArray,
+    rate_hz: float,
 ) -> Recording:
     """Return the columns as channels, angles free of jumps by a full turn.
 
     Args:
         path: The file.
         columns: What each column means, length C.
+        joints: The joints that they move, parents first; empty where they are not known.
         values: Angles [rad] and translations [m], shape (T, C).
         axes: `to_z_up` of the file, a cyclic exchange of axes, so that angles keep their values.
         rate_hz: Frames per second [1/s].
     """
+    skeleton = skeleton_of(joints, values, axes) if joints else None
     values = values.copy()
     turning = [i for i, column in enumerate(columns) if column.rotates]
     values[:, turning] = np.unwrap(values[:, turning], axis=0)
@@ -58,7 +65,9 @@ def angle_recording(
     if len(set(channels)) != len(channels):
         twice = sorted({name for name in channels if channels.count(name) > 1})
         raise bad_file(path, f"channels {twice[:5]} more than once", "each channel once")
-    return Recording(values, rate_hz, channels, stem(path), cmu_subject(stem(path)))
+    return Recording(
+        values, rate_hz, channels, stem(path), cmu_subject(stem(path)), skeleton=skeleton
+    )
 
 
 def position_recording(
@@ -74,4 +83,5 @@ def position_recording(
         marker_channels(names),
         stem(path),
         cmu_subject(stem(path)),
+        skeleton=skeleton_of(joints, values, axes),
     )
