@@ -8,9 +8,10 @@ import numpy as np
 
 import mplearn_envs
 from mplearn import PrimitiveLibrary
-from mplearn_envs.control import Motion, Plan, Planner, rest_reference
+from mplearn_envs.execution.simulation import Simulation
+from mplearn_envs.mechanics import rest_reference
+from mplearn_envs.planning import Motion, Plan, Planner
 from mplearn_envs.robot import humanoid
-from mplearn_envs.simulation import Simulation
 
 STANDING = ("both arms raise", "both arms lower", "bow down", "bow up", "squat down", "squat raise")
 STEPPING = (

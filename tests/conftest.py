@@ -1,6 +1,6 @@
 import pytest
 
-from mplearn_envs.graphics import choose_backend
+from mplearn_envs.rendering.backend import choose_backend
 
 CAN_DRAW = choose_backend()  # before anything imports mujoco, which reads MUJOCO_GL then
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import get_args
 
 from mplearn.errors import InvalidValueError
-from mplearn_envs.performer import Dynamics
+from mplearn_envs.execution.modes import Dynamics
 from mplearn_envs.tasks import TASKS
 
 from .contest import Contest, Game

@@ -8,10 +8,10 @@ from gymnasium.envs.registration import register
 
 register(
     id="mplearn/PrimitiveHumanoid-v0",
-    entry_point="mplearn_envs.primitive_humanoid:PrimitiveHumanoidEnv",
-    vector_entry_point="mplearn_envs.vector:PrimitiveHumanoidVectorEnv",
+    entry_point="mplearn_envs.environment.primitive_humanoid:PrimitiveHumanoidEnv",
+    vector_entry_point="mplearn_envs.environment.vector:PrimitiveHumanoidVectorEnv",
 )
 register(
     id="mplearn/OnlinePrimitiveHumanoid-v0",
-    entry_point="mplearn_envs.online:OnlinePrimitiveHumanoidEnv",
+    entry_point="mplearn_envs.environment.online:OnlinePrimitiveHumanoidEnv",
 )

@@ -2,7 +2,7 @@ import os
 import subprocess
 import sys
 
-from mplearn_envs.graphics import choose_backend
+from mplearn_envs.rendering.backend import choose_backend
 
 
 def test_the_demo_chooses_its_graphics_library_before_mujoco_is_imported():

@@ -14,7 +14,7 @@ from mplearn_agents.policies import (
     RandomWalk,
 )
 from mplearn_agents.walk import walk
-from mplearn_envs.feasibility import FeasibilityConfig
+from mplearn_envs.skills.feasibility import FeasibilityConfig
 
 
 class Ring(gymnasium.Env):

@@ -9,12 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from link_world import CODE, N, posture
 
-from mplearn_envs.link import (
-    Datagram,
-    DatagramError,
-    decode,
-    encode,
-)
+from mplearn_envs.link import Datagram, DatagramError, decode, encode
 from mplearn_envs.link.datagram import base_coordinates, base_frame
 
 finite = st.floats(allow_nan=False, allow_infinity=False, width=64)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from standing_library import ARMS, BOW, KICK, RATE_HZ, SQUAT, STANDING_M, posture, sweep
 
-from mplearn_envs.control import Planner
-from mplearn_envs.feasibility import FeasibilityCheck, FeasibilityConfig
+from mplearn_envs.planning import Planner
 from mplearn_envs.robot import humanoid
+from mplearn_envs.skills.feasibility import FeasibilityCheck, FeasibilityConfig
 
 CHECK = FeasibilityCheck(Planner(humanoid()))
 

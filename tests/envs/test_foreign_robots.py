@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from mplearn.body import features_of, human_body, posture_of, robot_body
 from mplearn.errors import MissingDependencyError, RobotError
-from mplearn_envs.control import reference_robot
+from mplearn_envs.mechanics import reference_robot
 from mplearn_envs.robot import ROLES, Retargeting, Robot, humanoid, unitree_g1
 
 HUMAN = human_body(1.7)

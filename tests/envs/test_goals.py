@@ -5,7 +5,7 @@ import pytest
 from standing_env import SLOT, legal
 from standing_task import make, shortest_way
 
-from mplearn_envs.reach import soonest_arrivals
+from mplearn_envs.execution.earliest_arrival import earliest_arrivals
 from mplearn_envs.tasks import GoalTask
 
 
@@ -36,7 +36,7 @@ def test_soonest_arrivals_are_those_of_all_ways():
     env = make("free")
     env.reset()
     repertoire = env.unwrapped.repertoire
-    found = soonest_arrivals(repertoire, repertoire.entries(env.unwrapped.performer.reference))
+    found = earliest_arrivals(repertoire, repertoire.entries(env.unwrapped.performer.reference))
     best = {}
     rng = np.random.default_rng(0)
     for _ in range(60):

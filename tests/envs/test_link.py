@@ -13,22 +13,16 @@ from hypothesis import strategies as st
 from link_world import PERIOD_S, ROBOT, N, posture
 
 from mplearn.errors import FrameError, InvalidValueError
-from mplearn_envs.control import reference_robot, rest_reference
-from mplearn_envs.control.reference import soles
-from mplearn_envs.link import (
-    LowerBody,
-    Receiver,
-    Sender,
-    UpperBody,
-    decode,
-)
+from mplearn_envs.execution.simulation import Simulation
+from mplearn_envs.link import LowerBody, Receiver, Sender, UpperBody, decode
 from mplearn_envs.link.datagram import base_frame
 from mplearn_envs.link.disturbance import Disturbance, DisturbedSender
 from mplearn_envs.link.playback import Playback
 from mplearn_envs.link.run import path_frames
 from mplearn_envs.link.sender import LinkError
+from mplearn_envs.mechanics import reference_robot, rest_reference
+from mplearn_envs.mechanics.reference import soles
 from mplearn_envs.robot import make_robot
-from mplearn_envs.simulation import Simulation
 
 
 @pytest.fixture

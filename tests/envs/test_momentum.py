@@ -3,9 +3,9 @@
 import mujoco
 import numpy as np
 
-from mplearn_envs.control import reference_robot
-from mplearn_envs.control.momentum import ground_reaction, momenta
-from mplearn_envs.control.support import zero_moment_point
+from mplearn_envs.mechanics import reference_robot
+from mplearn_envs.mechanics.momentum import ground_reaction, momenta
+from mplearn_envs.mechanics.support import zero_moment_point
 from mplearn_envs.robot import humanoid
 
 HUMANOID = humanoid()

@@ -13,9 +13,9 @@ import mplearn_envs  # noqa: F401  (registers the environments)
 from mplearn import LearnerConfig, MotionLearner, Recording
 from mplearn.errors import InvalidValueError, LibraryError
 from mplearn_envs.checks import check_action_mask
-from mplearn_envs.demonstration import RecordingStream, SyntheticStream
+from mplearn_envs.environment.live_demonstrator import RecordingDemonstrator, SyntheticDemonstrator
 from mplearn_envs.robot import humanoid
-from mplearn_envs.slots import Slots
+from mplearn_envs.skills.slots import Slots
 from mplearn_envs.tasks import FreeTask
 
 ID = "mplearn/OnlinePrimitiveHumanoid-v0"
@@ -142,7 +142,7 @@ def test_it_complies():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"demonstrator": "nobody"}, "'synthetic', a Recording or a Stream"),
+        ({"demonstrator": "nobody"}, "'synthetic', a Recording or a LiveDemonstrator"),
         ({"warm_up_s": -1.0}, "warm_up_s"),
         ({"warm_up_s": np.nan}, "warm_up_s"),
         ({"library": standing_library()}, "learns its library"),
@@ -163,12 +163,12 @@ def test_a_demonstrator_of_another_body_is_refused():
 
 def test_streams_are_what_they_show():
     film = recording(1)
-    stream = RecordingStream(film)
+    stream = RecordingDemonstrator(film)
     stream.restart(np.random.default_rng(0))
     frames, ended = stream.take(10**6)
     assert ended and np.array_equal(frames, film.frames)
     assert np.array_equal(stream.take(3)[0], film.frames[:3])
-    person = SyntheticStream()
+    person = SyntheticDemonstrator()
     person.restart(np.random.default_rng(1))
     begun, _ = person.take(250)
     twin = copy.deepcopy(person)

@@ -7,9 +7,9 @@ from scipy.spatial import ConvexHull
 
 from mplearn_agents.film.film import zero_moment_points
 from mplearn_agents.walk import WalkResult
-from mplearn_envs.overlay import BalanceMeter
+from mplearn_envs.execution.simulation import Simulation
+from mplearn_envs.rendering.overlay import BalanceMeter
 from mplearn_envs.robot import humanoid
-from mplearn_envs.simulation import Simulation
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +72,7 @@ def test_the_zmp_of_a_recorded_walk_is_the_pendulums(simulation):
 
 
 def test_the_marks_are_drawn(renderer, simulation):
-    from mplearn_envs.rendering import Renderer
+    from mplearn_envs.rendering.renderer import Renderer
 
     model, data = simulation.model, simulation.data
     pictures = []

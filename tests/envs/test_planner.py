@@ -8,19 +8,14 @@ from hypothesis import strategies as st
 from standing_library import ARMS, BOW, RATE_HZ, SQUAT, sweep
 
 from mplearn.errors import FrameError, InvalidValueError
-from mplearn_envs.control import (
-    Motion,
-    Planner,
-    StandingController,
-    UpperBodyTracker,
-    reference_robot,
-    rest_reference,
-)
-from mplearn_envs.control.controller import tracked_columns
-from mplearn_envs.control.splines import refine
-from mplearn_envs.control.support import convex_hull, support_margin
+from mplearn_envs.control import StandingController, UpperBodyTracker
+from mplearn_envs.control.standing import tracked_columns
+from mplearn_envs.execution.simulation import Simulation
+from mplearn_envs.mechanics import reference_robot, rest_reference
+from mplearn_envs.mechanics.support import convex_hull, support_margin
+from mplearn_envs.planning import Motion, Planner
+from mplearn_envs.planning.splines import refine
 from mplearn_envs.robot import humanoid
-from mplearn_envs.simulation import Simulation
 
 HUMANOID = humanoid()
 REFERENCE = reference_robot(HUMANOID)

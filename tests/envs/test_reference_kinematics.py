@@ -7,16 +7,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mplearn_envs.control.balance import BalanceController
-from mplearn_envs.control.footwork import sole_heights
-from mplearn_envs.control.kinematics import forward, mass_tree, rotate_quaternion, rotation_error
-from mplearn_envs.control.reference import base_rotation, reference_robot, rest_reference
-from mplearn_envs.control.velocity_ik import (
+from mplearn_envs.mechanics.kinematics import forward, mass_tree, rotate_quaternion, rotation_error
+from mplearn_envs.mechanics.reference import base_rotation, reference_robot, rest_reference
+from mplearn_envs.mechanics.velocity_ik import (
     add_leg_columns,
     errors,
     jacobian_rows,
     settle,
     solve_damped,
 )
+from mplearn_envs.planning.footwork import sole_heights
 from mplearn_envs.robot import humanoid
 
 MODEL = humanoid().model()

@@ -11,7 +11,7 @@ from standing_library import standing_library
 
 import mplearn_envs  # noqa: F401  (registers the environment)
 from mplearn.errors import InvalidValueError, MissingDependencyError
-from mplearn_envs.primitive_humanoid import PrimitiveHumanoidEnv
+from mplearn_envs.environment.primitive_humanoid import PrimitiveHumanoidEnv
 
 ID = "mplearn/PrimitiveHumanoid-v0"
 
@@ -67,7 +67,7 @@ def run(code):
 
 def test_a_renderer_that_is_left_open_ends_in_silence(renderer):
     left = run(
-        "import numpy as np; from mplearn_envs.rendering import Renderer;"
+        "import numpy as np; from mplearn_envs.rendering.renderer import Renderer;"
         "from mplearn_envs.robot import humanoid; import mujoco; model = humanoid().model();"
         "data = mujoco.MjData(model); mujoco.mj_forward(model, data);"
         "first, second = Renderer(model, 32, 24), Renderer(model, 32, 24);"
@@ -83,7 +83,12 @@ def test_importing_the_package_is_light():
 
 
 def test_making_an_environment_is_light():
-    unwanted = ("mplearn_envs.online", "mplearn_envs.rendering", "scipy.signal", "torch")
+    unwanted = (
+        "mplearn_envs.environment.online",
+        "mplearn_envs.rendering.renderer",
+        "scipy.signal",
+        "torch",
+    )
     done = run(
         "import sys, gymnasium, mplearn_envs; gymnasium.make('mplearn/PrimitiveHumanoid-v0');"
         f"print([m for m in {unwanted} if m in sys.modules])"

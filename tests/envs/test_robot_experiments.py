@@ -3,6 +3,7 @@
 import numpy as np
 from standing_library import standing_library
 
+from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.experiments import (
     learned_table,
     push_table,
@@ -12,7 +13,6 @@ from mplearn_envs.experiments import (
 )
 from mplearn_envs.experiments.model_error import disturb
 from mplearn_envs.robot import humanoid
-from mplearn_envs.simulation import Simulation
 
 
 def test_random_walks_count_what_happened():

@@ -11,7 +11,7 @@ import pytest
 from mplearn.body import robot_body
 from mplearn.errors import RobotError
 from mplearn_envs.robot import humanoid
-from mplearn_envs.robot.description import read_model
+from mplearn_envs.robot.compiling import read_model
 
 
 def test_the_committed_model_is_what_the_build_makes():

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from standing_library import BOW, RATE_HZ, sweep
 
-from mplearn_envs.control import Motion, Planner, rest_reference
-from mplearn_envs.control.controller import tracked_columns
-from mplearn_envs.control.guide import correct, make_guide
+from mplearn_envs.control.ankle_feedback import correct, make_ankle_feedback
+from mplearn_envs.control.standing import tracked_columns
+from mplearn_envs.execution.simulation import Simulation
+from mplearn_envs.mechanics import rest_reference
+from mplearn_envs.planning import Motion, Planner
 from mplearn_envs.robot import humanoid
-from mplearn_envs.simulation import Simulation
 
 HUMANOID = humanoid()
 MOTION = Motion(sweep({}, BOW, 1.0)[:, tracked_columns(HUMANOID)], RATE_HZ)
@@ -86,7 +87,7 @@ def test_guided_steps_are_mujocos_with_the_guides_corrections(simulation):
     mujoco.mj_setState(model, data, simulation.state(), STATE)
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
-    guide = make_guide(HUMANOID, PLAN)
+    guide = make_ankle_feedback(HUMANOID, PLAN)
     feet = [model.body(name).id for name in HUMANOID.feet]
     seen = [data.xpos[feet[0]], data.xpos[feet[1]], data.xmat[feet[0]], data.xmat[feet[1]]]
     changed = 0

@@ -6,22 +6,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from standing_library import KICK, RATE_HZ, posture, sweep
 
-from mplearn_envs.control import (
-    Motion,
-    Planner,
-    PlannerConfig,
-    reference_robot,
-    rest_reference,
-)
-from mplearn_envs.control.footwork import Footwork, Lift, read_footwork
-from mplearn_envs.control.gravity import holding_torques
-from mplearn_envs.control.kinematics import places
-from mplearn_envs.control.pendulum import JERK_WEIGHT, plan_cog, zmp_along
-from mplearn_envs.control.reference import soles
-from mplearn_envs.control.stride import landing, sole_middles
+from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.experiments.model_error import disturb
+from mplearn_envs.mechanics import reference_robot, rest_reference
+from mplearn_envs.mechanics.gravity import holding_torques
+from mplearn_envs.mechanics.kinematics import places
+from mplearn_envs.mechanics.pendulum import JERK_WEIGHT, plan_cog, zmp_along
+from mplearn_envs.mechanics.reference import sole_middles, soles
+from mplearn_envs.planning import Motion, Planner, PlannerConfig
+from mplearn_envs.planning.footwork import Footwork, Lift, read_footwork
+from mplearn_envs.planning.stride import landing
 from mplearn_envs.robot import humanoid
-from mplearn_envs.simulation import Simulation
 
 HUMANOID = humanoid()
 REFERENCE = reference_robot(HUMANOID)

@@ -9,9 +9,9 @@ from scipy.spatial import ConvexHull, Delaunay
 
 from mplearn.errors import FrameError, InvalidValueError
 from mplearn_envs.control.cog_filter import CogFilter
-from mplearn_envs.control.inverse_dynamics import InverseDynamics
-from mplearn_envs.control.reference import reference_robot
-from mplearn_envs.control.support import (
+from mplearn_envs.mechanics.inverse_dynamics import InverseDynamics
+from mplearn_envs.mechanics.reference import reference_robot
+from mplearn_envs.mechanics.support import (
     convex_hull,
     pendulum_zmp,
     support_margin,

@@ -8,8 +8,8 @@ from standing_library import standing_library
 
 import mplearn_envs  # noqa: F401  (registers the environment)
 from mplearn.errors import InvalidValueError
+from mplearn_envs.environment.vector import PrimitiveHumanoidVectorEnv
 from mplearn_envs.tasks import GoalTask
-from mplearn_envs.vector import PrimitiveHumanoidVectorEnv
 
 ID = "mplearn/PrimitiveHumanoid-v0"
 OPTIONS = {"max_steps": 4}

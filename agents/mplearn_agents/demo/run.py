@@ -14,7 +14,7 @@ from mplearn.errors import InvalidValueError
 from mplearn_agents.extras import require
 from mplearn_agents.learning import learn
 from mplearn_agents.report import render_page
-from mplearn_envs.graphics import choose_backend
+from mplearn_envs.rendering.backend import choose_backend
 
 from .page import Run, demo_page, meaning
 from .performance import make_film, perform

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
 def walks(setting: Setting) -> Iterator[Table]:
     """200 primitives in a row, with a wrong model; then each primitive, and each speed."""
+    from mplearn_envs.data.library_source import LibrarySource
     from mplearn_envs.experiments import primitive_table, random_walks, speed_table, walk_table
-    from mplearn_envs.library_source import LibrarySource
 
     library = LibrarySource(None).now()
     found = random_walks(library, setting.seeds)
@@ -26,8 +26,8 @@ def walks(setting: Setting) -> Iterator[Table]:
 def other_robots(setting: Setting) -> Iterator[Table]:
     """The same walks of the Unitree G1 at half speed, where its model is installed."""
     from mplearn.errors import MissingDependencyError
+    from mplearn_envs.data.library_source import LibrarySource
     from mplearn_envs.experiments import random_walks, speed_table, walk_table
-    from mplearn_envs.library_source import LibrarySource
     from mplearn_envs.robot import unitree_g1
 
     try:

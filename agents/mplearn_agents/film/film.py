@@ -54,7 +54,7 @@ def zero_moment_points(walk: WalkResult, robot_xml: str) -> FloatArray:
     """
     import mujoco
 
-    from mplearn_envs.control.support import pendulum_zmp
+    from mplearn_envs.mechanics.support import pendulum_zmp
 
     model = mujoco.MjModel.from_xml_string(robot_xml)
     data = mujoco.MjData(model)

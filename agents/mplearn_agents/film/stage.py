@@ -42,8 +42,8 @@ class Stage:
     ) -> None:
         import mujoco
 
-        from mplearn_envs.overlay import BalanceMeter
-        from mplearn_envs.rendering import close_at_exit
+        from mplearn_envs.rendering.overlay import BalanceMeter
+        from mplearn_envs.rendering.renderer import close_at_exit
 
         self.bodies, self.size, self.balance = tuple(bodies), size, balance
         self._model = _scene(self.bodies)
@@ -89,7 +89,7 @@ class Stage:
         mujoco.mj_camlight(self._model, self._data)
         self._renderer.update_scene(self._data, self._camera)
         if self._meter is not None:
-            from mplearn_envs.overlay import draw_balance
+            from mplearn_envs.rendering.overlay import draw_balance
 
             shift = np.array([0.0, places[0]])
             point = np.full(2, np.nan) if zmp is None else zmp + shift

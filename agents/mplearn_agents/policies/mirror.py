@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mplearn.errors import InvalidValueError
-from mplearn_envs.choices import HOLD
+from mplearn_envs.skills.action_choices import HOLD
 
 from .base import Policy, legal_actions
 

@@ -8,7 +8,7 @@ import torch
 from stable_baselines3.common.torch_layers import MlpExtractor
 from torch import nn
 
-from mplearn_envs.choices import HOLD
+from mplearn_envs.skills.action_choices import HOLD
 
 from .config import PriorUse
 from .features import LARGEST, LEGAL

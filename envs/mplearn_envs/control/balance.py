@@ -12,11 +12,18 @@ from __future__ import annotations
 import numpy as np
 
 from mplearn.recording import FloatArray
+from mplearn_envs.mechanics.kinematics import forward, rotate_quaternion
+from mplearn_envs.mechanics.reference import Reference, base_rotation, reference_robot
+from mplearn_envs.mechanics.velocity_ik import (
+    COG,
+    FEET,
+    HEIGHT,
+    ORIENTATION,
+    advance,
+    errors,
+    rates,
+)
 from mplearn_envs.robot import Robot
-
-from .kinematics import forward, rotate_quaternion
-from .reference import Reference, base_rotation, reference_robot
-from .velocity_ik import COG, FEET, HEIGHT, ORIENTATION, advance, errors, rates
 
 
 class BalanceController:

@@ -8,8 +8,7 @@ import numpy as np
 
 from mplearn.errors import FrameError, InvalidValueError
 from mplearn.recording import FloatArray
-
-from .support import pendulum_zmp
+from mplearn_envs.mechanics.support import pendulum_zmp
 
 
 class CogFilter:

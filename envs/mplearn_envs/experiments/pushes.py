@@ -8,9 +8,10 @@ import numpy as np
 
 from mplearn.evaluation.table import Table
 from mplearn.recording import FloatArray
-from mplearn_envs.control import Motion, Plan, Planner, reference_robot, rest_reference
+from mplearn_envs.execution.simulation import Feedback, Simulation
+from mplearn_envs.mechanics import reference_robot, rest_reference
+from mplearn_envs.planning import Motion, Plan, Planner
 from mplearn_envs.robot import Robot, humanoid
-from mplearn_envs.simulation import Feedback, Simulation
 
 PUSH_S = 0.1
 RECOVERY_S = 2.5

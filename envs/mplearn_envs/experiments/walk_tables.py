@@ -8,7 +8,7 @@ import numpy as np
 
 from mplearn.evaluation.table import Table, percent
 from mplearn.library import PrimitiveLibrary
-from mplearn_envs.control import Planner
+from mplearn_envs.planning import Planner
 from mplearn_envs.robot import Robot, humanoid
 
 from .walks import FASTEST, Walk, skills

@@ -9,12 +9,13 @@ import numpy as np
 
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import FloatArray
-from mplearn_envs.control import Motion, Plan, Planner, reference_robot, rest_reference
-from mplearn_envs.control.kinematics import places
-from mplearn_envs.feasibility import Feasibility, FeasibilityCheck
-from mplearn_envs.performance import Performance
+from mplearn_envs.execution.simulation import Simulation
+from mplearn_envs.execution.tracking_report import TrackingReport
+from mplearn_envs.mechanics import reference_robot, rest_reference
+from mplearn_envs.mechanics.kinematics import places
+from mplearn_envs.planning import Motion, Plan, Planner
 from mplearn_envs.robot import Retargeting, Robot, humanoid
-from mplearn_envs.simulation import Simulation
+from mplearn_envs.skills.feasibility import Feasibility, FeasibilityCheck
 
 from .model_error import disturb
 
@@ -147,12 +148,12 @@ def go(
         skill = known[last]
         plan = planner.plan(here, skill.motion, skill.verdict.speed, (last, walk.speed))
         before = simulation.data.qpos.copy()
-        performance = simulation.perform(plan)
-        walk.duration_s += performance.duration_s
+        report = simulation.perform(plan)
+        walk.duration_s += report.duration_s
         after = simulation.data.qpos.copy()
-        walk.steps.append(_figures(skill, plan, performance, before, after, planner.robot))
+        walk.steps.append(_figures(skill, plan, report, before, after, planner.robot))
         here = plan.end
-        if performance.fallen:
+        if report.fallen:
             walk.fell = skill.name
             return
 
@@ -171,7 +172,7 @@ def _next(
 def _figures(
     skill: Skill,
     plan: Plan,
-    performance: Performance,
+    report: TrackingReport,
     before: FloatArray,
     after: FloatArray,
     robot: Robot,
@@ -179,16 +180,16 @@ def _figures(
     ref = reference_robot(robot)
     drift, turn = np.nan, np.nan
     stood = [side for side in range(2) if side not in (plan.up[0], plan.up[-1])]
-    if stood and not performance.fallen:
+    if stood and not report.fallen:
         feet = places(ref.tree, ref.stance.feet, np.stack((before, after)))[:, stood[0]]
         wanted = plan.ground[[0, -1], stood[0]]
         moved = _moved(feet) - _moved(wanted)
         drift, turn = float(np.hypot(moved[0], moved[1])), float(abs(moved[2]))
     return (
         skill.name,
-        float(performance.cog_deviation_m.max()),
-        float(performance.zmp_margin_m.min()),
-        float(np.mean(performance.tracking_error_rad**2)),
+        float(report.cog_deviation_m.max()),
+        float(report.zmp_margin_m.min()),
+        float(np.mean(report.tracking_error_rad**2)),
         drift,
         turn,
         skill.motion.duration_s / plan.duration_s,

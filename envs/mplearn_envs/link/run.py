@@ -12,10 +12,10 @@ import numpy as np
 from mplearn.generation import retime
 from mplearn.generation.joins import drawn_from
 from mplearn.recording import FloatArray
-from mplearn_envs.control import rest_reference
-from mplearn_envs.library_source import LibrarySource
+from mplearn_envs.data.library_source import LibrarySource
+from mplearn_envs.execution.simulation import Simulation
+from mplearn_envs.mechanics import rest_reference
 from mplearn_envs.robot import Retargeting, Robot, make_robot
-from mplearn_envs.simulation import Simulation
 
 from .disturbance import Disturbance, DisturbedSender
 from .lower_body import LowerBody

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from .humanoid import GROUPS
+from .drives import HUMANOID_DRIVES
 
 TIMESTEP_S = 0.004
 
@@ -99,7 +99,7 @@ def _add_surroundings(root: Any) -> None:
 
 
 def _add_servos(root: Any) -> None:
-    drives = {name: group for group in GROUPS for name in group.names}
+    drives = {name: group for group in HUMANOID_DRIVES for name in group.names}
     for joint in root.find_all("joint"):
         if joint.tag == "freejoint":
             continue

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
-from importlib.resources import files
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,34 +13,12 @@ import numpy as np
 from mplearn.errors import RobotError
 from mplearn.recording import FloatArray, IntArray
 
+from .compiling import compile_once
+from .drives import JointGroup
+from .roles import BASE_CHANNELS
+
 if TYPE_CHECKING:
     import mujoco
-
-BASE_CHANNELS = ("base_height", "base_roll", "base_pitch")
-#: Segments that a robot may have, as the library's bodies name them; a standing robot needs legs.
-TRUNK_ROLES = ("pelvis", "chest", "head")
-LIMB_ROLES = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")
-ROLES = (*TRUNK_ROLES, *(f"{role}_{side}" for side in "lr" for role in LIMB_ROLES))
-NEEDED_ROLES = ("pelvis", *(f"{role}_{side}" for side in "lr" for role in LIMB_ROLES[3:]))
-
-
-@dataclass(frozen=True)
-class JointGroup:
-    """Joints that are driven alike.
-
-    Attributes:
-        names: The joints' names.
-        stiffness: Gain of the position servo, ``kp`` [N m/rad].
-        damping: Its velocity gain, ``kv`` [N m s/rad].
-        torque: Torque limit [N m].
-        velocity: Velocity limit [rad/s].
-    """
-
-    names: tuple[str, ...]
-    stiffness: float
-    damping: float
-    torque: float
-    velocity: float
 
 
 @dataclass(frozen=True)
@@ -105,9 +82,9 @@ class Robot:
         Raises:
             RobotError: The model does not compile or is no humanoid on two feet, with the reason.
         """
-        from .mjcf import robot_from_mjcf
+        from .from_mjcf import described
 
-        return robot_from_mjcf(source, name, segments, attention or {})
+        return cls(**described(source, name, segments, attention or {}))
 
     def __post_init__(self) -> None:
         model = self.model()
@@ -129,7 +106,7 @@ class Robot:
 
     def model(self) -> mujoco.MjModel:
         """Compile the simulation model."""
-        return _compile(self.xml)
+        return compile_once(self.xml)
 
     @cached_property
     def joint_names(self) -> tuple[str, ...]:
@@ -165,19 +142,3 @@ class Robot:
         """
         values = {n: getattr(group, quantity) for group in self.groups for n in group.names}
         return np.array([values[n] for n in self.joint_names], dtype=np.float64)
-
-
-@cache
-def _compile(xml: str) -> mujoco.MjModel:
-    """Compile once; nobody changes a robot's model (an environment copies it)."""
-    import mujoco
-
-    try:
-        return mujoco.MjModel.from_xml_string(xml)
-    except ValueError as error:
-        raise RobotError(f"the robot's MJCF does not compile: {error}") from error
-
-
-def read_model(name: str) -> str:
-    """Return the text of one of the package's models."""
-    return (files(__package__) / "models" / f"{name}.xml").read_text(encoding="utf-8")

@@ -13,7 +13,8 @@ import numpy as np
 from mplearn.errors import RobotError
 from mplearn.recording import FloatArray
 
-from .description import JointGroup, read_model
+from .compiling import read_model
+from .drives import JointGroup
 
 _LEVEL = 0.995  # least cosine between the floor and the foot of a robot at attention
 _HALF_SOLE_M = 0.01

@@ -24,7 +24,8 @@ from mplearn.body.tree import KinematicTree
 from mplearn.errors import RobotError
 from mplearn.recording import FloatArray, IntArray
 
-from .description import ROLES, Robot
+from .description import Robot
+from .roles import ROLES
 
 if TYPE_CHECKING:
     from mplearn.body import Body

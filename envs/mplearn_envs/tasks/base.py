@@ -10,10 +10,10 @@ import numpy as np
 from gymnasium import spaces
 
 from mplearn.recording import FloatArray
-from mplearn_envs.control.reference import Reference
-from mplearn_envs.measurement import Measured
-from mplearn_envs.performance import Performance
-from mplearn_envs.repertoire import Repertoire
+from mplearn_envs.execution.sensors import Measured
+from mplearn_envs.execution.tracking_report import TrackingReport
+from mplearn_envs.mechanics.reference import Reference
+from mplearn_envs.skills.repertoire import Repertoire
 
 
 class Choice(NamedTuple):
@@ -92,7 +92,7 @@ class Task(ABC):
         """Return what a choice earns at once, by term."""
 
     @abstractmethod
-    def rates(self, performance: Performance) -> dict[str, FloatArray]:
+    def rates(self, report: TrackingReport) -> dict[str, FloatArray]:
         """Return what each moment earns per second, by term, shape (S,) each."""
 
     @abstractmethod

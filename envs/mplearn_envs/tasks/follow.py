@@ -11,9 +11,9 @@ from gymnasium import spaces
 from mplearn.errors import InvalidValueError, NoPathError
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import FloatArray
-from mplearn_envs.choices import HOLD, Choices
-from mplearn_envs.performance import Performance
-from mplearn_envs.repertoire import Repertoire
+from mplearn_envs.execution.tracking_report import TrackingReport
+from mplearn_envs.skills.action_choices import HOLD, Choices
+from mplearn_envs.skills.repertoire import Repertoire
 
 from .base import Choice, Scene, Task
 
@@ -136,16 +136,16 @@ class FollowTask(Task):
         self._doing = choice.primitive
         return {}
 
-    def rates(self, performance: Performance) -> dict[str, FloatArray]:
+    def rates(self, report: TrackingReport) -> dict[str, FloatArray]:
         """Return the term ``agree``."""
-        time_s = self._time_s + performance.time_s
+        time_s = self._time_s + report.time_s
         self._go_on(float(time_s[-1]))
         together = np.zeros(len(time_s))
         if self._doing is not None:
             turn = np.searchsorted(self._ends_s, time_s, side="left")
             same = np.array([id == self._doing for id in self._ids])
             together[same[turn]] = 1.0
-            self._agreed_s += float(together.mean() * performance.duration_s)
+            self._agreed_s += float(together.mean() * report.duration_s)
         return {"agree": self.agree * together}
 
     def fall(self) -> float:

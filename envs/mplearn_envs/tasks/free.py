@@ -8,8 +8,8 @@ import numpy as np
 from gymnasium import spaces
 
 from mplearn.recording import FloatArray
-from mplearn_envs.performance import Performance
-from mplearn_envs.repertoire import Repertoire
+from mplearn_envs.execution.tracking_report import TrackingReport
+from mplearn_envs.skills.repertoire import Repertoire
 
 from .base import Choice, Scene, Task
 
@@ -71,11 +71,11 @@ class FreeTask(Task):
         share = lately.count(choice.primitive) / max(len(lately), 1)
         return {"likely": self.likely * choice.probability, "varied": self.varied * (1.0 - share)}
 
-    def rates(self, performance: Performance) -> dict[str, FloatArray]:
+    def rates(self, report: TrackingReport) -> dict[str, FloatArray]:
         """Return the terms ``alive`` and ``balanced``."""
-        safe = np.minimum(np.maximum(performance.zmp_margin_m / self.safe_m, 0.0), 1.0)
+        safe = np.minimum(np.maximum(report.zmp_margin_m / self.safe_m, 0.0), 1.0)
         return {
-            "alive": np.full(len(performance.time_s), self.alive),
+            "alive": np.full(len(report.time_s), self.alive),
             "balanced": self.balanced * safe,
         }
 

@@ -11,9 +11,9 @@ from gymnasium import spaces
 from mplearn.errors import InvalidValueError, NoPathError
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import FloatArray
-from mplearn_envs.performance import Performance
-from mplearn_envs.reach import soonest_arrivals
-from mplearn_envs.repertoire import Repertoire
+from mplearn_envs.execution.earliest_arrival import earliest_arrivals
+from mplearn_envs.execution.tracking_report import TrackingReport
+from mplearn_envs.skills.repertoire import Repertoire
 
 from .base import Choice, Scene, Task
 from .goals import Goal, GoalKind, HandGoals, PostureGoals, PrimitiveGoals
@@ -106,7 +106,7 @@ class GoalTask(Task):
         """
         repertoire = scene.repertoire
         if self._library is not repertoire.library:
-            self._arrivals = soonest_arrivals(repertoire, repertoire.entries(scene.reference))
+            self._arrivals = earliest_arrivals(repertoire, repertoire.entries(scene.reference))
             self._library = repertoire.library
             self._kind = self._goals(repertoire)
         target = scene.options.get("target", self.target)
@@ -124,9 +124,9 @@ class GoalTask(Task):
         """Return nothing: choosing alone earns nothing."""
         return {}
 
-    def rates(self, performance: Performance) -> dict[str, FloatArray]:
+    def rates(self, report: TrackingReport) -> dict[str, FloatArray]:
         """Return the term ``hurry``."""
-        return {"hurry": np.full(len(performance.time_s), -self.hurry)}
+        return {"hurry": np.full(len(report.time_s), -self.hurry)}
 
     def fall(self) -> float:
         """Return the price of a fall."""

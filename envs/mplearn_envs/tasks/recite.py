@@ -11,8 +11,8 @@ from gymnasium import spaces
 
 from mplearn.errors import InvalidValueError, NoPathError
 from mplearn.recording import FloatArray
-from mplearn_envs.performance import Performance
-from mplearn_envs.repertoire import Repertoire
+from mplearn_envs.execution.tracking_report import TrackingReport
+from mplearn_envs.skills.repertoire import Repertoire
 
 from .base import Choice, Scene, Task
 
@@ -109,9 +109,9 @@ class ReciteTask(Task):
         self._chosen = choice.primitive
         return {}
 
-    def rates(self, performance: Performance) -> dict[str, FloatArray]:
+    def rates(self, report: TrackingReport) -> dict[str, FloatArray]:
         """Return the term ``hurry``."""
-        return {"hurry": np.full(len(performance.time_s), -self.hurry)}
+        return {"hurry": np.full(len(report.time_s), -self.hurry)}
 
     def fall(self) -> float:
         """Return the price of a fall."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from mplearn.recording import FloatArray
-from mplearn_envs.measurement import Measured
-from mplearn_envs.reach import Arrival
-from mplearn_envs.repertoire import Repertoire
+from mplearn_envs.execution.earliest_arrival import Arrival
+from mplearn_envs.execution.sensors import Measured
+from mplearn_envs.skills.repertoire import Repertoire
 
 
 class Goal(ABC):

@@ -11,7 +11,7 @@ import numpy as np
 
 from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray
-from mplearn_envs.measurement import Measured
+from mplearn_envs.execution.sensors import Measured
 
 from .base import Goal, GoalKind
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray
-from mplearn_envs.measurement import Measured
-from mplearn_envs.repertoire import HEIGHT_SCALE
+from mplearn_envs.execution.sensors import Measured
+from mplearn_envs.skills.repertoire import HEIGHT_SCALE
 
 from .base import Goal, GoalKind
 

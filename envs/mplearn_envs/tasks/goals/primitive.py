@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from mplearn.recording import FloatArray
-from mplearn_envs.measurement import Measured
-from mplearn_envs.reach import Arrival
+from mplearn_envs.execution.earliest_arrival import Arrival
+from mplearn_envs.execution.sensors import Measured
 
 from .base import Goal, GoalKind
 

@@ -1,0 +1,1 @@
+"""The Gymnasium environments: what a step is, what is observed, what it earns."""

@@ -1,0 +1,74 @@
+"""Where an episode is: what was performed, how the robot stands, and what may be done next."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mplearn_envs.execution.performer import PerformerState
+from mplearn_envs.execution.sensors import Measured
+from mplearn_envs.mechanics.reference import Reference
+from mplearn_envs.skills.action_choices import Choices
+from mplearn_envs.skills.repertoire import Repertoire
+from mplearn_envs.tasks import Task
+
+_HISTORY = 100  # primitives that tasks may look back
+
+
+class Episode(NamedTuple):
+    """An episode between two macro steps.
+
+    Attributes:
+        measured: How the robot stands.
+        choices: What may be done next.
+        current: Id of the primitive performed last; None at the start and after a dead end.
+        history: Ids of the primitives performed, the latest last, at most 100.
+        time_s: Time since the start [s].
+        n_steps: Number of macro steps.
+        running: Whether it goes on.
+    """
+
+    measured: Measured
+    choices: Choices
+    current: int | None = None
+    history: tuple[int, ...] = ()
+    time_s: float = 0.0
+    n_steps: int = 0
+    running: bool = True
+
+    def after(
+        self,
+        chosen: int | None,
+        measured: Measured,
+        duration_s: float,
+        repertoire: Repertoire,
+        reference: Reference,
+    ) -> Episode:
+        """Return the episode after a macro step.
+
+        Args:
+            chosen: Id of the primitive performed; None is hold.
+            measured: How the robot stands now.
+            duration_s: How long the macro step took [s].
+            repertoire: What the robot can perform by now.
+            reference: Where the reference robot is now.
+        """
+        current, history = self.current, self.history
+        if chosen is not None:
+            current, history = chosen, (*history[1 - _HISTORY :], chosen)
+        gone = current is not None and current not in repertoire.slots
+        if gone or (chosen is None and self.choices.dead_end):
+            current = None
+        choices = repertoire.entries(reference) if current is None else repertoire.after(current)
+        time_s, n_steps = self.time_s + duration_s, self.n_steps + 1
+        return Episode(measured, choices, current, history, time_s, n_steps)
+
+
+class EpisodeState(NamedTuple):
+    """All that the future of an episode depends on."""
+
+    performer: PerformerState
+    episode: Episode
+    task: Task
+    rng: np.random.Generator

@@ -1,0 +1,295 @@
+"""The core of the environments: one action performs a whole primitive."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Any, Literal, SupportsFloat
+
+import gymnasium
+import mujoco
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from mplearn.errors import InvalidValueError
+from mplearn.library import PrimitiveLibrary
+from mplearn_envs.execution.modes import Dynamics, make_performer
+from mplearn_envs.execution.performer import Performer
+from mplearn_envs.execution.simulation import Simulation
+from mplearn_envs.rendering.screen import RENDER_MODES, Screen
+from mplearn_envs.skills.action_choices import HOLD
+from mplearn_envs.skills.repertoire import Repertoire
+from mplearn_envs.tasks import Choice, Scene, Task
+
+from .episode import Episode, EpisodeState
+from .observation import Observation, ObservationBuilder
+from .rewards import add, earned_meanwhile
+
+
+class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
+    """Chooses and performs primitives of a repertoire, and rewards it by a task.
+
+    See `PrimitiveHumanoidEnv` for the meaning of everything. An environment derived from this one
+    builds the parts, and may override `_begin` and `_meanwhile`.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 (gymnasium declares it so)
+        "render_modes": list(RENDER_MODES),
+        "render_fps": 25,
+    }
+
+    repertoire: Repertoire
+    task: Task
+    dynamics: Dynamics
+    hold_s: float
+    max_steps: int
+    discount: float
+    illegal: Literal["hold", "raise"]
+    illegal_penalty: float
+    novel_penalty: float | None
+    frame_rate_hz: float
+
+    def _set_up(self, flat: bool, screen: Screen) -> None:
+        """Complete the construction, once all parts are there."""
+        repertoire = self.repertoire
+        self.capacity = repertoire.capacity
+        self.action_space = spaces.Discrete(self.capacity)
+        n_joints = len(repertoire.robot.joint_names)
+        self._builder = ObservationBuilder(
+            n_joints, self.capacity, self.task.space(repertoire), flat
+        )
+        self.observation_space = self._builder.space
+        self._screen = screen
+        self.render_mode = screen.mode
+        self.frame_callback: Callable[[], object] | None = None
+        self._episode: Episode | None = None
+
+    @cached_property
+    def performer(self) -> Performer:
+        """Who performs; made when it is first needed."""
+        return make_performer(self.dynamics, self.repertoire, self.hold_s)
+
+    @cached_property
+    def _frame_steps(self) -> int:
+        period_s = self.repertoire.planner.config.period_s
+        return max(1, round(1.0 / (self.frame_rate_hz * period_s)))
+
+    # ---- what derived environments do besides
+
+    def _begin(self) -> None:
+        """Prepare an episode, before the robot is put upright."""
+
+    def _meanwhile(self, duration_s: float) -> None:
+        """Let the world go on for the duration of a macro step."""
+
+    # ---- gymnasium's interface
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Put the robot upright, at rest; returns observation and info.
+
+        Args:
+            seed: Seed of the episodes from here on.
+            options: For the task: see there.
+
+        Raises:
+            RobotError: The robot can perform nothing of the library.
+            NoPathError: The task's goal cannot be reached.
+        """
+        super().reset(seed=seed)
+        self._episode = None
+        self._begin()
+        measured = self.performer.reset()
+        episode = Episode(measured, self.repertoire.entries(self.performer.reference))
+        self.task.reset(self._scene(episode, options or {}))
+        self._episode = episode
+        self._show()
+        return self._observation(), self._info()
+
+    def step(
+        self, action: np.int64 | int
+    ) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Perform a primitive, or hold; see the class.
+
+        Raises:
+            InvalidValueError: The action is no integer of the action space, or illegal with
+                ``illegal="raise"``; or the episode has not begun or is over.
+        """
+        before = self._running()
+        slot = self._slot(action, before.choices.mask)
+        legal = bool(before.choices.mask[slot])
+        novel = bool(before.choices.novel[slot])
+        chosen = self.repertoire.primitive(slot) if legal else None
+        probability = float(before.choices.prior[slot])
+        terms = self.task.bonuses(Choice(chosen, legal, probability, before.history))
+        if not legal:
+            terms["illegal"] = -self.illegal_penalty
+        if novel:
+            terms["novel"] = -(self.novel_penalty or 0.0)
+        watched = self.frame_callback is not None or self.render_mode == "human"
+        outcome = self.performer.perform(
+            chosen, self._frame if watched else None, self._frame_steps
+        )
+        report, duration_s = outcome.report, outcome.report.duration_s
+        remaining = self.discount**duration_s
+        add(terms, earned_meanwhile(self.task, report, self.discount))
+        self._meanwhile(duration_s)
+        episode = before.after(
+            chosen, outcome.measured, duration_s, self.repertoire, self.performer.reference
+        )
+        add(terms, self.task.arrive(self._scene(episode, {})), remaining)
+        terminated = report.fallen or self.task.done
+        self._episode = episode._replace(running=not terminated)
+
+        info = self._info()
+        info["duration_s"] = duration_s
+        info["discount"] = remaining
+        info["reward_terms"] = terms
+        info["illegal"] = not legal
+        info["novel"] = novel
+        info["fallen"] = report.fallen
+        info.update(outcome.figures)
+        truncated = episode.n_steps >= self.max_steps
+        return self._observation(), sum(terms.values()), terminated, truncated, info
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Return which actions are legal, shape (capacity,): the convention of sb3-contrib."""
+        return self._begun().choices.mask.astype(np.bool_)
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture, shape (height, width, 3), or show the window.
+
+        Raises:
+            InvalidValueError: There is no render mode.
+        """
+        self.performer.show()
+        return self._screen.picture(self.simulation)
+
+    def close(self) -> None:
+        """Free what drawing needed; a second time does nothing."""
+        self._screen.close()
+
+    def state(self) -> EpisodeState:
+        """Return where the episode is: with `load_state`, actions can be tried."""
+        task, rng = copy.deepcopy((self.task, self.np_random), self._shared())
+        return EpisodeState(self.performer.state(), self._begun(), task, rng)
+
+    def load_state(self, state: EpisodeState) -> tuple[Observation, dict[str, Any]]:
+        """Go on from there, bit for bit; returns observation and info, as `reset` does.
+
+        The state may be another environment's with the same library, robot and task; a simulated
+        one's may be loaded into a kinematic one, to look ahead.
+
+        Raises:
+            InvalidValueError: A kinematic state is loaded into a simulated environment.
+        """
+        measured = self.performer.load_state(state.performer)
+        same_kind = (state.performer.simulated is None) == (self.dynamics == "kinematic")
+        episode = state.episode
+        self._episode = episode if same_kind else episode._replace(measured=measured)
+        self.task, self.np_random = copy.deepcopy((state.task, state.rng), self._shared())
+        return self._observation(), self._info()
+
+    # ---- what others may look at
+
+    @property
+    def library(self) -> PrimitiveLibrary:
+        """The library of now."""
+        return self.repertoire.library
+
+    @property
+    def simulation(self) -> Simulation:
+        """The robot in MuJoCo."""
+        return self.performer.simulation
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The simulation's model."""
+        return self.simulation.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """The simulation's state, up to date."""
+        self.performer.show()
+        return self.simulation.data
+
+    # ---- inside
+
+    def _begun(self) -> Episode:
+        """Return the episode, over or not."""
+        if self._episode is None:
+            raise InvalidValueError("the episode has not begun: call reset first")
+        return self._episode
+
+    def _running(self) -> Episode:
+        """Return the episode, which goes on."""
+        if self._episode is None or not self._episode.running:
+            raise InvalidValueError("the episode has not begun or is over: call reset first")
+        return self._episode
+
+    def _slot(self, action: np.int64 | int, mask: NDArray[np.int8]) -> int:
+        """Return a valid action as an integer."""
+        value = np.asarray(action)
+        if value.shape != () or value.dtype.kind not in "iu" or not 0 <= value < self.capacity:
+            raise InvalidValueError(
+                f"an action is an integer in [0, {self.capacity}), not {action!r}"
+            )
+        slot = int(value)
+        if self.illegal == "raise" and not mask[slot]:
+            allowed = np.flatnonzero(mask).tolist()
+            raise InvalidValueError(f"action {slot} is illegal here; legal are {allowed}")
+        return slot
+
+    def _shared(self) -> dict[int, Any]:
+        """Return what copies of a task share with it, for `copy.deepcopy`."""
+        return {id(part): part for part in (self.repertoire, self.library)}
+
+    def _scene(self, episode: Episode, options: Mapping[str, Any]) -> Scene:
+        return Scene(
+            self.repertoire,
+            episode.measured,
+            self.performer.reference,
+            episode.current,
+            episode.history,
+            episode.time_s,
+            self.np_random,
+            options,
+        )
+
+    def _observation(self) -> Observation:
+        episode = self._begun()
+        slot = HOLD if episode.current is None else self.repertoire.slots[episode.current]
+        return self._builder.see(episode.measured, slot, episode.choices, self.task.observe())
+
+    def _info(self) -> dict[str, Any]:
+        choices, current = self._begun().choices, self._begun().current
+        report = self.task.report()
+        info = {
+            "action_mask": choices.mask.copy(),
+            "transition_prior": choices.prior.copy(),
+            "infeasible": dict(choices.refused),
+            "dead_end": choices.dead_end,
+            "library_version": self.library.version,
+            "primitive": -1 if current is None else current,
+            "primitive_name": "" if current is None else self.library[current].name,
+            "task": report,
+        }
+        if "success" in report:
+            info["is_success"] = report["success"]
+        return info
+
+    def _frame(self) -> None:
+        if self.frame_callback is not None:
+            self.frame_callback()
+        self._show()
+
+    def _show(self) -> None:
+        if self.render_mode == "human":
+            self.performer.show()
+            self._screen.show(self.simulation)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "frame_callback": None}

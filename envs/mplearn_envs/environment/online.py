@@ -1,0 +1,151 @@
+"""``mplearn/OnlinePrimitiveHumanoid-v0``: the humanoid acts while its demonstrator goes on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from mplearn.errors import InvalidValueError
+from mplearn.learner import (
+    LearnerConfig,
+    MotionLearner,
+    PrimitiveBorn,
+    PrimitiveMerged,
+    PrimitiveSplit,
+    Recognised,
+    TransitionSeen,
+)
+from mplearn.learner.events import Event
+from mplearn_envs.tasks import FollowTask
+
+from .episode import EpisodeState
+from .live_demonstrator import DemonstratorLike, open_demonstrator
+from .primitive_humanoid import PrimitiveHumanoidEnv
+
+CAPACITY = 64
+
+
+class OnlinePrimitiveHumanoidEnv(PrimitiveHumanoidEnv):
+    """A humanoid that performs what a demonstrator, who is still moving, has shown so far.
+
+    While the robot performs for ``info["duration_s"]``, the demonstrator moves on for the same
+    time, and a `MotionLearner` watches: tree and graph grow within the episode ([Kulic2012], figure
+    1). A new primitive takes a free slot and becomes a legal action where it was seen to follow; a
+    primitive that turns out to be another, or several, leaves its slot. Before there is any, only
+    hold is legal.
+
+    Actions, observations, rewards and all other arguments are those of `PrimitiveHumanoidEnv`;
+    ``capacity`` is 64 unless given. When there are more primitives, the newest have no slot.
+
+    ## Info
+
+    Besides: ``learner``, a dict of ``watched_s`` (in this episode, warm-up included),
+    ``n_primitives``, ``recognised`` (ids of what was recognised during this step, in order),
+    ``born`` and ``gone`` (ids), ``without_slot`` (ids).
+
+    ## Start
+
+    The demonstrator begins anew, drawn by the environment's seed. The learner starts with nothing
+    and watches ``warm_up_s``; with ``carry_over`` it goes on with all it knows, and warms up once.
+    An episode depends on the seed alone, and with ``carry_over`` on the episodes before.
+
+    Args:
+        demonstrator: "synthetic", a `Recording` (shown again and again), or a `LiveDemonstrator`.
+        learner: How to learn; None is the default. Channels and rate are the demonstrator's.
+        warm_up_s: Time watched before the first action [s].
+        carry_over: Whether what was learned outlives the episode.
+        **options: See `PrimitiveHumanoidEnv`.
+
+    Raises:
+        InvalidValueError: An option is wrong; or a library is given, or the task "follow", whose
+            demonstrator is another.
+    """
+
+    def __init__(
+        self,
+        demonstrator: DemonstratorLike = "synthetic",
+        *,
+        learner: LearnerConfig | None = None,
+        warm_up_s: float = 60.0,
+        carry_over: bool = False,
+        **options: Any,
+    ) -> None:
+        if "library" in options:
+            raise InvalidValueError("an online environment learns its library: give none")
+        if not 0.0 <= warm_up_s <= 1e6:
+            raise InvalidValueError(f"warm_up_s must lie in [0, 1e6] s, not {warm_up_s}")
+        self.demonstrator = open_demonstrator(demonstrator)
+        config = learner or LearnerConfig(self.demonstrator.channels, self.demonstrator.rate_hz)
+        self.learner_config = replace(
+            config, channels=self.demonstrator.channels, rate_hz=self.demonstrator.rate_hz
+        )
+        self.warm_up_s = warm_up_s
+        self.carry_over = carry_over
+        self.learner = MotionLearner(self.learner_config)
+        options = {"capacity": CAPACITY} | options
+        super().__init__(self.learner, **options)
+        if isinstance(self.task, FollowTask):
+            raise InvalidValueError(
+                "the task 'follow' draws a demonstrator of its own from a library that is known: "
+                "choose another task in an online environment"
+            )
+
+    def _begin(self) -> None:
+        known = self.carry_over and self.learner.n_frames > 0
+        if known:
+            self.learner.end_stream()
+        else:
+            self.learner = MotionLearner(self.learner_config)
+        self.demonstrator.restart(self.np_random)
+        self._owed_s = 0.0
+        self._n_watched = 0
+        self._left_out: tuple[int, ...] = ()
+        if not known:
+            self._watch(self.warm_up_s)
+            self.repertoire.forget()
+        self._left_out = self.repertoire.update(self.learner.snapshot())
+        self._news: dict[str, tuple[int, ...]] = {"recognised": (), "born": (), "gone": ()}
+
+    def _meanwhile(self, duration_s: float) -> None:
+        events = self._watch(duration_s)
+        before = set(self.repertoire.library.ids)
+        kinds = (PrimitiveBorn, PrimitiveMerged, PrimitiveSplit, TransitionSeen)
+        if any(isinstance(event, kinds) for event in events):
+            self._left_out = self.repertoire.update(self.learner.snapshot())
+        now = set(self.repertoire.library.ids)
+        self._news = {
+            "recognised": tuple(e.primitive for e in events if isinstance(e, Recognised)),
+            "born": tuple(sorted(now - before)),
+            "gone": tuple(sorted(before - now)),
+        }
+
+    def _watch(self, duration_s: float) -> list[Event]:
+        """Let the demonstrator go on, and learn."""
+        self._owed_s += duration_s
+        n_frames = int(self._owed_s * self.demonstrator.rate_hz)
+        self._owed_s -= n_frames / self.demonstrator.rate_hz
+        self._n_watched += n_frames
+        events: list[Event] = []
+        while n_frames > 0:
+            frames, ended = self.demonstrator.take(n_frames)
+            n_frames -= len(frames)
+            events.extend(self.learner.learn_many(frames))
+            if ended:
+                events.extend(self.learner.end_stream())
+        return events
+
+    def _info(self) -> dict[str, Any]:
+        report = {
+            "watched_s": self._n_watched / self.demonstrator.rate_hz,
+            "n_primitives": len(self.library),
+            "without_slot": self._left_out,
+        }
+        return super()._info() | {"learner": report | self._news}
+
+    def state(self) -> EpisodeState:
+        """Refuse: the learner belongs to the state.
+
+        Raises:
+            InvalidValueError: Always; ``copy.deepcopy(env)`` copies it all.
+        """
+        raise InvalidValueError("the state of an online environment is all of it: deepcopy it")

@@ -1,0 +1,1 @@
+"""Who performs plans, simulated or kinematic, and what is measured meanwhile."""

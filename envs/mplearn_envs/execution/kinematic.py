@@ -1,0 +1,119 @@
+"""Plans are taken at their word: nothing is simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mplearn.recording import FloatArray
+from mplearn_envs.mechanics.momentum import velocities
+from mplearn_envs.mechanics.reference import Reference, rest_reference
+from mplearn_envs.planning.plan import Plan
+from mplearn_envs.skills.repertoire import Repertoire
+
+from .performer import Outcome, Performer, PerformerState
+from .sensors import Measured, Sensors
+from .tracking_report import TrackingReport
+
+
+class _Place(NamedTuple):
+    """Where a kinematic robot is: its reference, the key of that, and what is measured there."""
+
+    key: Hashable
+    reference: Reference
+    measured: Measured
+
+
+class _Known(NamedTuple):
+    """An outcome, and where it led."""
+
+    outcome: Outcome
+    place: _Place
+
+
+class KinematicPerformer(Performer):
+    """Takes plans at their word: the robot is where its reference is, without contact or delay.
+
+    COG and zero-moment point come from the plan; nothing ever falls. What comes of an action
+    depends on the reference posture at its start and the motion alone, so it is remembered,
+    exactly, in the repertoire's memory.
+    """
+
+    def __init__(self, repertoire: Repertoire, hold_s: float) -> None:
+        super().__init__(repertoire, hold_s)
+        self._sensors = Sensors(self.simulation)
+        self._rest = self._arrive(rest_reference(self.simulation.robot))
+        self._here = self._rest
+
+    def reset(self) -> Measured:
+        """Stand upright at rest, arms hanging; return how the robot stands."""
+        self._here = self._rest
+        self.reference = self._rest.reference
+        return self._rest.measured
+
+    def perform(
+        self, id: int | None, on_frame: Callable[[], None] | None, frame_steps: int
+    ) -> Outcome:
+        """Perform a primitive; None holds. See `Performer.perform`."""
+        motion = ("hold", self.hold_s) if id is None else self.repertoire.key(id)
+        key = (self._here.key, motion)
+        known: _Known | None = self.repertoire.memory.get(key)
+        if known is None or on_frame is not None:
+            plan = self._plan(id)
+            known = self._performed(plan)
+            self.repertoire.memory.put(key, known)
+            if on_frame is not None:
+                self._play(plan, on_frame, frame_steps)
+        self._here = known.place
+        self.reference = known.place.reference
+        return known.outcome
+
+    def state(self) -> PerformerState:
+        """Return all that the future depends on."""
+        return PerformerState(self.reference, None)
+
+    def load_state(self, state: PerformerState) -> Measured:
+        """Go on from there, from the reference where the state is a simulation's."""
+        self._here = self._arrive(state.reference)
+        self.reference = state.reference
+        return self._here.measured
+
+    def show(self) -> None:
+        """Put the simulated robot where the reference is."""
+        self._sensors.at(self.reference.q)
+
+    def _performed(self, plan: Plan) -> _Known:
+        n_knots = len(plan.q) - 1
+        report = TrackingReport(
+            np.arange(1.0, n_knots + 1.0) * plan.knot_s,
+            np.zeros(n_knots),
+            np.zeros(n_knots),
+            plan.zmp_margin_m[1:],
+            False,
+            plan.duration_s,
+        )
+        place = self._arrive(plan.end, velocities(plan.q[-2:], plan.knot_s)[-1])
+        return _Known(Outcome.of(report, place.measured, plan.speed), place)
+
+    def _arrive(self, reference: Reference, velocity: FloatArray | None = None) -> _Place:
+        key = tuple(np.asarray(part).tobytes() for part in reference)
+        return _Place(key, reference, self._sensors.at(reference.q, velocity))
+
+    def _play(self, plan: Plan, on_frame: Callable[[], None], frame_steps: int) -> None:
+        """Show a plan's reference postures."""
+        n_steps = len(plan.commands) // (len(plan.q) - 1)
+        next_frame = frame_steps
+        for knot in range(1, len(plan.q)):
+            if knot * n_steps >= next_frame:
+                next_frame += frame_steps
+                self._sensors.at(plan.q[knot])
+                on_frame()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_sensors"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._sensors = Sensors(self.simulation)

@@ -1,0 +1,113 @@
+"""Who performs one primitive after another, and what comes of it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from mplearn.recording import FloatArray
+from mplearn_envs.mechanics.reference import Reference, rest_reference
+from mplearn_envs.planning.plan import Plan
+from mplearn_envs.skills.repertoire import Repertoire
+
+from .sensors import Measured
+from .simulation import Simulation
+from .tracking_report import TrackingReport
+
+
+class Outcome(NamedTuple):
+    """What came of an action.
+
+    Attributes:
+        report: What happened meanwhile.
+        measured: How the robot stands now.
+        figures: For ``info``: ``speed`` of performance, as a share of the human's;
+            ``tracking_rmse_rad``; ``cog_deviation_m``, the largest; ``zmp_margin_m``, the least.
+    """
+
+    report: TrackingReport
+    measured: Measured
+    figures: dict[str, float]
+
+    @classmethod
+    def of(cls, report: TrackingReport, measured: Measured, speed: float) -> Outcome:
+        """Return an outcome with its figures."""
+        error = report.tracking_error_rad
+        figures = {
+            "speed": speed,
+            "tracking_rmse_rad": float(np.sqrt(error @ error / len(error))),
+            "cog_deviation_m": float(report.cog_deviation_m.max()),
+            "zmp_margin_m": float(report.zmp_margin_m.min()),
+        }
+        return cls(report, measured, figures)
+
+
+class PerformerState(NamedTuple):
+    """Where a performer is.
+
+    Attributes:
+        reference: Where the reference robot is.
+        simulated: State of the simulation; None where nothing is simulated.
+    """
+
+    reference: Reference
+    simulated: FloatArray | None
+
+
+class Performer(ABC):
+    """Performs one primitive after another.
+
+    Args:
+        repertoire: What can be performed.
+        hold_s: Duration of holding [s].
+
+    Attributes:
+        simulation: The robot; what is drawn.
+        reference: Where the reference robot is, from which the next motion starts.
+    """
+
+    def __init__(self, repertoire: Repertoire, hold_s: float) -> None:
+        self.repertoire = repertoire
+        self.hold_s = hold_s
+        self.simulation = Simulation(repertoire.robot)
+        self.reference: Reference = rest_reference(self.simulation.robot)
+
+    @abstractmethod
+    def reset(self) -> Measured:
+        """Stand upright at rest, arms hanging; return how the robot stands."""
+
+    @abstractmethod
+    def perform(
+        self, id: int | None, on_frame: Callable[[], None] | None, frame_steps: int
+    ) -> Outcome:
+        """Perform a primitive; None holds.
+
+        Args:
+            id: The primitive.
+            on_frame: Called every ``frame_steps`` steps, to take pictures of ``simulation``.
+            frame_steps: See there.
+        """
+
+    @abstractmethod
+    def state(self) -> PerformerState:
+        """Return all that the future depends on."""
+
+    @abstractmethod
+    def load_state(self, state: PerformerState) -> Measured:
+        """Go on from there, bit for bit; return how the robot stands.
+
+        Raises:
+            InvalidValueError: The state has no simulation's, and this performer needs it.
+        """
+
+    @abstractmethod
+    def show(self) -> None:
+        """Bring ``simulation`` up to date, to be drawn."""
+
+    def _plan(self, id: int | None) -> Plan:
+        if id is None:
+            return self.repertoire.hold(self.reference, self.hold_s)
+        return self.repertoire.plan(self.reference, id)

@@ -1,0 +1,58 @@
+"""The simulated robot performs: plans are sent to its servos."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from mplearn.errors import InvalidValueError
+from mplearn_envs.mechanics.reference import rest_reference
+from mplearn_envs.skills.repertoire import Repertoire
+
+from .performer import Outcome, Performer, PerformerState
+from .sensors import Measured, Sensors
+
+
+class SimulatedPerformer(Performer):
+    """Sends plans to the servos of the simulated robot; see `Performer`."""
+
+    def __init__(self, repertoire: Repertoire, hold_s: float) -> None:
+        super().__init__(repertoire, hold_s)
+        self._sensors = Sensors(self.simulation)
+
+    def reset(self) -> Measured:
+        """Stand upright at rest, arms hanging; return how the robot stands."""
+        self.simulation.reset()
+        self.reference = rest_reference(self.simulation.robot)
+        return self._sensors.read()
+
+    def perform(
+        self, id: int | None, on_frame: Callable[[], None] | None, frame_steps: int
+    ) -> Outcome:
+        """Perform a primitive; None holds. See `Performer.perform`."""
+        plan = self._plan(id)
+        report = self.simulation.perform(plan, on_frame, frame_steps)
+        self.reference = plan.end
+        return Outcome.of(report, self._sensors.read(), plan.speed)
+
+    def state(self) -> PerformerState:
+        """Return all that the future depends on."""
+        return PerformerState(self.reference, self.simulation.state())
+
+    def load_state(self, state: PerformerState) -> Measured:
+        """Go on from there; see `Performer.load_state`."""
+        if state.simulated is None:
+            raise InvalidValueError("a kinematic state cannot be loaded into a simulation")
+        self.simulation.load_state(state.simulated)
+        self.reference = state.reference
+        return self._sensors.read()
+
+    def show(self) -> None:
+        """Nothing to do: the simulation is what there is."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_sensors"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._sensors = Sensors(self.simulation)

@@ -1,0 +1,104 @@
+"""What happened while a plan was performed, from the states that were recorded."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mplearn.recording import FloatArray
+from mplearn_envs.control.ankle_feedback import support
+from mplearn_envs.mechanics.momentum import ground_reaction, momenta
+from mplearn_envs.mechanics.reference import reference_robot, sole_middles
+from mplearn_envs.mechanics.support import margins_along
+from mplearn_envs.planning.plan import Plan
+from mplearn_envs.robot import Robot
+
+FALL_TILT_RAD = 0.6
+FALL_DROP_M = 0.2
+_TOUCHES_M = 0.004  # a sole so near the floor carries
+
+
+class TrackingReport(NamedTuple):
+    """What happened while a plan was performed, at its S reference postures (fewer after a fall).
+
+    Attributes:
+        time_s: Time since the start, shape (S,) [s].
+        tracking_error_rad: Root mean square over the joints of actual minus wanted angle, (S,)
+            [rad].
+        cog_deviation_m: Distance of the COG's projection from where it should be over the feet that
+            carry, shape (S,) [m]; with both feet down that is the middle of the soles.
+        zmp_margin_m: Distance of the zero-moment point from the edge of the soles that stand, (S,)
+            [m].
+        fallen: Whether the robot fell; the last sample is when.
+        duration_s: How long it took [s].
+    """
+
+    time_s: FloatArray
+    tracking_error_rad: FloatArray
+    cog_deviation_m: FloatArray
+    zmp_margin_m: FloatArray
+    fallen: bool
+    duration_s: float
+
+
+def assess(robot: Robot, plan: Plan, q: FloatArray, v: FloatArray, fallen: bool) -> TrackingReport:
+    """Compare what was recorded with what was planned.
+
+    Args:
+        robot: The robot.
+        plan: What it performed.
+        q: Postures at the plan's reference postures, the start included, shape (S + 1, 7 + n).
+        v: Velocities there, shape (S + 1, 6 + n).
+        fallen: Whether it fell.
+    """
+    ref = reference_robot(robot)
+    n = len(q)
+    cog, linear, angular, soles = momenta(ref.tree, ref.inertia, ref.stance.feet, ref.corners, q, v)
+    zmp = ground_reaction(float(ref.tree.mass.sum()), cog, linear, angular, plan.knot_s)
+    share, ground = plan.share[:n], plan.ground[:n]
+    seen = support(share, _feet(soles)).see(cog[:, :2])
+    planned = np.concatenate((sole_middles(ref, ground), ground[..., 2:]), axis=-1)
+    wanted = support(share, planned).see(plan.cog[:n, :2])
+    soles = soles[1:]
+    landed = soles[..., 2].min(axis=2).max(axis=1) < _TOUCHES_M
+    up = np.where(landed, -1, plan.up[1:n])
+    margin = margins_along(soles[..., :2], up, np.nan_to_num(zmp, nan=np.inf))
+    error = q[1:, 7:] - plan.q[1:n, 7:]
+    time = np.arange(1.0, n) * plan.knot_s
+    return TrackingReport(
+        time,
+        np.sqrt(np.mean(error**2, axis=1)),
+        np.linalg.norm(seen - wanted, axis=1)[1:],
+        np.maximum(margin, -1.0),
+        fallen,
+        float(time[-1]),
+    )
+
+
+def _feet(soles: FloatArray) -> FloatArray:
+    """Return middle x, y [m] and yaw [rad] of soles with corners (S, 2, 4, 3), front ones first."""
+    ahead = soles[..., :2, :2].sum(axis=2) - soles[..., 2:, :2].sum(axis=2)
+    yaw = np.arctan2(ahead[..., 1], ahead[..., 0])
+    return np.concatenate((soles[..., :2].mean(axis=2), yaw[..., None]), axis=-1)
+
+
+@njit(cache=True, nogil=True)
+def has_fallen(q: FloatArray, wanted: FloatArray) -> bool:
+    """Return whether the base is far from upright, from its height, or not finite.
+
+    Args:
+        q: Actual posture, shape (7 + n,).
+        wanted: Wanted posture, shape (7 + n,).
+    """
+    up, wanted_up = _up(q), _up(wanted)
+    cosine = up[0] * wanted_up[0] + up[1] * wanted_up[1] + up[2] * wanted_up[2]
+    return not (cosine > np.cos(FALL_TILT_RAD) and q[2] > wanted[2] - FALL_DROP_M)
+
+
+@njit(cache=True, nogil=True)
+def _up(q: FloatArray) -> tuple[float, float, float]:
+    """Return the vertical in the base's frame."""
+    w, x, y, z = q[3], q[4], q[5], q[6]
+    return 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)

@@ -1,0 +1,223 @@
+"""The kinematic reference robot: a robot's arrays, its stance, and where it is in its motion."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mplearn.errors import RobotError
+from mplearn.maths.rotations import quaternion_to_matrix
+from mplearn.recording import FloatArray, IntArray
+from mplearn_envs.robot import Robot
+
+from .kinematics import MassTree, forward, mass_tree
+from .velocity_ik import Stance, settle
+
+N_BASE = 3  # base height, roll, pitch
+
+
+class ReferenceRobot(NamedTuple):
+    """A robot as the kernels need it.
+
+    Its U tracked coordinates are base height, roll and pitch, then all joints but the legs'.
+
+    Attributes:
+        tree: Kinematics and masses.
+        inertia: Rotational inertia of each body about its centre of mass, in its own frame, shape
+            (B, 3, 3) [kg m^2].
+        stance: Both feet on the floor, symmetric about the origin.
+        corners: Lower corners of the soles in their feet's frames, shape (2, 4, 3) [m].
+        ground: Where the feet stand: x, y [m] and yaw [rad], shape (2, 3).
+        upper: Hinges that are tracked, shape (U - 3,).
+        limits: Smallest and largest value of the tracked coordinates, shape (U, 2) [m, rad].
+        velocity: Their velocity limits, shape (U,) [m/s, rad/s].
+        standing_height: Base height with straight legs, to which features refer [m].
+        stance_height: Base height in the standing posture (knees a little bent) [m].
+        rest: Standing posture, arms hanging, shape (7 + n,).
+    """
+
+    tree: MassTree
+    inertia: FloatArray
+    stance: Stance
+    corners: FloatArray
+    ground: FloatArray
+    upper: IntArray
+    limits: FloatArray
+    velocity: FloatArray
+    standing_height: float
+    stance_height: float
+    rest: FloatArray
+
+
+class Reference(NamedTuple):
+    """Where the reference robot is, from which the next motion starts.
+
+    Attributes:
+        target: Tracked coordinates, shape (U,) [m, rad]; the height as the features have it.
+        velocity: Their velocities, shape (U,) [m/s, rad/s].
+        q: The whole posture, shape (7 + n,); its origin is on the floor between the feet, x ahead.
+        swing: The legs as the motion has them, which a foot in the air follows: angles of the legs'
+            hinges [rad], then the heights of the left and the right sole [m], shape (n_legs + 2,).
+        swing_velocity: Their velocities, shape (n_legs + 2,) [rad/s, m/s].
+        up: 1 for the foot that is in the air, shape (2,).
+        ground: Where each foot stands or left the ground: x, y [m] and yaw [rad], shape (2, 3).
+    """
+
+    target: FloatArray
+    velocity: FloatArray
+    q: FloatArray
+    swing: FloatArray
+    swing_velocity: FloatArray
+    up: FloatArray
+    ground: FloatArray
+
+    @property
+    def lifted(self) -> int:
+        """Side of the foot that is in the air, 0 left, 1 right; -1 for none."""
+        return int(np.argmax(self.up)) if self.up.any() else -1
+
+
+@njit(cache=True)
+def base_rotation(roll: float, pitch: float) -> FloatArray:
+    """Return the base's orientation without heading, R_x(roll) R_y(pitch), shape (3, 3)."""
+    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
+    return np.array([[cp, 0.0, sp], [sr * sp, cr, -sr * cp], [-cr * sp, sr, cr * cp]])
+
+
+@lru_cache(maxsize=8)
+def reference_robot(robot: Robot) -> ReferenceRobot:
+    """Return the arrays of a robot, standing with its knees bent by ``stance_knee_rad``.
+
+    Raises:
+        RobotError: The robot cannot stand so that its COG is over its feet.
+    """
+    model = robot.model()
+    tree = mass_tree(model)
+    names = robot.joint_names
+    body = {model.body(i).name: i - 1 for i in range(1, model.nbody)}
+    feet = np.array([body[n] for n in robot.feet])
+    thighs = np.array([body[n] for n in robot.thighs])
+    knees = [names.index(n) for n in robot.knees]
+
+    straight = np.zeros(7 + len(names))
+    straight[3] = 1.0
+    sole = lowest_sole(robot, straight)
+    straight[2] = -sole
+    pose = forward(tree, straight)
+    centre = 0.5 * (pose.position[feet[0]] + pose.position[feet[1]])
+    straight[:2] -= centre[:2]
+    pose = forward(tree, straight)
+
+    reach, crouch = np.empty(2), np.empty(2)
+    for angle, out in ((robot.guard_knee_rad, reach), (robot.stance_knee_rad, crouch)):
+        bent = straight.copy()
+        bent[[7 + k for k in knees]] = angle
+        moved = forward(tree, bent).position
+        out[:] = np.linalg.norm(moved[thighs] - moved[feet], axis=1)
+    limits = robot.position_limits
+    stance = Stance(
+        robot.leg_joints,
+        np.repeat(np.arange(2), [len(leg) for leg in robot.legs]),
+        limits[robot.leg_joints].copy(),
+        feet,
+        thighs,
+        pose.position[feet],
+        pose.rotation[feet],
+        reach,
+        sole_centre(robot, straight),
+        np.zeros(2),
+    )
+    length = np.linalg.norm(pose.position[thighs] - pose.position[feet], axis=1)
+    stance_height = float(straight[2] - np.max(length - crouch))
+    guess = straight.copy()
+    guess[2] = stance_height
+    guess[[7 + k for k in knees]] = robot.stance_knee_rad
+    rest, worst = settle(tree, stance, guess, stance_height, np.eye(3), 1e-10, 50)
+    if worst > 1e-6:
+        raise RobotError(
+            f"robot {robot.name!r} cannot stand: its feet or COG miss by {worst:.3g} m"
+        )
+    upper = robot.upper_joints
+    lowest = 0.45 * straight[2]
+    base_limits = np.array([[lowest, straight[2]], [-0.6, 0.6], [-0.6, 1.6]])
+    turn = quaternion_to_matrix(model.body_iquat[1:])
+    return ReferenceRobot(
+        tree,
+        np.einsum("bij,bj,bkj->bik", turn, model.body_inertia[1:], turn),
+        stance,
+        sole_corners(robot),
+        np.column_stack((stance.foot_position[:, :2], np.zeros(2))),
+        upper,
+        np.vstack((base_limits, limits[upper])),
+        np.concatenate((robot.base_velocity, robot.per_joint("velocity")[upper])),
+        float(straight[2]),
+        stance_height,
+        rest,
+    )
+
+
+def rest_reference(robot: Robot) -> Reference:
+    """Return the reference of a robot that stands still, arms hanging."""
+    ref = reference_robot(robot)
+    target = np.zeros(len(ref.limits))
+    target[0] = ref.standing_height
+    swing = np.append(ref.rest[7 + robot.leg_joints], np.zeros(2))
+    return Reference(
+        target, np.zeros_like(target), ref.rest, swing, 0.0 * swing, np.zeros(2), ref.ground
+    )
+
+
+def sole_corners(robot: Robot) -> FloatArray:
+    """Return the lower corners of both soles in their feet's frames, shape (2, 4, 3) [m]."""
+    model = robot.model()
+    out = np.empty((2, 4, 3))
+    for side, geom in enumerate(("sole_l", "sole_r")):
+        half, centre = model.geom(geom).size, model.geom(geom).pos
+        signs = np.array([[1, 1, -1], [1, -1, -1], [-1, -1, -1], [-1, 1, -1]])
+        out[side] = centre + signs * half
+    return out
+
+
+def soles(robot: Robot, q: FloatArray) -> FloatArray:
+    """Return the lower corners of both soles in posture ``q``, world frame, shape (2, 4, 3) [m]."""
+    model = robot.model()
+    pose = forward(mass_tree(model), q)
+    feet = [model.body(n).id - 1 for n in robot.feet]
+    local = sole_corners(robot)
+    return np.stack([local[s] @ pose.rotation[f].T + pose.position[f] for s, f in enumerate(feet)])
+
+
+def lowest_sole(robot: Robot, q: FloatArray) -> float:
+    """Return the height of the lowest corner of the soles [m]."""
+    return float(soles(robot, q)[..., 2].min())
+
+
+def sole_centre(robot: Robot, q: FloatArray) -> FloatArray:
+    """Return the middle of both soles on the floor, shape (2,) [m]."""
+    return np.asarray(soles(robot, q)[..., :2].mean(axis=(0, 1)))
+
+
+def sole_middles(robot: ReferenceRobot, ground: FloatArray) -> FloatArray:
+    """Return the middles of both soles, shape (..., 2, 2) [m], for feet at (..., 2, 3)."""
+    middle = robot.corners.mean(axis=1)[:, :2]
+    c, s = np.cos(ground[..., 2]), np.sin(ground[..., 2])
+    out: FloatArray = np.stack(
+        (
+            ground[..., 0] + c * middle[:, 0] - s * middle[:, 1],
+            ground[..., 1] + s * middle[:, 0] + c * middle[:, 1],
+        ),
+        axis=-1,
+    )
+    return out
+
+
+def sole_outlines(robot: ReferenceRobot, ground: FloatArray) -> FloatArray:
+    """Return the corners of both soles, shape (..., 2, 4, 2) [m], for feet at (..., 2, 3)."""
+    corners = robot.corners[..., :2]
+    c, s = np.cos(ground[..., 2])[..., None], np.sin(ground[..., 2])[..., None]
+    x, y = corners[..., 0], corners[..., 1]
+    place = ground[..., None, :2]
+    return np.asarray(place + np.stack((c * x - s * y, s * x + c * y), axis=-1))

@@ -1,0 +1,6 @@
+"""From a motion to commands for the whole robot: footwork, times, weight, postures."""
+
+from .plan import Motion as Motion
+from .plan import Plan as Plan
+from .plan import PlannerConfig as PlannerConfig
+from .planner import Planner as Planner

@@ -1,0 +1,192 @@
+"""The reference robot's postures along a plan: feet where they shall be, COG where it shall be."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mplearn.recording import FloatArray
+from mplearn_envs.mechanics.kinematics import forward, rotation_error
+from mplearn_envs.mechanics.reference import ReferenceRobot, base_rotation
+from mplearn_envs.mechanics.velocity_ik import Stance, advance, errors, rates
+
+TOLERANCE = 1e-8  # [m, rad] to which the feet, COG and base follow
+OFF_M = 0.08  # by no more than this a foot's height is its leg's and not the one it shall have
+APART_M = 0.02  # between a foot and the one that it passes, where it is
+LOW_M = 0.2  # not much higher than this
+_MAX_ITERATIONS = 12
+
+
+@njit(cache=True, nogil=True)
+def balanced_path(
+    robot: ReferenceRobot,
+    targets: FloatArray,
+    swing: FloatArray,
+    ground: FloatArray,
+    carried: FloatArray,
+    cog: FloatArray,
+    start: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Balance the reference robot under every target.
+
+    Args:
+        robot: The reference robot.
+        targets: Tracked coordinates, shape (K, U) [m, rad].
+        swing: Angles of the legs' hinges [rad] that feet in the air follow, and heights of the left
+            and the right sole [m], shape (K, n_legs + 2).
+        ground: Where each foot stands or would: x, y [m] and yaw [rad], shape (K, 2, 3).
+        carried: How far each foot follows its leg's motion instead, shape (K, 2), 0 to 1.
+        cog: Horizontal COG, shape (K, 2) [m].
+        start: Posture before them, shape (7 + n,).
+
+    Returns:
+        The postures, shape (K + 1, 7 + n), start included, and the largest error that is left in
+        each, shape (K + 1,) [m, rad].
+    """
+    n_knots = targets.shape[0]
+    out = np.empty((n_knots + 1, start.shape[0]))
+    worst = np.zeros(n_knots + 1)
+    out[0] = start
+    fixed = robot.stance
+    stance = Stance(
+        fixed.leg_joints,
+        fixed.leg_side,
+        fixed.limits,
+        fixed.feet,
+        fixed.thighs,
+        fixed.foot_position.copy(),
+        fixed.foot_rotation.copy(),
+        fixed.reach,
+        fixed.cog.copy(),
+        np.zeros(2),
+    )
+    offset = robot.stance_height - robot.standing_height
+    for k in range(n_knots):
+        q = out[k].copy()
+        if k > 0:  # base and legs go on as they went
+            for i in range(3):
+                q[i] += out[k, i] - out[k - 1, i]
+            for j in stance.leg_joints:
+                q[7 + j] += out[k, 7 + j] - out[k - 1, 7 + j]
+        for u in range(robot.upper.shape[0]):
+            q[7 + robot.upper[u]] = targets[k, 3 + u]
+        stance.cog[:] = cog[k]
+        stance.carried[:] = carried[k]
+        heading = 0.5 * (ground[k, 0, 2] + ground[k, 1, 2])
+        orientation = about_vertical(heading, base_rotation(targets[k, 1], targets[k, 2]))
+        height = targets[k, 0] + offset
+        for iteration in range(_MAX_ITERATIONS + 1):
+            pose = forward(robot.tree, q)
+            for side in range(2):
+                _aim(robot, stance, side, q, ground[k], swing[k])
+            rows = errors(stance, pose, height, orientation)
+            worst[k + 1] = np.max(np.abs(rows))
+            if worst[k + 1] < TOLERANCE or iteration == _MAX_ITERATIONS:
+                break
+            step = rates(robot.tree, stance, pose, rows)
+            longest = np.max(np.abs(step))
+            if longest > 0.2:
+                step *= 0.2 / longest
+            q = advance(stance, q, step)
+        out[k + 1] = q
+    return out, worst
+
+
+@njit(cache=True)
+def _aim(
+    robot: ReferenceRobot,
+    stance: Stance,
+    side: int,
+    q: FloatArray,
+    ground: FloatArray,
+    swing: FloatArray,
+) -> None:
+    """Write where a foot shall be: on the ground, or as the leg's motion has it, or in between.
+
+    On its way it passes the other foot, and does not meet it.
+    """
+    n_legs = stance.leg_joints.shape[0]
+    rise, share = swing[n_legs + side], stance.carried[side]
+    flat = robot.stance.foot_rotation[side]
+    there_x, there_y, yaw = ground[side]
+    rotation = about_vertical(yaw, flat)
+    height = robot.stance.foot_position[side, 2]
+    x, y, z = there_x, there_y, height + rise
+    if share > 0.0:
+        there = q.copy()
+        for i in range(n_legs):
+            if stance.leg_side[i] == side:
+                there[7 + stance.leg_joints[i]] = swing[i]
+        pose = forward(robot.tree, there)
+        foot = stance.feet[side]
+        turn = rotation_error(pose.rotation[foot], rotation)
+        rotation = rotated(share * turn, rotation)
+        z += _lowest(robot.corners[side], flat) - _lowest(robot.corners[side], rotation)
+        x += share * (pose.position[foot, 0] - x)
+        y += share * (pose.position[foot, 1] - y)
+        low = min(max(1.5 - rise / LOW_M, 0.0), 1.0)
+        aside = share * low * _too_near(robot, side, x, y, ground[1 - side])
+        x -= aside * np.sin(ground[1 - side, 2])
+        y += aside * np.cos(ground[1 - side, 2])
+        z += share * OFF_M * np.tanh((pose.position[foot, 2] - z) / OFF_M)
+    stance.foot_position[side, 0] = x
+    stance.foot_position[side, 1] = y
+    stance.foot_position[side, 2] = z
+    stance.foot_rotation[side] = rotation
+
+
+@njit(cache=True)
+def _too_near(robot: ReferenceRobot, side: int, x: float, y: float, other: FloatArray) -> float:
+    """Return how far a foot must go to the left so that it clears the one that stands [m]."""
+    corners = robot.corners[side]
+    length = corners[:, 0].max() - corners[:, 0].min()
+    width = corners[:, 1].max() - corners[:, 1].min()
+    c, s = np.cos(other[2]), np.sin(other[2])
+    ahead = c * (x - other[0]) + s * (y - other[1])
+    aside = c * (y - other[1]) - s * (x - other[0])
+    beside = min(max(2.0 - abs(ahead) / length, 0.0), 1.0)
+    missing = (width + APART_M) * beside - (aside if side == 0 else -aside)
+    return float(max(missing, 0.0) * (1.0 if side == 0 else -1.0))
+
+
+@njit(cache=True)
+def _lowest(corners: FloatArray, rotation: FloatArray) -> float:
+    """Return the height of the lowest corner of a sole over its foot's origin [m]."""
+    lowest = np.inf
+    for corner in range(corners.shape[0]):
+        z = 0.0
+        for i in range(3):
+            z += rotation[2, i] * corners[corner, i]
+        lowest = min(lowest, z)
+    return lowest
+
+
+@njit(cache=True)
+def about_vertical(yaw: float, rotation: FloatArray) -> FloatArray:
+    """Return a (3, 3) orientation turned by an angle about the vertical."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    out = rotation.copy()
+    for i in range(3):
+        out[0, i] = c * rotation[0, i] - s * rotation[1, i]
+        out[1, i] = s * rotation[0, i] + c * rotation[1, i]
+    return out
+
+
+@njit(cache=True)
+def rotated(vector: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Return a (3, 3) orientation turned by a rotation vector [rad] (Rodrigues' formula)."""
+    angle = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    if angle < 1e-12:
+        return rotation.copy()
+    axis = vector / angle
+    c, s = np.cos(angle), np.sin(angle)
+    out = np.empty((3, 3))
+    for j in range(3):
+        along = 0.0
+        for i in range(3):
+            along += axis[i] * rotation[i, j]
+        for i in range(3):
+            a, b = (i + 1) % 3, (i + 2) % 3
+            across = axis[a] * rotation[b, j] - axis[b] * rotation[a, j]
+            out[i, j] = c * rotation[i, j] + s * across + (1.0 - c) * along * axis[i]
+    return out

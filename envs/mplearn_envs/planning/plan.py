@@ -1,0 +1,102 @@
+"""Motions to be performed, plans that perform them, and what planning goes by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from mplearn.recording import FloatArray, IntArray
+from mplearn_envs.mechanics.reference import Reference
+
+from .footwork import Footwork
+
+
+@dataclass(frozen=True)
+class PlannerConfig:
+    """How motions become commands.
+
+    Attributes:
+        period_s: Time between commands [s].
+        knot_steps: Commands from one solution of the inverse kinematics to the next.
+        blend_s: Time in which the present posture gives way to the primitive's [s]: less in short
+            motions, more where there is far to go.
+        blend_velocity: Share of the velocity limits that the blending may take.
+        zmp_margin_m: How far inside the soles the zero-moment point stays, if slowing down can
+            make it [m].
+        model_error: By which share masses and gains may be wrong: the zero-moment point stays
+            farther inside by this share of its distance from the COG, which is what moving masses
+            make of it.
+        cache_size: Number of plans that are kept.
+    """
+
+    period_s: float = 0.004
+    knot_steps: int = 5
+    blend_s: float = 0.5
+    blend_velocity: float = 0.3
+    zmp_margin_m: float = 0.015
+    model_error: float = 0.1
+    cache_size: int = 256
+
+
+class Motion(NamedTuple):
+    """What shall be performed.
+
+    Attributes:
+        frames: Tracked coordinates at human speed, shape (T, U) [m, rad].
+        rate_hz: Frames per second [1/s].
+        footwork: What the feet do; None where both stay down.
+    """
+
+    frames: FloatArray
+    rate_hz: float
+    footwork: Footwork | None = None
+
+    @property
+    def duration_s(self) -> float:
+        """Length at human speed [s]."""
+        return (len(self.frames) - 1) / self.rate_hz
+
+
+class Plan(NamedTuple):
+    """A motion, ready to be performed.
+
+    Attributes:
+        commands: Servo commands, shape (N, n) [rad].
+        q: Reference postures, shape (K + 1, 7 + n), the first being the start.
+        knot_s: Time between reference postures [s].
+        error: Largest error of feet, COG and base that is left at each of them, shape (K + 1,).
+        end: Where the reference robot is at the end.
+        speed: Speed that was possible, as a share of the human's.
+        cog: COG of each posture, shape (K + 1, 3) [m].
+        zmp: Zero-moment point at each posture, all masses moving as planned, (K + 1, 2) [m].
+        zmp_margin_m: Its distance from the edge of the soles that stand, negative outside, shape
+            (K + 1,) [m].
+        ground: Where each foot stands or would: x, y [m] and yaw [rad], shape (K + 1, 2, 3).
+        up: Side of the foot in the air at each posture, 0 left, 1 right, -1 none, shape (K + 1,).
+        share: Which share of the weight the left foot carries, shape (K + 1,).
+    """
+
+    commands: FloatArray
+    q: FloatArray
+    knot_s: float
+    error: FloatArray
+    end: Reference
+    speed: float
+    cog: FloatArray
+    zmp: FloatArray
+    zmp_margin_m: FloatArray
+    ground: FloatArray
+    up: IntArray
+    share: FloatArray
+
+    @property
+    def duration_s(self) -> float:
+        """Length [s]."""
+        return (len(self.q) - 1) * self.knot_s
+
+    @property
+    def steps(self) -> bool:
+        """Whether a foot is in the air or the weight moves."""
+        return bool((self.up >= 0).any() or np.ptp(self.cog[:, :2], axis=0).max() > 1e-3)

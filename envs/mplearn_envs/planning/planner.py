@@ -1,0 +1,196 @@
+"""From a primitive's trajectory to servo commands for the whole robot: a pure function.
+
+What is commanded depends on the reference posture at the start, the motion and the speed alone
+([Kulic2012] 4.2.1 balances a kinematic reference). Plans are therefore cached, exactly: their ends
+are kept on a grid of 1e-6, so the same posture recurs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+
+import numpy as np
+
+from mplearn.errors import InvalidValueError
+from mplearn.recording import FloatArray
+from mplearn_envs.lru_cache import LRUCache
+from mplearn_envs.mechanics.gravity import holding_torques
+from mplearn_envs.mechanics.reference import N_BASE, Reference, reference_robot, sole_middles
+from mplearn_envs.mechanics.servos import servo_commands
+from mplearn_envs.robot import Robot
+
+from .draft import Draft, Drafter, Pace
+from .footwork import Footwork, Lift, read_footwork
+from .plan import Motion as Motion
+from .plan import Plan as Plan
+from .plan import PlannerConfig as PlannerConfig
+from .splines import refine
+from .stride import left_share, recentred
+
+GRID_DECIMALS = 6
+OUT_OF_REACH = 1e-3  # [m, rad]: an error that slowing down does not mend
+_TRIES = 6
+_SLOWEST = 0.6  # of the pace is tried next, at least
+_ENOUGH_M = 1e-3  # a margin that falls short by less is enough
+
+
+class Planner:
+    """Plans motions for one robot.
+
+    Args:
+        robot: The robot.
+        config: See `PlannerConfig`.
+    """
+
+    def __init__(self, robot: Robot, config: PlannerConfig | None = None) -> None:
+        self.robot = robot
+        self.config = config or PlannerConfig()
+        self._reference = reference_robot(robot)
+        self._drafter = Drafter(robot, self.config)
+        self._velocity = np.concatenate(
+            (self._reference.velocity[:N_BASE], robot.per_joint("velocity"))
+        )
+        self._stiffness = robot.per_joint("stiffness")
+        self._tracked = np.concatenate((np.arange(N_BASE), N_BASE + robot.upper_joints))
+        self._cache = LRUCache(self.config.cache_size)
+
+    def motion(self, frames: FloatArray, rate_hz: float) -> Motion:
+        """Return the motion of frames in the robot's channels, what its feet do included.
+
+        Args:
+            frames: Values of the robot's channels, shape (T, 3 + n) [m, rad].
+            rate_hz: Frames per second, at human speed [1/s].
+
+        Raises:
+            InvalidValueError: The frames have another shape or are not finite.
+        """
+        width = len(self.robot.channels)
+        if frames.ndim != 2 or frames.shape[1] != width or len(frames) < 2:
+            raise InvalidValueError(
+                f"a motion needs frames of shape (2 or more, {width}), not {frames.shape}"
+            )
+        if not np.isfinite(frames).all():
+            raise InvalidValueError("a motion's frames must be finite")
+        if not (np.isfinite(rate_hz) and rate_hz > 0):
+            raise InvalidValueError(f"rate_hz must be positive and finite, not {rate_hz}")
+        footwork = read_footwork(self.robot, frames, rate_hz)
+        tracked = np.ascontiguousarray(frames[:, self._tracked])
+        return Motion(tracked, rate_hz, footwork if footwork.lifts else None)
+
+    def plan(
+        self, start: Reference, motion: Motion, speed: float = 0.5, key: Hashable = None
+    ) -> Plan:
+        """Return the commands that perform a motion from the present reference.
+
+        Where another foot is in the air than at the motion's start, it is lowered, and the motion's
+        raised, before the motion begins.
+
+        Args:
+            start: Where the reference robot is.
+            motion: What shall be performed.
+            speed: Wanted speed, as a share of the human's; it is lowered where the robot's velocity
+                limits ask for it.
+            key: Names the motion; plans of named motions are cached.
+
+        Raises:
+            InvalidValueError: The speed is not positive, or the motion is too short or not finite.
+        """
+        if not (np.isfinite(speed) and speed > 0):
+            raise InvalidValueError(f"speed must be positive and finite, not {speed}")
+        width = len(self._reference.limits)
+        if motion.frames.ndim != 2 or motion.frames.shape[1] != width or len(motion.frames) < 2:
+            raise InvalidValueError(
+                f"a motion needs frames of shape (2 or more, {width}), not {motion.frames.shape}"
+            )
+        if not np.isfinite(motion.frames).all():
+            raise InvalidValueError("a motion's frames must be finite")
+        if key is None:
+            return self._plan(start, motion, speed)
+        full_key = (key, speed, *(part.tobytes() for part in start))
+        plan: Plan | None = self._cache.get(full_key)
+        if plan is None:
+            plan = self._plan(start, motion, speed)
+            self._cache.put(full_key, plan)
+        return plan
+
+    def hold(self, start: Reference, duration_s: float) -> Plan:
+        """Return the commands that come to rest in the present posture, on one foot or on two."""
+        here = np.clip(start.target, *self._reference.limits.T)
+        footwork = None
+        if start.lifted >= 0:
+            legs, rise = start.swing[:-2], start.swing[-2:]
+            lifts = (Lift(start.lifted, -1, 2),)
+            footwork = Footwork(
+                np.stack((legs, legs)), np.stack((rise, rise)), np.zeros((2, 3)), lifts
+            )
+        motion = Motion(np.stack((here, here)), 1.0 / duration_s, footwork)
+        return self.plan(start, motion, 1.0, ("hold", duration_s))
+
+    def _plan(self, start: Reference, motion: Motion, speed: float) -> Plan:
+        pace = Pace(speed)
+        draft = self._drafter.draft(start, motion, pace)
+        for _ in range(_TRIES):
+            slower = self._slower(draft, start, motion, pace)
+            if slower == pace:
+                break
+            pace = slower
+            draft = self._drafter.draft(start, motion, pace)
+        knot_s = self._drafter.knot_s
+        middles = sole_middles(self._reference, draft.ground)
+        borne = np.where(np.isfinite(draft.zmp), draft.zmp, draft.cog[:, :2])  # it may fly
+        share = left_share(middles, draft.up, borne)
+        torque = holding_torques(self._reference, draft.q, share, borne, middles)
+        led = draft.q[:, 7:] + torque / self._stiffness  # a servo gives way to what it holds
+        position, rate = refine(led, knot_s, self.config.knot_steps)
+        return Plan(
+            commands=servo_commands(self.robot, position, rate),
+            q=draft.q,
+            knot_s=knot_s,
+            error=draft.error,
+            end=self._end(draft),
+            speed=pace.speed,
+            cog=draft.cog,
+            zmp=draft.zmp,
+            zmp_margin_m=draft.margin,
+            ground=draft.ground,
+            up=draft.up,
+            share=share,
+        )
+
+    def _slower(self, draft: Draft, start: Reference, motion: Motion, pace: Pace) -> Pace:
+        """Return the pace that velocity limits and balance ask for; the same where it is right.
+
+        What moving masses add to the zero-moment point falls with the square of the pace.
+        """
+        if draft.error.max() > OUT_OF_REACH:
+            carries_on = motion.footwork is not None and start.lifted == motion.footwork.up_at(
+                False
+            )
+            return pace if start.lifted >= 0 and carries_on else pace._replace(in_turn=True)
+        base = np.vstack((start.target[:N_BASE], draft.targets[:, :N_BASE]))
+        velocity = np.diff(np.hstack((base, draft.q[:, 7:])), axis=0) / self._drafter.knot_s
+        excess = float(np.max(np.abs(velocity) / self._velocity))
+        if excess > 1.0:
+            return pace._replace(speed=pace.speed / (1.02 * excess))
+        moving = np.linalg.norm(draft.zmp - draft.cog[:, :2], axis=1)
+        wanted = self.config.zmp_margin_m + self.config.model_error * moving
+        short = np.nan_to_num(wanted - draft.margin, nan=np.inf)
+        worst = int(np.argmax(short))
+        if not (short[worst] > _ENOUGH_M and moving[worst] > 0):
+            return pace
+        share = 1.0 - 1.1 * short[worst] / moving[worst]
+        slower = max(_SLOWEST, float(np.sqrt(max(share, 0.0))))
+        if draft.timeline.waits(worst, 1.0 / (motion.rate_hz * pace.speed)):
+            return pace._replace(patience=pace.patience / slower)
+        return pace._replace(speed=pace.speed * slower)
+
+    def _end(self, draft: Draft) -> Reference:
+        """Return the reference after the last knot, seen from between the feet."""
+        targets, up, width = draft.targets, int(draft.up[-1]), len(self._reference.limits)
+        rate = (targets[-1] - targets[-2]) / self._drafter.knot_s
+        lifted = np.zeros(2)
+        if up >= 0:
+            lifted[up] = 1.0
+        q, ground = recentred(draft.q[-1], draft.ground[-1])
+        parts = (targets[-1, :width], rate[:width], q, targets[-1, width:], rate[width:], lifted)
+        return Reference(*(np.round(part, GRID_DECIMALS) for part in (*parts, ground)))

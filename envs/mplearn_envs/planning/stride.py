@@ -1,0 +1,205 @@
+"""Where feet, weight and base shall be at every knot of a plan."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mplearn.recording import FloatArray, IntArray
+from mplearn_envs.mechanics.pendulum import plan_cog
+from mplearn_envs.mechanics.reference import Reference, ReferenceRobot
+
+from .footwork import Footwork
+from .timeline import Timeline, shift_time_s
+
+SAME_PLACE_M = 0.1  # a foot that lands so near to where it stood lands there
+SAME_YAW_RAD = 0.25
+APART_M = 0.02  # between soles beside each other
+CARRY_M = 0.12  # from this height on a foot follows the motion of the leg alone
+_STILL_M = 1e-5
+RESTS_S = 0.4  # where the weight has so long to come to rest, it rests where it shall
+
+
+def plan_ground(
+    robot: ReferenceRobot, timeline: Timeline, footwork: Footwork | None, start: FloatArray
+) -> FloatArray:
+    """Return where each foot stands or would: x, y [m] and yaw [rad], shape (K, 2, 3).
+
+    Args:
+        robot: The reference robot.
+        timeline: The plan's times.
+        footwork: The motion's feet.
+        start: Where they stand at first, shape (2, 3).
+    """
+    out = np.empty((len(timeline.progress), 2, 3))
+    here, first = start.copy(), 0
+    for part, last in zip(timeline.stretches, timeline.ends, strict=True):
+        out[first:last] = here
+        if part.lands >= 0 and footwork is not None:
+            frame = min(part.lands, len(footwork.rise) - 1)
+            place = landing(robot, here, part.up, footwork.left_from_right[frame])
+            x = ((np.arange(last - first) + 1.0) / (last - first))[:, None]
+            x = x * x * (3.0 - 2.0 * x)
+            out[first:last, part.up] = here[part.up] * (1.0 - x) + place * x
+            here[part.up] = place
+        first = last
+    return out
+
+
+def landing(
+    robot: ReferenceRobot, ground: FloatArray, side: int, left_from_right: FloatArray
+) -> FloatArray:
+    """Return where a foot lands: x, y [m] and yaw [rad], shape (3,).
+
+    It does not land on the other foot, however narrow the demonstrator stands.
+    """
+    stands = ground[1 - side]
+    c, s = np.cos(stands[2]), np.sin(stands[2])
+    dx, dy, turn = left_from_right
+    if side == 1:  # the right foot in the left one's frame
+        ct, st = np.cos(turn), np.sin(turn)
+        dx, dy, turn = -(ct * dx + st * dy), -(ct * dy - st * dx), -turn
+    length, width = np.ptp(robot.corners, axis=1).max(axis=0)[:2]
+    if abs(dx) < length:
+        clear = width + APART_M + 0.5 * length * abs(np.sin(turn))
+        dy = max(dy, clear) if side == 0 else min(dy, -clear)
+    place = np.array([stands[0] + c * dx - s * dy, stands[1] + s * dx + c * dy, stands[2] + turn])
+    moved = place - ground[side]
+    moved[2] = np.arctan2(np.sin(moved[2]), np.cos(moved[2]))
+    if np.hypot(moved[0], moved[1]) < SAME_PLACE_M and abs(moved[2]) < SAME_YAW_RAD:
+        return np.array(ground[side])
+    return np.asarray(ground[side] + moved)
+
+
+def left_share(middles: FloatArray, up: IntArray, zmp: FloatArray) -> FloatArray:
+    """Return which share of the weight the left foot carries, shape (T,).
+
+    Args:
+        middles: Middles of the soles, shape (T, 2, 2) [m].
+        up: Side of the foot in the air, -1 for none, shape (T,).
+        zmp: Zero-moment points, shape (T, 2) [m].
+    """
+    left, right = middles[:, 0], middles[:, 1]
+    across = left - right
+    share = np.clip(np.sum((zmp - right) * across, axis=1) / np.sum(across**2, axis=1), 0.0, 1.0)
+    share[up == 0], share[up == 1] = 0.0, 1.0
+    return np.asarray(share)
+
+
+def recentred(q: FloatArray, ground: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a posture (7 + n,) and its feet (2, 3) seen from between the feet, x ahead."""
+    middle, yaw = ground[:, :2].mean(axis=0), float(ground[:, 2].mean())
+    if not (np.any(np.abs(middle) > 1e-9) or abs(yaw) > 1e-9):
+        return q, ground
+    c, s = np.cos(yaw), np.sin(yaw)
+    turn = np.array([[c, s], [-s, c]])
+    q, ground = q.copy(), ground.copy()
+    q[:2] = turn @ (q[:2] - middle)
+    half_c, half_s = np.cos(0.5 * yaw), -np.sin(0.5 * yaw)
+    w, a, b, z = q[3:7]
+    q[3:7] = (
+        half_c * w - half_s * z,
+        half_c * a - half_s * b,
+        half_c * b + half_s * a,
+        half_c * z + half_s * w,
+    )
+    ground[:, :2] = (ground[:, :2] - middle) @ turn.T
+    ground[:, 2] -= yaw
+    return q, ground
+
+
+class Weight(NamedTuple):
+    """Where the weight shall be.
+
+    Attributes:
+        zmp: Zero-moment points at the start and the K knots after it, shape (K + 1, 2) [m].
+        end: Where the COG shall rest at last, shape (2,) [m].
+        settled: Whether there is time for that.
+        still: Whether it is there from the beginning.
+    """
+
+    zmp: FloatArray
+    end: FloatArray
+    settled: bool
+    still: bool
+
+    def path(self, height: float, knot_s: float, off: FloatArray | float = 0.0) -> FloatArray:
+        """Return the COG at the K knots, shape (K, 2) [m].
+
+        Args:
+            height: Height of the COG [m].
+            knot_s: Time between knots [s].
+            off: By how much the zero-moment point of all masses differs from the pendulum's, shape
+                (K + 1, 2) [m].
+        """
+        start = self.zmp[0]
+        path = plan_cog(self.zmp - off, start, self.end, self.settled, height, knot_s)
+        return np.asarray(path[1:])
+
+
+def plan_weight(
+    timeline: Timeline, middles: FloatArray, start: FloatArray, knot_s: float
+) -> Weight:
+    """Plan the zero-moment point so that the weight is over the foot that carries.
+
+    Args:
+        timeline: The plan's times.
+        middles: Middles of the soles, shape (K, 2, 2) [m].
+        start: Where the COG rests, shape (2,) [m].
+        knot_s: Time between knots [s].
+    """
+    zmp = np.empty((len(middles) + 1, 2))
+    zmp[0] = here = start
+    first, rests_s, still = 0, 0.0, True
+    for i, (part, last) in enumerate(zip(timeline.stretches, timeline.ends, strict=True)):
+        n = last - first
+        standing = middles[last - 1]
+        following = timeline.stretches[i + 1].up if i + 1 < len(timeline.stretches) else -1
+        if part.up >= 0:
+            there = standing[1 - part.up]
+        else:
+            there = standing[1 - following] if following >= 0 else standing.mean(axis=0)
+        far = float(np.linalg.norm(there - here))
+        over = 1 if part.up >= 0 else min(n, round(shift_time_s(far) / knot_s))
+        begin = n - over if part.up < 0 and following >= 0 else 0  # not before it must
+        x = np.clip((np.arange(n) + 1.0 - begin) / max(over, 1), 0.0, 1.0)[:, None]
+        zmp[first + 1 : last + 1] = here * (1.0 - x) + there * x
+        stays = far < _STILL_M
+        rests_s = rests_s + n * knot_s if stays else (n - begin - over) * knot_s
+        still &= stays
+        here, first = there, last
+    if still:
+        return Weight(np.broadcast_to(start, zmp.shape).copy(), start, True, True)
+    return Weight(zmp, here, rests_s >= RESTS_S, False)
+
+
+def plan_rise(
+    timeline: Timeline, rise: FloatArray, start: Reference, blended: FloatArray
+) -> FloatArray:
+    """Return the heights of the soles along a plan, shape (K, 2) [m].
+
+    Args:
+        timeline: The plan's times.
+        rise: Heights in the motion, shape (K, 2) [m].
+        start: Where the reference robot is.
+        blended: Heights when a foot stays up, blended with those at the start, shape (K, 2).
+    """
+    out, first = rise.copy(), 0
+    for i, (part, last) in enumerate(zip(timeline.stretches, timeline.ends, strict=True)):
+        side, here = part.up, slice(first, last)
+        if side < 0:
+            out[here] = 0.0
+        else:
+            out[here, 1 - side] = 0.0
+            x = ((np.arange(last - first) + 1.0) / (last - first)) ** 3
+            z = ((np.arange(last - first) + 1.0) / (last - first))[:, None][:, 0]
+            ramp = x * (10.0 - 15.0 * z + 6.0 * z * z)
+            if part.first == part.last and i == 0 and start.up[side] > 0:
+                out[here, side] = start.swing[side - 2] * (1.0 - ramp)
+            elif part.first == part.last:
+                out[here, side] = rise[last - 1, side] * ramp
+            elif i == 0 and start.up[side] > 0:
+                out[here, side] = blended[here, side]
+        first = last
+    return np.maximum(out, 0.0)

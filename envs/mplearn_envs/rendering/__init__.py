@@ -1,0 +1,1 @@
+"""Pictures off screen, a window, and balance drawn on the floor."""

@@ -1,0 +1,162 @@
+"""Any humanoid's MJCF model as a `Robot`, told by which body plays which role.
+
+Gains follow one rule: those of the `humanoid`'s hinges of the same segment, scaled by m g h, the
+stiffness against gravity that an ankle must exceed by far. Torque limits are the model's own where
+it has some.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import radians
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mplearn.errors import RobotError
+
+from .compiling import compile_once, read_model
+from .drives import HUMANOID_BASE_VELOCITY, HUMANOID_DRIVES, JointGroup
+from .foreign import (
+    add_servos,
+    add_soles,
+    compiled,
+    move_zero,
+    on_our_floor,
+    read_spec,
+    take_out_drives,
+)
+from .roles import NEEDED_ROLES, ROLES
+
+_LOOSE = "hand_l"  # hinges that carry no segment (fingers, toes) are driven like a hand's
+
+
+def described(
+    source: str | Path, name: str, segments: Mapping[str, str], attention: Mapping[str, float]
+) -> dict[str, Any]:
+    """Return the fields of a `Robot`; see `Robot.from_mjcf`."""
+    missing = [role for role in NEEDED_ROLES if role not in segments]
+    unknown = sorted(set(segments) - set(ROLES))
+    if missing or unknown:
+        raise RobotError(
+            f"robot {name!r} needs bodies for {NEEDED_ROLES}; missing: {missing}"
+            + (f"; unknown roles: {unknown}, there are {ROLES}" if unknown else "")
+        )
+    spec = read_spec(source, name)
+    bodies, hinges = ({each.name for each in part} for part in (spec.bodies, spec.joints))
+    for body in segments.values():
+        if body not in bodies:
+            raise RobotError(f"robot {name!r} has no body {body!r}; it has {sorted(bodies)}")
+    for hinge in attention:
+        if hinge not in hinges:
+            raise RobotError(f"robot {name!r} has no hinge {hinge!r}; it has {sorted(hinges)}")
+    take_out_drives(spec)
+    move_zero(spec, attention, name)
+    feet = (segments["foot_l"], segments["foot_r"])
+    add_soles(spec, feet, name)
+    model = compiled(spec, name)
+    groups = _groups(model, segments)
+    add_servos(spec, groups)
+    legs = [_hinges_above(model, foot, segments["pelvis"]) for foot in feet]
+    knees = [_knee(model, segments, side, name) for side in "lr"]
+    thighs = [model.body(int(model.joint(leg[0]).bodyid[0])).name for leg in legs]
+    height, roll, pitch = HUMANOID_BASE_VELOCITY
+    size = np.sqrt(_cog_height(model) / _cog_height(_humanoid()))
+    return {
+        "name": name,
+        "xml": on_our_floor(spec, name),
+        "groups": groups,
+        "legs": (legs[0], legs[1]),
+        "knees": (knees[0], knees[1]),
+        "thighs": (thighs[0], thighs[1]),
+        "feet": feet,
+        "stance_knee_rad": radians(30.0),
+        "guard_knee_rad": radians(12.0),
+        "base_velocity": (float(size) * height, roll, pitch),
+        "segments": tuple((role, segments[role]) for role in ROLES if role in segments),
+    }
+
+
+def hinge_roles(model: mujoco.MjModel, segments: Mapping[str, str]) -> dict[str, str]:
+    """Return the role of the segment that each hinge moves: the first at or below its body.
+
+    Hinges that move no segment are left out.
+    """
+    role_of = {model.body(body).id: role for role, body in segments.items()}
+    moved: dict[int, str] = {}
+    for segment, role in role_of.items():
+        body = segment
+        while body > 1 and (body == segment or body not in role_of):
+            moved.setdefault(body, role)
+            body = int(model.body_parentid[body])
+    bodies = {model.joint(j).name: int(model.jnt_bodyid[j]) for j in range(1, model.njnt)}
+    return {hinge: moved[body] for hinge, body in bodies.items() if body in moved}
+
+
+def _groups(model: mujoco.MjModel, segments: Mapping[str, str]) -> tuple[JointGroup, ...]:
+    """Return a group for each hinge."""
+    ours = _humanoid()
+    ratio = _weight_moment(model) / _weight_moment(ours)
+    roles = hinge_roles(ours, {role: role for role in ROLES})
+    softest_first = sorted(HUMANOID_DRIVES, key=lambda group: group.stiffness)
+    patterns = {roles[hinge]: group for group in softest_first for hinge in group.names}
+    own = hinge_roles(model, segments)
+    found = []
+    for j in range(1, model.njnt):
+        hinge = model.joint(j).name
+        like = patterns[own.get(hinge, _LOOSE)]
+        limited = bool(model.jnt_actfrclimited[j])
+        torque = np.abs(model.jnt_actfrcrange[j]).min() if limited else ratio * like.torque
+        found.append(
+            replace(
+                like,
+                names=(hinge,),
+                stiffness=ratio * like.stiffness,
+                damping=ratio * like.damping,
+                torque=float(torque),
+            )
+        )
+    return tuple(found)
+
+
+def _humanoid() -> mujoco.MjModel:
+    """Return the model of the `humanoid`, after which others are driven."""
+    return compile_once(read_model("humanoid"))
+
+
+def _weight_moment(model: mujoco.MjModel) -> float:
+    """Return m g h [N m/rad]."""
+    return float(9.81 * model.body_mass.sum() * _cog_height(model))
+
+
+def _cog_height(model: mujoco.MjModel) -> float:
+    """Return the height of the COG above the lowest body, all hinges at zero [m]."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    return float(data.subtree_com[0, 2] - data.xpos[1:, 2].min())
+
+
+def _hinges_above(model: mujoco.MjModel, below: str, above: str) -> tuple[str, ...]:
+    """Return the hinges from one body down to another, in this order."""
+    found: list[str] = []
+    body = model.body(below).id
+    while body not in (0, model.body(above).id):
+        first, n = int(model.body_jntadr[body]), int(model.body_jntnum[body])
+        found = [model.joint(j).name for j in range(first, first + n)] + found
+        body = int(model.body_parentid[body])
+    return tuple(found)
+
+
+def _knee(model: mujoco.MjModel, segments: Mapping[str, str], side: str, name: str) -> str:
+    thigh, shank = segments[f"thigh_{side}"], segments[f"shank_{side}"]
+    hinges = _hinges_above(model, shank, thigh)
+    if len(hinges) != 1:
+        raise RobotError(
+            f"robot {name!r} needs one hinge from {thigh!r} to {shank!r}, its knee; there are "
+            f"{list(hinges)}"
+        )
+    return hinges[0]

@@ -1,0 +1,242 @@
+"""A library as one robot can perform it: who has which slot, and which may come next."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Hashable
+from typing import Any
+from weakref import WeakValueDictionary
+
+import numpy as np
+
+from mplearn.errors import LibraryError, RobotError
+from mplearn.generation import StyleName
+from mplearn.library import PrimitiveLibrary
+from mplearn.recording import FloatArray
+from mplearn_envs.control.standing import tracked_columns
+from mplearn_envs.lru_cache import LRUCache
+from mplearn_envs.mechanics.reference import Reference
+from mplearn_envs.robot import Robot
+
+from .action_choices import Choices, choose_among
+from .feasibility import FeasibilityConfig
+from .skills import Skills
+from .slots import Slots
+
+ENTRY_GAP = 0.5  # largest difference of a tracked coordinate [rad]
+HEIGHT_SCALE = 5.0  # 0.2 m of height count as much as 1 rad
+_OUTCOMES = 4096  # of about 6 kB each
+
+
+class Repertoire(Skills):
+    """The primitives of a library, in slots of a fixed number: slot 0 is hold.
+
+    Several environments may share a repertoire, in threads too.
+
+    Args:
+        library: The primitives and their transitions.
+        robot: The robot.
+        capacity: Number of slots; None is the next power of two, at least 32.
+        speed: Speed of performance, as a share of the human's.
+        style: How motions are generated from primitives.
+        limits: What counts as feasible.
+        novel: Whether transitions are allowed that were never observed.
+        growing: Whether the library will be replaced by `update`; it may be empty then.
+
+    Attributes:
+        slots: Slot of each primitive.
+        ids: Ids of the primitives that have one.
+        growing: See above.
+        memory: What performers remember of outcomes.
+
+    Raises:
+        LibraryError: The library is empty, is for another body, or holds more than fits.
+        InvalidValueError: The capacity is not an integer above 1, or the speed not positive.
+    """
+
+    def __init__(
+        self,
+        library: PrimitiveLibrary,
+        robot: Robot,
+        capacity: int | None = None,
+        speed: float = 0.5,
+        style: StyleName = "deterministic",
+        limits: FeasibilityConfig | None = None,
+        *,
+        novel: bool = False,
+        growing: bool = False,
+    ) -> None:
+        if not len(library) and not growing:
+            raise LibraryError("the library is empty: there is nothing to perform")
+        self._slots = Slots(capacity, len(library))
+        self._slots.require_room(len(library))
+        super().__init__(library, robot, speed, style, limits)
+        self.capacity = self._slots.capacity
+        self.novel = novel
+        self.growing = growing
+        self.memory = LRUCache(_OUTCOMES)
+        self._tracked = tracked_columns(robot)
+        self.update(library)
+
+    def update(self, library: PrimitiveLibrary) -> tuple[int, ...]:
+        """Take a newer snapshot; primitives that live on keep their slots.
+
+        Returns:
+            Ids of primitives for which there was no slot: they cannot be chosen.
+
+        Raises:
+            LibraryError: The library is for another body.
+        """
+        with self.lock:
+            self.take(library)
+            left_out = self._slots.update(library.ids)
+            self.slots = self._slots.of
+            self.ids = tuple(sorted(self.slots))
+            self._after: dict[int, Choices] = {}
+            self._starts: FloatArray | None = None
+        return left_out
+
+    def forget(self) -> None:
+        """Forget all and free all slots: what comes is another learner's, of other ids."""
+        with self.lock:
+            super().forget()
+            self._slots.clear()
+
+    def require_room(self, n_primitives: int) -> None:
+        """Check that so many primitives fit.
+
+        Raises:
+            LibraryError: They do not.
+        """
+        self._slots.require_room(n_primitives)
+
+    def primitive(self, slot: int) -> int | None:
+        """Return the id of the primitive in a slot; None for hold and for free slots."""
+        return self._slots.primitive(slot)
+
+    @property
+    def feasible_ids(self) -> tuple[int, ...]:
+        """Ids of the primitives that the robot can perform; judges them all."""
+        return tuple(id for id in self.ids if self.feasibility(id).feasible)
+
+    def after(self, id: int) -> Choices:
+        """Return what may follow a primitive: observed transitions that are feasible, and hold."""
+        with self.lock:
+            if id not in self._after:
+                graph = self.library.graph
+                row = graph.prior(id)
+                self._after[id] = self._choices(
+                    {graph.ids[i]: float(row[i]) for i in np.flatnonzero(row)}
+                )
+            return self._after[id]
+
+    def entries(self, reference: Reference) -> Choices:
+        """Return with which primitives a walk may begin somewhere: those that start near it.
+
+        They are the feasible ones that start on the same feet, at most ``ENTRY_GAP`` farther than
+        the nearest one, so that there always are some (on other feet where there is none on
+        these); weighted by how often each was seen.
+
+        Args:
+            reference: Where the reference robot is.
+
+        Raises:
+            RobotError: There are primitives, and the robot can perform none of them.
+        """
+        if not self.ids:
+            return self._choices({})
+        with self.lock:
+            gaps = self._gaps(reference)
+            near = sorted(self.ids, key=lambda id: (gaps[id], id))
+            # no more is judged than is needed
+            first = next((id for id in near if self._starts_on(id, reference.lifted)), None)
+            other_feet = first is None
+            if first is None:
+                first = next((id for id in near if self.feasibility(id).feasible), None)
+            if first is None:
+                raise RobotError(self._nothing_feasible(near))
+            within = [id for id in near if gaps[id] <= gaps[first] + ENTRY_GAP]
+            if not other_feet:
+                within = [
+                    id
+                    for id in within
+                    if self._starts_on(id, reference.lifted) or not self.feasibility(id).feasible
+                ]
+            return self._choices({id: float(self.library[id].n_exemplars) for id in within})
+
+    def _starts_on(self, id: int, lifted: int) -> bool:
+        """Return whether the robot can perform a primitive, and it starts with that foot up."""
+        verdict = self.feasibility(id)
+        return verdict.feasible and verdict.starts_up == lifted
+
+    def _gaps(self, reference: Reference) -> dict[int, float]:
+        """Return how far from a reference each primitive starts [rad]."""
+        if self._starts is None:
+            self._starts = np.array([self.frames(id)[0][0, self._tracked] for id in self.ids])
+        apart = np.abs(self._starts - reference.target)
+        apart[:, 0] *= HEIGHT_SCALE
+        return dict(zip(self.ids, apart.max(axis=1).tolist(), strict=True))
+
+    def _nothing_feasible(self, ids: list[int]) -> str:
+        reasons = "; ".join(
+            f"{self.library[id].name}: {self.feasibility(id).problems[0]}" for id in ids[:6]
+        )
+        return (
+            f"robot {self.robot.name!r} can perform none of the library's "
+            f"{len(self.ids)} primitives ({reasons})"
+        )
+
+    def _choices(self, weights: dict[int, float]) -> Choices:
+        possible, refused = {}, {}
+        for id, weight in weights.items():
+            slot = self.slots.get(id)
+            if slot is None:
+                continue
+            verdict = self.feasibility(id)
+            if verdict.feasible:
+                possible[slot] = weight
+            else:
+                refused[slot] = tuple(str(problem) for problem in verdict.problems)
+        novel = tuple(self.slots[id] for id in self.feasible_ids) if self.novel else ()
+        return choose_among(possible, refused, novel, self.capacity)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Repertoire:
+        """Share what does not change; copy what grows."""
+        if not self.growing:
+            return self
+        twin = object.__new__(Repertoire)
+        memo[id(self)] = twin
+        twin.__setstate__(copy.deepcopy(self.__getstate__(), memo))
+        return twin
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what can be worked out again, and is large."""
+        return {name: value for name, value in super().__getstate__().items() if name != "memory"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)
+        self.memory = LRUCache(_OUTCOMES)
+
+
+_SHARED: WeakValueDictionary[Hashable, Repertoire] = WeakValueDictionary()
+
+
+def shared_repertoire(
+    library: PrimitiveLibrary,
+    robot: Robot,
+    capacity: int | None,
+    speed: float,
+    style: StyleName,
+    limits: FeasibilityConfig | None,
+    novel: bool,
+) -> Repertoire:
+    """Return the repertoire of a library that will not change; arguments as `Repertoire`'s.
+
+    All environments of a process that ask for the same get the same.
+    """
+    key = (library.version, robot, capacity, speed, style, limits, novel)
+    found = _SHARED.get(key)
+    if found is None:
+        found = Repertoire(library, robot, capacity, speed, style, limits, novel=novel)
+        _SHARED[key] = found
+    return found

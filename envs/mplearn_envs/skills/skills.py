@@ -1,0 +1,176 @@
+"""What a robot makes of a library's primitives: motions, verdicts and plans."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from threading import RLock
+from typing import Any
+
+import numpy as np
+
+from mplearn.errors import InvalidValueError, LibraryError, RobotError
+from mplearn.generation import StyleName
+from mplearn.library import PrimitiveLibrary
+from mplearn.recording import FloatArray
+from mplearn_envs.mechanics.reference import Reference, rest_reference
+from mplearn_envs.planning.plan import Motion, Plan
+from mplearn_envs.planning.planner import Planner
+from mplearn_envs.robot import Retargeting, Robot
+
+from .feasibility import Feasibility, FeasibilityCheck, FeasibilityConfig
+
+
+class Skills:
+    """The primitives of a library, as one robot performs them.
+
+    What is found out about a primitive is kept until it changes; it depends on nothing else, so
+    that several threads may ask.
+
+    Args:
+        library: The primitives.
+        robot: The robot.
+        speed: Speed of performance, as a share of the human's.
+        style: How motions are generated from primitives.
+        limits: What counts as feasible.
+
+    Attributes:
+        library: The primitives, as `take` had them last.
+        lock: Held while anything here changes.
+
+    Raises:
+        LibraryError: The library is for another body.
+        InvalidValueError: The speed is not positive.
+    """
+
+    def __init__(
+        self,
+        library: PrimitiveLibrary,
+        robot: Robot,
+        speed: float,
+        style: StyleName,
+        limits: FeasibilityConfig | None,
+    ) -> None:
+        if not (np.isfinite(speed) and speed > 0):
+            raise InvalidValueError(f"speed must be positive and finite, not {speed}")
+        self.robot = robot
+        self.speed = float(speed)
+        self.style = style
+        self.limits = limits
+        self.lock = RLock()
+        self._revision: dict[int, int] = {}
+        self.forget()
+        self.take(library)
+
+    @cached_property
+    def planner(self) -> Planner:
+        """Plans for the robot."""
+        return Planner(self.robot)
+
+    @cached_property
+    def _check(self) -> FeasibilityCheck:
+        return FeasibilityCheck(self.planner, self.limits)
+
+    @cached_property
+    def _rest(self) -> Reference:
+        return rest_reference(self.robot)
+
+    def take(self, library: PrimitiveLibrary) -> None:
+        """Take a newer snapshot; what is known of unchanged primitives is kept.
+
+        Raises:
+            LibraryError: The library is for another body.
+        """
+        try:
+            retargeting = Retargeting(library.channels, library.body, self.robot)
+        except RobotError as error:
+            raise LibraryError(f"the library is not for this robot: {error}") from error
+        with self.lock:
+            self.library = library
+            self._retargeting = retargeting
+            gone = self._frames.keys() - set(library.ids)
+            for known in (self._frames, self._motions, self._verdicts):
+                for id in gone & known.keys():
+                    del known[id]
+            self._fresh: set[int] = set()  # ids whose frames are known to be this library's
+
+    def forget(self) -> None:
+        """Forget all: what comes is another learner's, whose ids mean something else."""
+        with self.lock:
+            self._frames: dict[int, tuple[FloatArray, float]] = {}
+            self._motions: dict[int, Motion] = {}
+            self._verdicts: dict[int, Feasibility] = {}
+
+    def frames(self, id: int) -> tuple[FloatArray, float]:
+        """Return a primitive's motion in the robot's channels, (T, 3 + n), and its rate [1/s]."""
+        with self.lock:
+            if id not in self._fresh:
+                self._generate(id)
+                self._fresh.add(id)
+            return self._frames[id]
+
+    def _generate(self, id: int) -> None:
+        motion = self.library.generate([id], style=self.style)
+        frames = self._retargeting(motion.frames)
+        if len(frames) == 1:
+            frames = np.repeat(frames, 2, axis=0)
+        known = self._frames.get(id)
+        if known is None or known[1] != motion.rate_hz or not np.array_equal(known[0], frames):
+            self._frames[id] = (np.ascontiguousarray(frames), motion.rate_hz)
+            self._motions.pop(id, None)
+            self._verdicts.pop(id, None)
+            self._revision[id] = self._revision.get(id, 0) + 1
+
+    def feasibility(self, id: int) -> Feasibility:
+        """Return whether the robot can perform a primitive; judged once."""
+        with self.lock:
+            frames, rate_hz = self.frames(id)
+            if id not in self._verdicts:
+                self._verdicts[id] = self._check.judge(frames, rate_hz, self.speed)
+            return self._verdicts[id]
+
+    def key(self, id: int) -> tuple[int, int]:
+        """Return what tells a primitive's motion from all others, earlier versions included."""
+        with self.lock:
+            self.frames(id)
+            return id, self._revision[id]
+
+    def duration_s(self, id: int) -> float:
+        """Return how long a primitive that it can perform takes the robot from where it starts."""
+        frames, rate_hz = self.frames(id)
+        return (len(frames) - 1) / rate_hz / self.feasibility(id).tempo
+
+    def plan(self, start: Reference, id: int) -> Plan:
+        """Return the commands that perform a primitive from the present reference."""
+        with self.lock:
+            frames, rate_hz = self.frames(id)
+            if id not in self._motions:
+                self._motions[id] = self.planner.motion(frames, rate_hz)
+            motion, speed, key = self._motions[id], self.feasibility(id).speed, self.key(id)
+        return self._settled(self.planner.plan(start, motion, speed, key))
+
+    def hold(self, start: Reference, duration_s: float) -> Plan:
+        """Return the commands that come to rest in the present posture."""
+        return self._settled(self.planner.hold(start, duration_s))
+
+    def _settled(self, plan: Plan) -> Plan:
+        """Return a plan whose end is such that the same place recurs, to the last bit.
+
+        The legs are solved for to about 1e-5 and depend that much on the way; and with both feet
+        down it does not matter how they swung.
+        """
+        end = plan.end
+        if end.lifted >= 0:
+            return plan
+        q = np.round(end.q, 4)
+        q[3:7] /= np.linalg.norm(q[3:7])
+        still = {"swing": self._rest.swing, "swing_velocity": self._rest.swing_velocity}
+        return plan._replace(end=end._replace(q=q, **still))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what can be worked out again, and is large."""
+        left_out = ("lock", "planner", "_check")
+        return {name: value for name, value in self.__dict__.items() if name not in left_out}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.lock = RLock()
