@@ -1,13 +1,9 @@
 """A small library, cut from a demonstration by its own truth: no learner is needed to make it."""
 
-import sys
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.append(str(Path(__file__).parents[1] / "envs"))  # for standing_library
 
 SCRIPT = ["BAR", "BAL", "SQD", "SQR", "RAR", "RAL", "BAR", "BAL", "RAR", "RAL"] * 2
 SCRIPT[12:14] = ["LKR", "LKT"]  # a foot leaves the floor, which the robot must not

@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull, Delaunay
 
-from mplearn.errors import FrameError, InvalidValueError
-from mplearn_envs.control.cog_filter import CogFilter
+from mplearn.errors import InvalidValueError
 from mplearn_envs.mechanics.inverse_dynamics import InverseDynamics
 from mplearn_envs.mechanics.reference import reference_robot
 from mplearn_envs.mechanics.support import (
@@ -81,38 +80,3 @@ def test_static_torques_are_those_of_the_simulation():
         mujoco.mj_step(model, data)
     measured = np.abs(data.actuator_force) / robot.per_joint("torque")
     np.testing.assert_allclose(share[0], measured, atol=0.02)
-
-
-def test_the_cog_filter_follows_a_swaying_cog():
-    rng = np.random.default_rng(0)
-    t = np.arange(0, 6, 0.01)
-    sway = 0.02 * np.sin(2 * np.pi * 0.5 * t)
-    acceleration = -((2 * np.pi * 0.5) ** 2) * sway
-    cog = np.stack((sway, np.zeros_like(t), np.full_like(t, 0.85)), axis=1)
-    cog_filter = CogFilter(100.0, noise_m=0.0005)
-    estimates, zmp = [], []
-    for i, measured in enumerate(cog + rng.normal(scale=0.0005, size=cog.shape)):
-        estimates.append(cog_filter.update(None if i % 20 == 7 else measured))
-        zmp.append(cog_filter.zmp())
-
-    def rmse(ours, truth):
-        return np.sqrt(np.mean((np.asarray(ours) - truth)[200:] ** 2))
-
-    estimates = np.array(estimates)
-    assert rmse(estimates[:, 0, 0], sway) < 0.0004  # below the noise
-    assert rmse(estimates[:, 2, 0], acceleration) < 0.13
-    differences = np.gradient(np.gradient(cog[:, 0] + rng.normal(scale=0.0005, size=600))) * 1e4
-    assert rmse(estimates[:, 2, 0], acceleration) < 0.1 * rmse(differences, acceleration)
-    assert rmse(np.array(zmp)[:, 0], sway - 0.85 * acceleration / 9.81) < 0.012
-
-
-def test_the_cog_filter_refuses_bad_input():
-    with pytest.raises(InvalidValueError, match="rate_hz"):
-        CogFilter(0.0)
-    cog_filter = CogFilter(100.0)
-    with pytest.raises(FrameError, match="first"):
-        cog_filter.update(None)
-    with pytest.raises(FrameError, match="finite"):
-        cog_filter.update(np.array([0.0, np.nan, 0.0]))
-    with pytest.raises(FrameError, match="not been given"):
-        cog_filter.zmp()
