@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mplearn.errors import BodyError
+from mplearn.maths.yaw_roll_pitch import roll_pitch_of, yaw_roll_pitch_quaternion
 from mplearn.recording import FloatArray
 
 from .body import Body
@@ -39,11 +40,9 @@ def features_of(q: FloatArray, body: Body | None = None) -> FloatArray:
     body = body or robot_body()
     if q.shape[-1] != body.nq:
         raise BodyError(f"a posture of {body.name!r} has {body.nq} values, not {q.shape[-1]}")
-    w, x, y, z = q[..., 3], q[..., 4], q[..., 5], q[..., 6]
     features = np.empty((*q.shape[:-1], 3 + len(body.driven)))
     features[..., 0] = q[..., 2]
-    features[..., 1] = np.arcsin(np.minimum(np.maximum(2 * (y * z + w * x), -1.0), 1.0))
-    features[..., 2] = np.arctan2(2 * (w * y - x * z), 1 - 2 * (x * x + y * y))
+    features[..., 1], features[..., 2] = roll_pitch_of(np.moveaxis(q[..., 3:7], -1, 0))
     features[..., 3:] = q[..., 7 + body.driven]
     return features
 
@@ -73,12 +72,8 @@ def posture_of(
         raise BodyError(f"features of {body.name!r} have {width} values, not {features.shape[-1]}")
     q = np.zeros((*features.shape[:-1], body.nq))
     q[..., 0], q[..., 1], q[..., 2] = x, y, features[..., 0]
-    half = np.stack(np.broadcast_arrays(features[..., 1], features[..., 2], yaw)) / 2
-    (cr, cp, cy), (sr, sp, sy) = np.cos(half), np.sin(half)
-    q[..., 3] = cy * cr * cp - sy * sr * sp
-    q[..., 4] = cy * sr * cp - sy * cr * sp
-    q[..., 5] = cy * cr * sp + sy * sr * cp
-    q[..., 6] = cy * sr * sp + sy * cr * cp
+    turn = yaw_roll_pitch_quaternion(yaw, features[..., 1], features[..., 2])
+    q[..., 3:7] = np.stack(turn, axis=-1)
     q[..., 7 + body.driven] = features[..., 3:]
     return q
 

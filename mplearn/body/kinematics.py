@@ -8,29 +8,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from mplearn.maths.rotation_kernels import quaternion_matrix
+from mplearn.maths.quaternions import quaternion_product, vector_quaternion
+from mplearn.maths.rotation_kernels import quaternion_matrix, turn_in_place
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
 
 def first_joints(joint_body: IntArray, n_bodies: int) -> IntArray:
     """Return, for each body, its first joint; body b has joints [first[b], first[b + 1])."""
     return np.searchsorted(joint_body, np.arange(n_bodies + 1)).astype(np.int64)
-
-
-@njit(cache=True)
-def turn(mat: FloatArray, axis: FloatArray, angle: float) -> None:
-    """Turn a rotation matrix, in place, about an axis of its own frame."""
-    s, c = np.sin(angle), np.cos(angle)
-    x, y, z = axis[0], axis[1], axis[2]
-    v = 1.0 - c
-    r00, r01, r02 = c + x * x * v, x * y * v - z * s, x * z * v + y * s
-    r10, r11, r12 = y * x * v + z * s, c + y * y * v, y * z * v - x * s
-    r20, r21, r22 = z * x * v - y * s, z * y * v + x * s, c + z * z * v
-    for i in range(3):
-        a, b, d = mat[i, 0], mat[i, 1], mat[i, 2]
-        mat[i, 0] = a * r00 + b * r10 + d * r20
-        mat[i, 1] = a * r01 + b * r11 + d * r21
-        mat[i, 2] = a * r02 + b * r12 + d * r22
 
 
 @njit(cache=True)
@@ -81,7 +66,7 @@ def forward_kinematics(
                     pos[b, i] += axes[j, i] * q[7 + j]
                 j += 1
                 continue
-            turn(mat[b], axis[j], q[7 + j])
+            turn_in_place(mat[b], axis[j], q[7 + j])
             for i in range(3):
                 at = anchors[j, i]
                 for k in range(3):
@@ -132,15 +117,9 @@ def integrate(q: FloatArray, step: FloatArray) -> None:
     """Move a posture, in place, by a step (6 + n,) [m, rad], as `mj_integratePos` does."""
     for i in range(3):
         q[i] += step[i]
-    angle = np.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
-    if angle > 0.0:
-        s = np.sin(0.5 * angle) / angle
-        rw, rx, ry, rz = np.cos(0.5 * angle), s * step[3], s * step[4], s * step[5]
-        w, x, y, z = q[3], q[4], q[5], q[6]
-        q[3] = w * rw - x * rx - y * ry - z * rz
-        q[4] = w * rx + x * rw + y * rz - z * ry
-        q[5] = w * ry - x * rz + y * rw + z * rx
-        q[6] = w * rz + x * ry - y * rx + z * rw
+    if step[3] != 0.0 or step[4] != 0.0 or step[5] != 0.0:
+        turn = vector_quaternion(step[3], step[4], step[5])
+        q[3], q[4], q[5], q[6] = quaternion_product(q[3:7], turn)
         norm = np.sqrt(q[3] ** 2 + q[4] ** 2 + q[5] ** 2 + q[6] ** 2)
         for i in range(3, 7):
             q[i] /= norm

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 from numba import njit
 
+from mplearn.maths.yaw_roll_pitch import yaw_roll_pitch_quaternion
 from mplearn.recording import FloatArray, IntArray
 
 from .body import Body
@@ -39,10 +40,10 @@ def _postures(features: FloatArray, driven: IntArray, n_joints: int) -> FloatArr
     """Return the postures at the origin, without heading, shape (T, 7 + n)."""
     postures = np.zeros((len(features), 7 + n_joints))
     for t in range(len(features)):
-        cr, sr = np.cos(features[t, 1] / 2), np.sin(features[t, 1] / 2)
-        cp, sp = np.cos(features[t, 2] / 2), np.sin(features[t, 2] / 2)
         turn = postures[t, 3:7]
-        turn[0], turn[1], turn[2], turn[3] = cr * cp, sr * cp, cr * sp, sr * sp
+        turn[0], turn[1], turn[2], turn[3] = yaw_roll_pitch_quaternion(
+            0.0, features[t, 1], features[t, 2]
+        )
         for j in range(len(driven)):
             postures[t, 7 + driven[j]] = features[t, 3 + j]
     return postures

@@ -37,13 +37,28 @@ def quaternion_product(p: Quaternion, q: Quaternion) -> tuple[Any, Any, Any, Any
 
 @register_jitable
 def vector_quaternion(x: float, y: float, z: float) -> tuple[Any, Any, Any, Any]:
-    """Return the unit quaternion of a rotation vector [rad].
+    """Return the unit quaternion of a rotation vector [rad], of numbers only.
 
     Example:
         >>> w, x, y, z = vector_quaternion(np.pi, 0.0, 0.0)
-        >>> round(w, 9), x
-        (0.0, np.float64(1.0))
+        >>> float(w.round(9)), float(x)
+        (0.0, 1.0)
     """
     angle = np.sqrt(x**2 + y**2 + z**2)
     share = np.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
     return np.cos(0.5 * angle), share * x, share * y, share * z
+
+
+@register_jitable
+def quaternion_vector(q: Quaternion) -> tuple[Any, Any, Any]:
+    """Return the rotation vector [rad] of a unit quaternion, of numbers only, at most half a turn.
+
+    Example:
+        >>> [float(part.round(4)) for part in quaternion_vector((0.0, 0.0, -1.0, 0.0))]
+        [0.0, -3.1416, 0.0]
+    """
+    sine = np.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    share = 2.0 if sine < 1e-9 else 2.0 * np.arctan2(sine, abs(q[0])) / sine
+    if q[0] < 0:
+        share = -share
+    return share * q[1], share * q[2], share * q[3]

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mplearn.maths.plane import turn_in_plane
+from mplearn.maths.quaternions import quaternion_product, vector_quaternion
 from mplearn.recording import FloatArray, LabelledSegment
 
 if TYPE_CHECKING:
@@ -67,13 +69,12 @@ def _centred(body: Body, frames: FloatArray) -> FloatArray:
     feet = [body.tree.body(f"foot_{side}") for side in "lr"]
     places, turns = body.tree.forward(frames[0])
     ahead = turns[feet, :2, 0].sum(axis=0)
-    half = -0.5 * np.arctan2(ahead[1], ahead[0])
-    c, s = np.cos(2 * half), np.sin(2 * half)
+    yaw = np.arctan2(ahead[1], ahead[0])
     moved = frames.copy()
-    moved[:, :2] = (frames[:, :2] - places[feet, :2].mean(axis=0)) @ [[c, s], [-s, c]]
-    w, x, y, z = frames[:, 3:7].T
-    c, s = np.cos(half), np.sin(half)
-    moved[:, 3:7] = np.stack([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w], axis=1)
+    x, y = (frames[:, :2] - places[feet, :2].mean(axis=0)).T
+    moved[:, :2] = np.stack(turn_in_plane(x, y, -yaw), axis=1)
+    turn = vector_quaternion(0.0, 0.0, -yaw)
+    moved[:, 3:7] = np.stack(quaternion_product(turn, frames[:, 3:7].T), axis=1)
     return moved
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from mplearn.maths.plane import turn_in_plane
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.mechanics.pendulum import pendulum_rate
 from mplearn_envs.mechanics.reference import reference_robot
@@ -39,8 +40,7 @@ class Support(NamedTuple):
     def see(self, points: FloatArray) -> FloatArray:
         """Return points of the floor, (S, 2), as seen from here [m]."""
         x, y = (points - self.origin).T
-        c, s = np.cos(self.heading), np.sin(self.heading)
-        return np.stack((c * x + s * y, c * y - s * x), axis=-1)
+        return np.stack(turn_in_plane(x, y, -self.heading), axis=-1)
 
 
 def support(share: FloatArray, feet: FloatArray) -> Support:

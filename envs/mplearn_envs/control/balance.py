@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix
 from mplearn.recording import FloatArray
 from mplearn_envs.mechanics.kinematics import forward, rotate_quaternion
-from mplearn_envs.mechanics.reference import Reference, base_rotation, reference_robot
+from mplearn_envs.mechanics.reference import Reference, reference_robot
 from mplearn_envs.mechanics.velocity_ik import (
     COG,
     FEET,
@@ -62,9 +63,9 @@ class BalanceController:
             robot.stance,
             before,
             reference.target[0] + height_offset,
-            base_rotation(reference.target[1], reference.target[2]),
+            roll_pitch_matrix(reference.target[1], reference.target[2]),
         )
-        height, upright = target[0] + height_offset, base_rotation(target[1], target[2])
+        height, upright = target[0] + height_offset, roll_pitch_matrix(target[1], target[2])
         later = errors(robot.stance, before, height, upright)
         rows = self._gains * now * period_s
         rows[COG] -= moved / pose.carried[0]

@@ -8,6 +8,8 @@ import mujoco
 import numpy as np
 from numba import njit
 
+from mplearn.maths.plane import turn_in_plane
+from mplearn.maths.yaw_roll_pitch import roll_pitch_of, yaw_of
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.mechanics.reference import sole_corners
 from mplearn_envs.mechanics.support import convex_hull, support_margin
@@ -95,10 +97,7 @@ def _read(
     corners: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return posture, velocity, COG, bodies, and the soles' corners that are down, (S, 2) [m]."""
-    w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
-    yaw = np.arctan2(2 * (w * z - x * y), 1 - 2 * (x * x + z * z))
-    c, s = np.cos(yaw), np.sin(yaw)
-
+    yaw = yaw_of(qpos[3:7])
     soles = np.empty((8, 3))
     for side in range(2):
         for k in range(4):
@@ -110,23 +109,21 @@ def _read(
 
     posture = np.empty(qpos.shape[0] - 4)
     posture[0] = qpos[2]
-    posture[1] = np.arcsin(min(max(2 * (y * z + w * x), -1.0), 1.0))
-    posture[2] = np.arctan2(2 * (w * y - x * z), 1 - 2 * (x * x + y * y))
+    posture[1], posture[2] = roll_pitch_of(qpos[3:7])
     posture[3:] = qpos[7:]
     velocity = qvel.copy()
-    velocity[0], velocity[1] = c * qvel[0] + s * qvel[1], c * qvel[1] - s * qvel[0]
+    velocity[0], velocity[1] = turn_in_plane(qvel[0], qvel[1], -yaw)
     cog = com.copy()
-    dx, dy = com[0] - middle_x, com[1] - middle_y
-    cog[0], cog[1] = c * dx + s * dy, c * dy - s * dx
+    cog[0], cog[1] = turn_in_plane(com[0] - middle_x, com[1] - middle_y, -yaw)
     bodies = np.empty_like(xpos)
     for b in range(xpos.shape[0]):
-        dx, dy = xpos[b, 0] - middle_x, xpos[b, 1] - middle_y
-        bodies[b, 0], bodies[b, 1], bodies[b, 2] = c * dx + s * dy, c * dy - s * dx, xpos[b, 2]
+        x, y = turn_in_plane(xpos[b, 0] - middle_x, xpos[b, 1] - middle_y, -yaw)
+        bodies[b, 0], bodies[b, 1], bodies[b, 2] = x, y, xpos[b, 2]
     down = np.empty((8, 2))
     n = 0
     for k in range(8):
         if soles[k, 2] < _DOWN_M:
-            dx, dy = soles[k, 0] - middle_x, soles[k, 1] - middle_y
-            down[n, 0], down[n, 1] = c * dx + s * dy, c * dy - s * dx
+            x, y = turn_in_plane(soles[k, 0] - middle_x, soles[k, 1] - middle_y, -yaw)
+            down[n, 0], down[n, 1] = x, y
             n += 1
     return posture, velocity, cog, bodies, down[:n].copy()

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mplearn.library import PrimitiveLibrary
+from mplearn.maths.plane import turn_in_plane, wrap_angle
 from mplearn.recording import FloatArray
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.execution.tracking_report import TrackingReport
@@ -198,6 +199,5 @@ def _figures(
 
 def _moved(place: FloatArray) -> FloatArray:
     """Return how a foot moved, (2, 3) to (3,): x, y [m] as it stood first, yaw [rad]."""
-    c, s = np.cos(place[0, 2]), np.sin(place[0, 2])
     x, y, turn = place[1] - place[0]
-    return np.array([c * x + s * y, c * y - s * x, np.arctan2(np.sin(turn), np.cos(turn))])
+    return np.array([*turn_in_plane(x, y, -place[0, 2]), wrap_angle(turn)])

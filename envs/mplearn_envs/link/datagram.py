@@ -29,6 +29,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from mplearn.errors import MPLearnError
+from mplearn.maths.yaw_roll_pitch import roll_pitch_of, yaw_roll_pitch_quaternion
 from mplearn.recording import FloatArray
 
 MAGIC, VERSION = b"MPLU", 1
@@ -130,14 +131,9 @@ def decode(data: bytes, robot: int, n_angles: int) -> Datagram:
 
 def base_frame(height_m: float, roll: float, pitch: float) -> FloatArray:
     """Return the frame of a base without heading, at x = y = 0, shape (7,)."""
-    cr, sr = np.cos(0.5 * roll), np.sin(0.5 * roll)
-    cp, sp = np.cos(0.5 * pitch), np.sin(0.5 * pitch)
-    return np.array([0.0, 0.0, height_m, cr * cp, sr * cp, cr * sp, sr * sp])
+    return np.array([0.0, 0.0, height_m, *yaw_roll_pitch_quaternion(0.0, roll, pitch)])
 
 
 def base_coordinates(frame: FloatArray) -> FloatArray:
     """Return height [m], roll and pitch [rad] of a base's frame; the inverse of `base_frame`."""
-    w, x, y, z = frame[3:7]
-    roll = np.arcsin(np.clip(2 * (y * z + w * x), -1.0, 1.0))
-    pitch = np.arctan2(2 * (w * y - x * z), 1 - 2 * (x * x + y * y))
-    return np.array([frame[2], roll, pitch])
+    return np.array([frame[2], *roll_pitch_of(frame[3:7])])

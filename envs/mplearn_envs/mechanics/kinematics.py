@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from mplearn.body.tree import KinematicTree, forward_kinematics
+from mplearn.maths.quaternions import quaternion_product, vector_quaternion
 from mplearn.recording import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -148,43 +149,9 @@ def places(tree: MassTree, bodies: IntArray, q: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
-def _relative(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return a b^T of (3, 3) matrices (at this size BLAS costs more than the product)."""
-    out = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = a[i, 0] * b[j, 0] + a[i, 1] * b[j, 1] + a[i, 2] * b[j, 2]
-    return out
-
-
-@njit(cache=True)
-def rotation_error(wanted: FloatArray, actual: FloatArray) -> FloatArray:
-    """Return the rotation vector [rad], world frame, that turns ``actual`` into ``wanted``."""
-    r = _relative(wanted, actual)
-    sine = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]]) * 0.5
-    s = np.sqrt(sine[0] ** 2 + sine[1] ** 2 + sine[2] ** 2)
-    cosine = 0.5 * (r[0, 0] + r[1, 1] + r[2, 2] - 1.0)
-    if s < 1e-9:
-        return sine
-    sine *= np.arctan2(s, cosine) / s
-    return sine
-
-
-@njit(cache=True)
 def rotate_quaternion(quaternion: FloatArray, vector: FloatArray) -> FloatArray:
     """Return the unit quaternion turned by a rotation vector [rad] of the world frame."""
-    angle = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
-    half = 0.5 * angle
-    k = 0.5 if angle < 1e-9 else np.sin(half) / angle
-    a, b, c, d = np.cos(half), vector[0] * k, vector[1] * k, vector[2] * k
-    w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
-    out = np.array(
-        [
-            a * w - b * x - c * y - d * z,
-            a * x + b * w + c * z - d * y,
-            a * y - b * z + c * w + d * x,
-            a * z + b * y - c * x + d * w,
-        ]
-    )
+    turn = vector_quaternion(vector[0], vector[1], vector[2])
+    out = np.array(quaternion_product(turn, quaternion))
     out /= np.sqrt(np.sum(out * out))
     return out

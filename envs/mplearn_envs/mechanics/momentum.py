@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from mplearn.maths.quaternions import quaternion_product, quaternion_vector
 from mplearn.recording import FloatArray, IntArray
 
 from .kinematics import MassTree, forward, turned
@@ -114,22 +115,10 @@ def velocities(q: FloatArray, period_s: float) -> FloatArray:
         span = (after - before) * period_s
         for i in range(3):
             out[t, i] = (q[after, i] - q[before, i]) / span
-        w, x, y, z = q[before, 3], -q[before, 4], -q[before, 5], -q[before, 6]
-        a, b, c, d = q[after, 3], q[after, 4], q[after, 5], q[after, 6]
-        cosine = w * a - x * b - y * c - z * d
-        turn = np.array(
-            [
-                w * b + x * a + y * d - z * c,
-                w * c + y * a + z * b - x * d,
-                w * d + z * a + x * c - y * b,
-            ]
-        )
-        if cosine < 0:
-            turn, cosine = -turn, -cosine
-        sine = np.sqrt(np.sum(turn * turn))
-        factor = 2.0 if sine < 1e-9 else 2.0 * np.arctan2(sine, cosine) / sine
+        earlier = (q[before, 3], -q[before, 4], -q[before, 5], -q[before, 6])
+        turn = quaternion_vector(quaternion_product(earlier, q[after, 3:7]))
         for i in range(3):
-            out[t, 3 + i] = factor * turn[i] / span
+            out[t, 3 + i] = turn[i] / span
         for i in range(7, q.shape[1]):
             out[t, i - 1] = (q[after, i] - q[before, i]) / span
     return out

@@ -6,9 +6,9 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mplearn.errors import RobotError
+from mplearn.maths.plane import turn_in_plane
 from mplearn.maths.rotations import quaternion_to_matrix
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.robot import Robot
@@ -78,13 +78,6 @@ class Reference(NamedTuple):
     def lifted(self) -> int:
         """Side of the foot that is in the air, 0 left, 1 right; -1 for none."""
         return int(np.argmax(self.up)) if self.up.any() else -1
-
-
-@njit(cache=True)
-def base_rotation(roll: float, pitch: float) -> FloatArray:
-    """Return the base's orientation without heading, R_x(roll) R_y(pitch), shape (3, 3)."""
-    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
-    return np.array([[cp, 0.0, sp], [sr * sp, cr, -sr * cp], [-cr * sp, sr, cr * cp]])
 
 
 @lru_cache(maxsize=8)
@@ -203,21 +196,12 @@ def sole_centre(robot: Robot, q: FloatArray) -> FloatArray:
 def sole_middles(robot: ReferenceRobot, ground: FloatArray) -> FloatArray:
     """Return the middles of both soles, shape (..., 2, 2) [m], for feet at (..., 2, 3)."""
     middle = robot.corners.mean(axis=1)[:, :2]
-    c, s = np.cos(ground[..., 2]), np.sin(ground[..., 2])
-    out: FloatArray = np.stack(
-        (
-            ground[..., 0] + c * middle[:, 0] - s * middle[:, 1],
-            ground[..., 1] + s * middle[:, 0] + c * middle[:, 1],
-        ),
-        axis=-1,
-    )
-    return out
+    turned = turn_in_plane(middle[:, 0], middle[:, 1], ground[..., 2])
+    return np.asarray(ground[..., :2] + np.stack(turned, axis=-1))
 
 
 def sole_outlines(robot: ReferenceRobot, ground: FloatArray) -> FloatArray:
     """Return the corners of both soles, shape (..., 2, 4, 2) [m], for feet at (..., 2, 3)."""
     corners = robot.corners[..., :2]
-    c, s = np.cos(ground[..., 2])[..., None], np.sin(ground[..., 2])[..., None]
-    x, y = corners[..., 0], corners[..., 1]
-    place = ground[..., None, :2]
-    return np.asarray(place + np.stack((c * x - s * y, s * x + c * y), axis=-1))
+    turned = turn_in_plane(corners[..., 0], corners[..., 1], ground[..., 2, None])
+    return np.asarray(ground[..., None, :2] + np.stack(turned, axis=-1))

@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from mplearn.maths.rotation_kernels import rotation_error
 from mplearn.recording import FloatArray, IntArray
 
-from .kinematics import MassTree, Pose, cross, forward, rotate_quaternion, rotation_error
+from .kinematics import MassTree, Pose, cross, forward, rotate_quaternion
 
 N_ROWS = 18
 FEET = slice(0, 12)

@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from mplearn.maths.plane import turn_in_plane, wrap_angle
+from mplearn.maths.yaw_roll_pitch import yaw_roll_pitch_quaternion
 from mplearn.recording import BoolArray, FloatArray, IntArray
 from mplearn_envs.mechanics.kinematics import MassTree, forward
 from mplearn_envs.mechanics.reference import reference_robot, sole_corners
@@ -147,9 +149,7 @@ def _feet(
     q = np.zeros(4 + frames.shape[1])
     for t in range(frames.shape[0]):
         q[2] = frames[t, 0]
-        cr, sr = np.cos(0.5 * frames[t, 1]), np.sin(0.5 * frames[t, 1])
-        cp, sp = np.cos(0.5 * frames[t, 2]), np.sin(0.5 * frames[t, 2])
-        q[3], q[4], q[5], q[6] = cp * cr, cp * sr, sp * cr, sp * sr
+        q[3], q[4], q[5], q[6] = yaw_roll_pitch_quaternion(0.0, frames[t, 1], frames[t, 2])
         q[7:] = frames[t, 3:]
         pose = forward(tree, q)
         for side in range(2):
@@ -161,9 +161,7 @@ def _feet(
                 heights[t, side] = min(heights[t, side], z)
         left, right = pose.rotation[feet[0]], pose.rotation[feet[1]]
         yaw = np.arctan2(right[1, 0], right[0, 0])
-        c, s = np.cos(yaw), np.sin(yaw)
         step = pose.position[feet[0]] - pose.position[feet[1]]
-        relative[t, 0], relative[t, 1] = c * step[0] + s * step[1], c * step[1] - s * step[0]
-        turn = np.arctan2(left[1, 0], left[0, 0]) - yaw
-        relative[t, 2] = np.arctan2(np.sin(turn), np.cos(turn))
+        relative[t, 0], relative[t, 1] = turn_in_plane(step[0], step[1], -yaw)
+        relative[t, 2] = wrap_angle(np.arctan2(left[1, 0], left[0, 0]) - yaw)
     return heights, relative

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from mplearn.maths.plane import turn_in_plane
+from mplearn.maths.rotation_kernels import rotation_error, turn_about_vertical, turn_by_vector
+from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix
 from mplearn.recording import FloatArray
-from mplearn_envs.mechanics.kinematics import forward, rotation_error
-from mplearn_envs.mechanics.reference import ReferenceRobot, base_rotation
+from mplearn_envs.mechanics.kinematics import forward
+from mplearn_envs.mechanics.reference import ReferenceRobot
 from mplearn_envs.mechanics.velocity_ik import Stance, advance, errors, rates
 
 TOLERANCE = 1e-8  # [m, rad] to which the feet, COG and base follow
@@ -73,7 +76,7 @@ def balanced_path(
         stance.cog[:] = cog[k]
         stance.carried[:] = carried[k]
         heading = 0.5 * (ground[k, 0, 2] + ground[k, 1, 2])
-        orientation = about_vertical(heading, base_rotation(targets[k, 1], targets[k, 2]))
+        orientation = turn_about_vertical(heading, roll_pitch_matrix(targets[k, 1], targets[k, 2]))
         height = targets[k, 0] + offset
         for iteration in range(_MAX_ITERATIONS + 1):
             pose = forward(robot.tree, q)
@@ -109,7 +112,7 @@ def _aim(
     rise, share = swing[n_legs + side], stance.carried[side]
     flat = robot.stance.foot_rotation[side]
     there_x, there_y, yaw = ground[side]
-    rotation = about_vertical(yaw, flat)
+    rotation = turn_about_vertical(yaw, flat)
     height = robot.stance.foot_position[side, 2]
     x, y, z = there_x, there_y, height + rise
     if share > 0.0:
@@ -120,7 +123,7 @@ def _aim(
         pose = forward(robot.tree, there)
         foot = stance.feet[side]
         turn = rotation_error(pose.rotation[foot], rotation)
-        rotation = rotated(share * turn, rotation)
+        rotation = turn_by_vector(share * turn, rotation)
         z += _lowest(robot.corners[side], flat) - _lowest(robot.corners[side], rotation)
         x += share * (pose.position[foot, 0] - x)
         y += share * (pose.position[foot, 1] - y)
@@ -141,9 +144,7 @@ def _too_near(robot: ReferenceRobot, side: int, x: float, y: float, other: Float
     corners = robot.corners[side]
     length = corners[:, 0].max() - corners[:, 0].min()
     width = corners[:, 1].max() - corners[:, 1].min()
-    c, s = np.cos(other[2]), np.sin(other[2])
-    ahead = c * (x - other[0]) + s * (y - other[1])
-    aside = c * (y - other[1]) - s * (x - other[0])
+    ahead, aside = turn_in_plane(x - other[0], y - other[1], -other[2])
     beside = min(max(2.0 - abs(ahead) / length, 0.0), 1.0)
     missing = (width + APART_M) * beside - (aside if side == 0 else -aside)
     return float(max(missing, 0.0) * (1.0 if side == 0 else -1.0))
@@ -159,34 +160,3 @@ def _lowest(corners: FloatArray, rotation: FloatArray) -> float:
             z += rotation[2, i] * corners[corner, i]
         lowest = min(lowest, z)
     return lowest
-
-
-@njit(cache=True)
-def about_vertical(yaw: float, rotation: FloatArray) -> FloatArray:
-    """Return a (3, 3) orientation turned by an angle about the vertical."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    out = rotation.copy()
-    for i in range(3):
-        out[0, i] = c * rotation[0, i] - s * rotation[1, i]
-        out[1, i] = s * rotation[0, i] + c * rotation[1, i]
-    return out
-
-
-@njit(cache=True)
-def rotated(vector: FloatArray, rotation: FloatArray) -> FloatArray:
-    """Return a (3, 3) orientation turned by a rotation vector [rad] (Rodrigues' formula)."""
-    angle = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
-    if angle < 1e-12:
-        return rotation.copy()
-    axis = vector / angle
-    c, s = np.cos(angle), np.sin(angle)
-    out = np.empty((3, 3))
-    for j in range(3):
-        along = 0.0
-        for i in range(3):
-            along += axis[i] * rotation[i, j]
-        for i in range(3):
-            a, b = (i + 1) % 3, (i + 2) % 3
-            across = axis[a] * rotation[b, j] - axis[b] * rotation[a, j]
-            out[i, j] = c * rotation[i, j] + s * across + (1.0 - c) * along * axis[i]
-    return out

@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mplearn.maths.plane import turn_in_plane, wrap_angle
+from mplearn.maths.quaternions import quaternion_product, vector_quaternion
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.mechanics.pendulum import plan_cog
 from mplearn_envs.mechanics.reference import Reference, ReferenceRobot
@@ -55,18 +57,15 @@ def landing(
     It does not land on the other foot, however narrow the demonstrator stands.
     """
     stands = ground[1 - side]
-    c, s = np.cos(stands[2]), np.sin(stands[2])
     dx, dy, turn = left_from_right
     if side == 1:  # the right foot in the left one's frame
-        ct, st = np.cos(turn), np.sin(turn)
-        dx, dy, turn = -(ct * dx + st * dy), -(ct * dy - st * dx), -turn
+        (dx, dy), turn = turn_in_plane(-dx, -dy, -turn), -turn
     length, width = np.ptp(robot.corners, axis=1).max(axis=0)[:2]
     if abs(dx) < length:
         clear = width + APART_M + 0.5 * length * abs(np.sin(turn))
         dy = max(dy, clear) if side == 0 else min(dy, -clear)
-    place = np.array([stands[0] + c * dx - s * dy, stands[1] + s * dx + c * dy, stands[2] + turn])
-    moved = place - ground[side]
-    moved[2] = np.arctan2(np.sin(moved[2]), np.cos(moved[2]))
+    moved = stands + np.array((*turn_in_plane(dx, dy, stands[2]), turn)) - ground[side]
+    moved[2] = wrap_angle(moved[2])
     if np.hypot(moved[0], moved[1]) < SAME_PLACE_M and abs(moved[2]) < SAME_YAW_RAD:
         return np.array(ground[side])
     return np.asarray(ground[side] + moved)
@@ -92,19 +91,11 @@ def recentred(q: FloatArray, ground: FloatArray) -> tuple[FloatArray, FloatArray
     middle, yaw = ground[:, :2].mean(axis=0), float(ground[:, 2].mean())
     if not (np.any(np.abs(middle) > 1e-9) or abs(yaw) > 1e-9):
         return q, ground
-    c, s = np.cos(yaw), np.sin(yaw)
-    turn = np.array([[c, s], [-s, c]])
     q, ground = q.copy(), ground.copy()
-    q[:2] = turn @ (q[:2] - middle)
-    half_c, half_s = np.cos(0.5 * yaw), -np.sin(0.5 * yaw)
-    w, a, b, z = q[3:7]
-    q[3:7] = (
-        half_c * w - half_s * z,
-        half_c * a - half_s * b,
-        half_c * b + half_s * a,
-        half_c * z + half_s * w,
-    )
-    ground[:, :2] = (ground[:, :2] - middle) @ turn.T
+    q[:2] = turn_in_plane(q[0] - middle[0], q[1] - middle[1], -yaw)
+    q[3:7] = quaternion_product(vector_quaternion(0.0, 0.0, -yaw), q[3:7])
+    x, y = (ground[:, :2] - middle).T
+    ground[:, :2] = np.stack(turn_in_plane(x, y, -yaw), axis=1)
     ground[:, 2] -= yaw
     return q, ground
 

@@ -6,9 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mplearn.maths.rotation_kernels import rotation_error
+from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix
 from mplearn_envs.control.balance import BalanceController
-from mplearn_envs.mechanics.kinematics import forward, mass_tree, rotate_quaternion, rotation_error
-from mplearn_envs.mechanics.reference import base_rotation, reference_robot, rest_reference
+from mplearn_envs.mechanics.kinematics import forward, mass_tree, rotate_quaternion
+from mplearn_envs.mechanics.reference import reference_robot, rest_reference
 from mplearn_envs.mechanics.velocity_ik import (
     add_leg_columns,
     errors,
@@ -108,7 +110,7 @@ def test_a_rotation_error_undoes_the_rotation(vector, quaternion):
 def settled(upper, height, roll, pitch):
     q = ROBOT.rest.copy()
     q[7 + ROBOT.upper] = upper
-    return settle(TREE, ROBOT.stance, q, height, base_rotation(roll, pitch), 1e-10, 60)
+    return settle(TREE, ROBOT.stance, q, height, roll_pitch_matrix(roll, pitch), 1e-10, 60)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -140,7 +142,7 @@ def test_the_balanced_posture_is_minks(seed):
     for _ in range(200):
         # mink weighs errors in the body's frame: a target above the body leaves height alone
         place = np.array([*configuration.q[:2], ours[2]])
-        turn = mink.SO3.from_matrix(base_rotation(roll, pitch))
+        turn = mink.SO3.from_matrix(roll_pitch_matrix(roll, pitch))
         pelvis.set_target(mink.SE3.from_rotation_and_translation(turn, place))
         velocity = mink.solve_ik(
             configuration,
@@ -193,7 +195,7 @@ def test_sole_heights_are_mujocos():
     frames[:, 3:] = rng.normal(scale=0.3, size=(4, 30))
     data = mujoco.MjData(MODEL)
     for frame, ours in zip(frames, sole_heights(humanoid(), frames), strict=True):
-        matrix = base_rotation(frame[1], frame[2])
+        matrix = roll_pitch_matrix(frame[1], frame[2])
         data.qpos[:3] = 0.0, 0.0, frame[0]
         mujoco.mju_mat2Quat(data.qpos[3:7], matrix.ravel())
         data.qpos[7:] = frame[3:]
