@@ -1,5 +1,5 @@
 # The commands of mplearn. `make demo` and `make test` set up what they need.
-.PHONY: demo test setup check format bench evaluate compare build clean clean-cache
+.PHONY: demo test setup check docs format bench evaluate compare build clean clean-cache
 .DEFAULT_GOAL := demo
 
 PYTHON ?= python3
@@ -24,6 +24,9 @@ check: setup                        ## format, lint, docstrings, types, floors
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+docs: setup                         ## the documentation as a site: out/site/index.html
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --site-dir $(OUT)/site
 
 format: setup                       ## format and mend what can be mended
 	$(BIN)/ruff format .
@@ -68,5 +71,5 @@ $(VENV)/.demo: $(VENV)/.venv pyproject.toml constraints.txt
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.venv pyproject.toml constraints.txt
-	$(PIP) --editable ".[report,rl,dev]"
+	$(PIP) --editable ".[report,rl,docs,dev]"
 	@touch $@ $(VENV)/.demo

@@ -1,0 +1,50 @@
+"""What MkDocs calls while it builds the site: formulas become MathML, rooms become API pages."""
+
+from __future__ import annotations
+
+import html
+import re
+from pathlib import Path
+from typing import Any
+
+from latex2mathml.converter import convert
+from mkdocs.structure.files import File, Files
+
+FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
+
+#: Where the packages lie whose rooms get a page of the reference each.
+PACKAGES = {"mplearn": "mplearn", "mplearn_envs": "envs/mplearn_envs"}
+
+#: Modules beside the rooms that get a page, too.
+MODULES = ("mplearn.errors", "mplearn.recording", "mplearn_envs.checks")
+
+
+def on_page_content(content: str, **_: Any) -> str:
+    """Replace each formula by MathML, which browsers draw without a script."""
+    return FORMULA.sub(_mathml, content)
+
+
+def _mathml(found: re.Match[str]) -> str:
+    display = "inline" if found[2] == "(" else "block"
+    return convert(html.unescape(found[3]), display=display)
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add a page of the reference for each room that has public names."""
+    root = Path(config["config_file_path"]).parent
+    pages = {name: f"# {name}\n\n::: {name}\n" for name in MODULES}
+    for package, folder in PACKAGES.items():
+        for init in sorted((root / folder).glob("*/**/__init__.py")):
+            room = ".".join((package, *init.parent.relative_to(root / folder).parts))
+            if names := public_names(init):
+                parts = (f"::: {room}.{name}" for name in names)
+                pages[room] = "\n\n".join((f"# {room}", *parts)) + "\n"
+    for name, page in pages.items():
+        files.append(File.generated(config, f"reference/{name}.md", content=page))
+    return files
+
+
+def public_names(init: Path) -> list[str]:
+    """Return the names that a room's door re-exports: ``from .x import Y as Y``."""
+    found = re.findall(r"\b([A-Za-z]\w*) as \1\b", init.read_text(encoding="utf-8"))
+    return sorted(set(found), key=found.index)
