@@ -98,66 +98,38 @@ _CMU41 = (
     | _sides(_ARM)
 )
 
-# joint centres, as skeletal files give them
-_ORIGIN: Offset = (0.0, 0.0, 0.0)
-# a joint of a skeleton is where its segment starts; "_end" is where the last one ends
-_ASF_SIDE: Table = {
-    "hipjoint": ("pelvis", (0.0, 0.0, 0.050)),
-    "femur": ("thigh_l", _ORIGIN),
-    "tibia": ("shank_l", _ORIGIN),
-    "foot": ("foot_l", _ORIGIN),
-    "toes": ("toes_l", _ORIGIN),
-    "toes_end": ("toes_l", (0.070, 0.0, -0.010)),
-    "clavicle": ("chest", (-0.010, 0.0, 0.250)),
-    "humerus": ("upper_arm_l", _ORIGIN),
-    "radius": ("forearm_l", _ORIGIN),
-    "wrist": ("forearm_l", (0.0, 0.0, -0.170)),
-    "hand": ("hand_l", _ORIGIN),
-    "fingers": ("hand_l", (0.0, 0.0, -0.080)),
-    "fingers_end": ("hand_l", (0.0, 0.0, -0.130)),
-    "thumb": ("hand_l", _ORIGIN),
-    "thumb_end": ("hand_l", (0.050, 0.0, -0.060)),
+# joints, and points that show how the trunk, the head, the hands and the feet are turned: what
+# `mplearn.anatomy` makes of skeletons and of markers at joints
+_JOINT_SIDE: Table = {
+    "hip": ("pelvis", (0.0, 0.0875, 0.0)),
+    "knee": ("thigh_l", (0.0, 0.0, -0.42875)),
+    "ankle": ("shank_l", (0.0, 0.0, -0.4305)),
+    "heel": ("foot_l", (-0.060, 0.0, -0.055)),
+    "ball": ("foot_l", (0.125, 0.0, -0.05325)),
+    "shoulder": ("clavicle_l", (0.0, 0.1505, -0.014)),
+    "elbow": ("upper_arm_l", (0.0, 0.0, -0.3255)),
+    "wrist": ("forearm_l", (0.0, 0.0, -0.2555)),
+    "hand": ("hand_l", (0.0, 0.0, -0.100)),
+    "thumb_side": ("hand_l", (0.040, 0.0, -0.100)),
+    "chest": ("chest", (0.0, 0.100, 0.200)),
+    "ear": ("head", (0.0, 0.075, 0.120)),
 }
-_ASF = {
-    "root": ("pelvis", (0.0, 0.0, 0.050)),
-    **_sides(_ASF_SIDE, "l{}", "r{}"),
-    "lowerback": ("pelvis", (0.0, 0.0, 0.050)),
-    "upperback": ("abdomen", (-0.010, 0.0, 0.090)),
-    "thorax": ("chest", (-0.010, 0.0, 0.060)),
-    "lowerneck": ("chest", (-0.010, 0.0, 0.250)),
-    "upperneck": ("head", (0.0, 0.0, 0.0)),
-    "head": ("head", (0.005, 0.0, 0.090)),
-    "head_end": ("head", (0.010, 0.0, 0.180)),
-}
-_BVH_SIDE: Table = {
-    "Shoulder": ("clavicle_l", _ORIGIN),
-    "Arm": ("upper_arm_l", _ORIGIN),
-    "ForeArm": ("forearm_l", _ORIGIN),
-    "Hand": ("hand_l", _ORIGIN),
-    "Hand_end": ("hand_l", (0.0, 0.0, -0.130)),
-    "UpLeg": ("thigh_l", _ORIGIN),
-    "Leg": ("shank_l", _ORIGIN),
-    "Foot": ("foot_l", _ORIGIN),
-    "ToeBase": ("toes_l", _ORIGIN),
-    "ToeBase_end": ("toes_l", (0.070, 0.0, -0.010)),
-}
-_BVH = {
-    "Hips": ("pelvis", (0.0, 0.0, 0.050)),
-    "LowerBack": ("pelvis", (0.0, 0.0, 0.050)),
-    "Spine": ("abdomen", (-0.010, 0.0, 0.040)),
-    "Spine1": ("chest", (-0.010, 0.0, 0.060)),
-    "Spine2": ("chest", (-0.010, 0.0, 0.180)),
-    "Neck": ("chest", (-0.010, 0.0, 0.300)),
-    "Neck1": ("head", _ORIGIN),
-    "Head": ("head", (0.005, 0.0, 0.090)),
-    "Head_end": ("head", (0.010, 0.0, 0.180)),
-    **_sides(_BVH_SIDE, "Left{}", "Right{}"),
+_JOINTS = {
+    "pelvis_front": ("pelvis", (0.100, 0.0, 0.0)),
+    "pelvis_back": ("pelvis", (-0.100, 0.0, 0.0)),
+    "lumbar": ("pelvis", (0.0, 0.0, 0.07875)),
+    "sternum": ("chest", (0.100, 0.0, 0.200)),
+    "back": ("chest", (-0.100, 0.0, 0.200)),
+    "neck": ("chest", (-0.010, 0.0, 0.350)),
+    "skull": ("head", (0.0, 0.0, 0.090)),
+    "face": ("head", (0.100, 0.0, 0.120)),
+    "crown": ("head", (0.0, 0.0, 0.235)),
+    **_sides(_JOINT_SIDE, "{}_l", "{}_r"),
 }
 
 TABLES: dict[str, Table] = {
     "paper34": _PAPER34,
     "plug_in_gait39": _PLUG_IN_GAIT,
     "cmu41": _CMU41,
-    "asf_joints": _ASF,
-    "bvh_joints": _BVH,
+    "joint_centres": _JOINTS,
 }

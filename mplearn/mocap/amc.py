@@ -10,7 +10,7 @@ from ..recording import FloatArray, Recording
 from .asf import ASFSkeleton, read_asf
 from .cmu_humanoid import CMU_COLUMNS, CMU_UNIT_M, cmu_humanoid_positions
 from .files import bad_file, cmu_subject, read_text, stem
-from .kinematics import joint_positions
+from .kinematics import joint_positions, with_axes
 from .numbers import numbers
 from .reader import Hints, Reader
 from .skeletal import Column, angle_recording, position_recording
@@ -43,7 +43,7 @@ class AMCReader(Reader):
             )
             angles = _in_si(values, columns, True if degrees is None else degrees, unit)
             if positions:
-                return cmu_humanoid_positions(path, angles, rate_hz, unit)
+                return cmu_humanoid_positions(path, angles, rate_hz, unit, axes=hints.joint_axes)
             return angle_recording(path, columns, (), angles, axes, rate_hz)
 
         skeleton = read_asf(skeleton_file, hints.unit_m)
@@ -56,7 +56,8 @@ class AMCReader(Reader):
             skeleton.unit_m,
         )
         if positions:
-            return position_recording(path, skeleton.joints, angles, axes, rate_hz)
+            shown = with_axes(skeleton.joints) if hints.joint_axes else skeleton.joints
+            return position_recording(path, shown, angles, axes, rate_hz)
         return angle_recording(path, skeleton.columns, skeleton.joints, angles, axes, rate_hz)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..recording import FloatArray, Recording
 from .files import bad_file, read_text
-from .kinematics import Joint, joint_positions
+from .kinematics import Joint, joint_positions, with_axes
 from .numbers import number, numbers
 from .reader import Hints, Reader
 from .skeletal import Column, angle_recording, position_recording
@@ -40,7 +40,8 @@ class BVHReader(Reader):
         axes = file_axes(hints.up_axis, "y", "z")
         rate_hz = hints.rate_hz or file_rate_hz
         if positions:
-            return position_recording(path, joints, values, axes, rate_hz)
+            shown = with_axes(joints) if hints.joint_axes else joints
+            return position_recording(path, shown, values, axes, rate_hz)
         return angle_recording(path, columns, joints, values, axes, rate_hz)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..maths.rotations import quaternion_to_matrix
 from ..recording import FloatArray, Recording, marker_channels
 from .files import bad_file, cmu_subject, stem
-from .kinematics import Joint, joint_positions, skeleton_of
+from .kinematics import Joint, joint_positions, skeleton_of, with_axes
 from .skeletal import Column
 from .space import checked_markers, to_z_up
 
@@ -39,7 +39,7 @@ _DM_CONTROL_AXES = to_z_up("z", "-y")  # parse_amc turns y to z and leaves x: a 
 
 
 def cmu_humanoid_positions(
-    path: Path, angles: FloatArray, rate_hz: float, unit_m: float
+    path: Path, angles: FloatArray, rate_hz: float, unit_m: float, *, axes: bool = False
 ) -> Recording:
     """Return the joint positions of dm_control's CMU humanoid as it performs a motion.
 
@@ -48,6 +48,7 @@ def cmu_humanoid_positions(
         angles: Its values in the order of `CMU_COLUMNS`, shape (T, 62) [m] [rad].
         rate_hz: Frames per second [1/s].
         unit_m: Unit that the translations were converted with [m].
+        axes: Whether to show how joints are turned; see `Hints`.
 
     Raises:
         RecordingError: There are fewer than the 4 frames that ``parse_amc.convert`` needs.
@@ -56,6 +57,7 @@ def cmu_humanoid_positions(
         raise bad_file(path, f"{len(angles)} frames and no ASF", "at least 4 frames, or its ASF")
     qpos, model = _converted(angles, unit_m)
     joints = tuple(_joint(model, body) for body in range(1, model.nbody))
+    joints = with_axes(joints) if axes else joints
     local = joint_positions(joints, qpos)  # (T, J, 3), the root at the origin
     turned = np.einsum("tij,tkj->tki", quaternion_to_matrix(qpos[:, 3:7]), local)
     points = turned + qpos[:, None, :3]

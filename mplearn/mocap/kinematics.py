@@ -9,6 +9,9 @@ import numpy as np
 from ..maths.rotations import axis_angle_to_matrix
 from ..recording import FloatArray, Skeleton
 
+AXIS_M = 0.1
+AXIS_MARK = ">"  # between a joint's name and the axis that a point shows
+
 _IDENTITY = np.eye(3)
 
 
@@ -69,6 +72,19 @@ def joint_positions(joints: tuple[Joint, ...], values: FloatArray) -> FloatArray
             rotation = parent @ rotation
         frames.append(rotation)
     return positions
+
+
+def with_axes(joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
+    """Return joints with points on their axes, behind them: they show how each joint is turned.
+
+    Each joint that turns gets three, `AXIS_M` along x, y, z of its own frame, as ``NAME>x``.
+    """
+    return joints + tuple(
+        Joint(f"{joint.name}{AXIS_MARK}{name}", index, AXIS_M * _IDENTITY[axis], is_end=True)
+        for index, joint in enumerate(joints)
+        if not joint.is_end
+        for axis, name in enumerate("xyz")
+    )
 
 
 def skeleton_of(joints: tuple[Joint, ...], values: FloatArray, axes: FloatArray) -> Skeleton:

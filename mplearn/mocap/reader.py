@@ -24,12 +24,15 @@ class Hints:
         unit_m: Length of the file's unit of length [m].
         up_axis: The file's vertical axis: ``"x"``, ``"y"`` or ``"z"``.
         skeleton: The ASF file that belongs to an AMC file.
+        joint_axes: With joint positions, also how each joint is turned: three points more
+            (``Head>x``), 0.1 m along axes that turn with it.
     """
 
     rate_hz: float | None = None
     unit_m: float | None = None
     up_axis: str | None = None
     skeleton: Path | str | None = None
+    joint_axes: bool = False
 
     def __post_init__(self) -> None:
         for name in ("rate_hz", "unit_m"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 from mplearn.errors import RecordingError
@@ -15,6 +16,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("data", type=Path, help="a recording, or a folder of them")
     parser.add_argument("--out", type=Path, required=True, help="library file to write")
     parser.add_argument("--rate-hz", type=float, help="resample to this rate [1/s]")
+    parser.add_argument(
+        "--observe",
+        choices=["robot", "positions", "channels"],
+        default="robot",
+        help="what is learned: the robot's features of the person in the recording (default), "
+        "positions of markers and joints, or the file's own channels (a skeleton's joint angles)",
+    )
     parser.add_argument("--segmenter", help="how the stream is cut (default: the learner's own)")
     parser.add_argument(
         "--person", action="append", help="learn from this person's takes only; may be repeated"
@@ -25,13 +33,19 @@ def run(args: argparse.Namespace) -> None:
     """Learn, save the library and print a summary."""
     from rich.console import Console
 
+    from mplearn.anatomy import as_bodies
     from mplearn.learner import LearnerConfig, MotionLearner
-    from mplearn.mocap import open_recordings
+    from mplearn.mocap import Hints, open_recordings
     from mplearn_agents.learning import learn
     from mplearn_agents.tables import primitive_table
 
     console = Console()
-    recordings = open_recordings(args.data, rate_hz=args.rate_hz)
+    recordings = open_recordings(
+        args.data,
+        rate_hz=args.rate_hz,
+        positions=args.observe != "channels",
+        hints=Hints(joint_axes=args.observe == "robot"),
+    )
     if args.person:
         persons = sorted({recording.person for recording in recordings})
         recordings = tuple(r for r in recordings if r.person in args.person)
@@ -40,11 +54,20 @@ def run(args: argparse.Namespace) -> None:
                 f"no take of {' or '.join(args.person)} in {args.data}; there are takes of "
                 f"{', '.join(person or 'a person unnamed' for person in persons)}"
             )
+    if args.observe == "robot" and any(recording.is_markers for recording in recordings):
+        bodies = as_bodies(recordings)
+        for name, error in bodies.refused.items():
+            console.print(f"[yellow]left out: {name}: {error}")
+        recordings = bodies.recordings
     first = recordings[0]
-    options = {"segmenter": args.segmenter} if args.segmenter else {}
-    learner = MotionLearner(
-        LearnerConfig(channels=first.channels, rate_hz=first.rate_hz, **options)
+    config = LearnerConfig(
+        channels=first.channels,
+        rate_hz=first.rate_hz,
+        observe="robot" if args.observe == "robot" else "markers",
     )
+    if args.segmenter:
+        config = replace(config, segmenter=args.segmenter)
+    learner = MotionLearner(config)
     log = learn(learner, recordings, console)
     library = learner.snapshot()
     args.out.parent.mkdir(parents=True, exist_ok=True)

@@ -1,0 +1,173 @@
+"""Which branches of a skeleton are legs, arms, trunk and head: by symmetry, lengths and bends.
+
+A person is built of two pairs of limbs, bone for bone alike, that part from the two ends of a
+spine. What is not paired in this way (weapons, tails, hair) or hangs on a limb's end (fingers) or
+the head (face) is no limb. Names only settle what is nearly a tie.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from .joint_tree import JointTree
+from .name_hints import says_head, says_leg
+from .proportions import ARM, LEG, STRANGE, LimbLaw, fit_limb
+
+SHORTEST_PAIR = 0.18  # of the longest way: fingers and eyes are shorter pairs than limbs
+MOST_NODES = 16  # of a limb that are looked at
+NAMED = 2.0  # what a name is worth, in the logarithm of odds
+UPRIGHT = 2.0  # what it is worth that arms are above legs
+
+
+@dataclass(frozen=True)
+class LimbPair:
+    """Two limbs that are alike; which is the left one is not known yet.
+
+    Attributes:
+        root: Node at which they part.
+        nodes: First, middle and last joint (hip, knee, ankle; shoulder, elbow, wrist) of each.
+        inner: Nodes between the root and the first joint of each, such as clavicles.
+        outer: Nodes after the last joint of each, on the way on which both are alike.
+        cost: Minus the logarithm of its likelihood.
+    """
+
+    root: int
+    nodes: tuple[tuple[int, int, int], tuple[int, int, int]]
+    inner: tuple[tuple[int, ...], tuple[int, ...]]
+    outer: tuple[tuple[int, ...], tuple[int, ...]]
+    cost: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The body that a skeleton is.
+
+    Attributes:
+        legs: The legs, or None.
+        arms: The arms, or None.
+        spine: Nodes from the legs' root to the arms', both included; empty where one is missing.
+        head: Nodes beyond the arms' root on the way to the top of the head; empty where none.
+        cost: Minus the logarithm of its likelihood, relative to a person's.
+    """
+
+    legs: LimbPair | None
+    arms: LimbPair | None
+    spine: tuple[int, ...]
+    head: tuple[int, ...]
+    cost: float
+
+
+def find_plan(tree: JointTree) -> Plan | None:
+    """Find the likeliest body in a skeleton; None if no two of its branches are alike."""
+    pairs = _pairs(tree)
+    if not pairs:
+        return None
+    plans = [
+        plan
+        for (one, reach_one), (other, reach_other) in combinations(pairs, 2)
+        if _apart(tree, one, other)
+        for plan in (
+            _plan(tree, one, other, reach_one + reach_other),
+            _plan(tree, other, one, reach_one + reach_other),
+        )
+    ]
+    if not plans:
+        one, reach = pairs[0]
+        plans = [_plan(tree, one, None, reach), _plan(tree, None, one, reach)]
+    return min(plans, key=lambda plan: plan.cost)
+
+
+_Ways = tuple[int, tuple[tuple[int, int], ...]]  # where they part, and the nodes on both
+
+
+def _pairs(tree: JointTree) -> list[tuple[_Ways, float]]:
+    """Return the pairs of branches that are long enough for limbs, the longest first."""
+    found = []
+    for node, edges in enumerate(tree.edges):
+        for a, b in combinations(edges, 2):
+            reach, ways = tree.paired(node, a, b)
+            if reach > SHORTEST_PAIR * tree.extent and len(ways) >= 2:
+                found.append(((node, ways), reach))
+    found.sort(key=lambda pair: -pair[1])
+    return found[:12]
+
+
+def _apart(tree: JointTree, one: _Ways, other: _Ways) -> bool:
+    """Whether two pairs of branches share no node, but perhaps the one where they part."""
+    return not (_region(tree, one) & _region(tree, other)) and not (
+        _region(tree, one) & {other[0]} or _region(tree, other) & {one[0]}
+    )
+
+
+def _region(tree: JointTree, pair: _Ways) -> frozenset[int]:
+    node, ways = pair
+    return tree.beyond(ways[0][0], node) | tree.beyond(ways[0][1], node)
+
+
+def _plan(tree: JointTree, legs: _Ways | None, arms: _Ways | None, reach: float) -> Plan:
+    """Return the plan in which certain branches are the legs and the arms."""
+    cost = -4.0 * reach / tree.extent  # longer pairs explain more of the skeleton
+    found_legs = _limbs(tree, legs, LEG, 1)
+    found_arms = _limbs(tree, arms, ARM, -1)
+    cost += sum(pair.cost if pair else 0.5 * STRANGE for pair in (found_legs, found_arms))
+    spine: tuple[int, ...] = ()
+    head: tuple[int, ...] = ()
+    if legs is not None and arms is not None:
+        spine = tree.way(legs[0], arms[0])
+        rise = tree.points[:, arms[0], 2] - tree.points[:, legs[0], 2]
+        bone = np.linalg.norm(tree.points[:, arms[0]] - tree.points[:, legs[0]], axis=1)
+        cost -= UPRIGHT * float(np.median(rise / np.maximum(bone, 1e-9)))
+    if arms is not None:
+        head = _head(tree, arms, spine)
+        cost -= NAMED if head and says_head([n for h in head for n in tree.names[h]]) else 0.0
+        cost -= 2.0 if head else 0.0
+    return Plan(found_legs, found_arms, spine, head, cost)
+
+
+def _limbs(tree: JointTree, pair: _Ways | None, law: LimbLaw, legs: int) -> LimbPair | None:
+    if pair is None:
+        return None
+    root, ways = pair
+    ways = ways[: MOST_NODES - 1]
+    chains = [(root, *(nodes[side] for nodes in ways)) for side in (0, 1)]
+    if len(chains[0]) < 3:
+        return None
+    both = np.concatenate([tree.points[:, list(chain)] for chain in chains])
+    limb = fit_limb(both, law)
+    first, middle, last = limb.places
+    names = [name for chain in chains for node in chain[1:] for name in tree.names[node]]
+    return LimbPair(
+        root=root,
+        nodes=_sides(chains, lambda c: (c[first], c[middle], c[last])),
+        inner=_sides(chains, lambda c: c[1:first]),
+        outer=_sides(chains, lambda c: c[last + 1 :]),
+        cost=limb.cost - NAMED * legs * says_leg(names),
+    )
+
+
+def _sides(chains: Sequence[tuple[int, ...]], part):  # type: ignore[no-untyped-def]
+    return part(chains[0]), part(chains[1])
+
+
+def _head(tree: JointTree, arms: _Ways, spine: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the nodes on the longest way from the arms' root that is neither limb nor spine."""
+    root, ways = arms
+    taken = {*ways[0], *spine}
+    best: tuple[float, tuple[int, ...]] = (0.0, ())
+    # where the neck hangs one joint below the arms' root, the way starts there
+    for start in (root, *spine[-2:-1]):
+        for branch in tree.edges[start]:
+            if branch in taken or branch == root:
+                continue
+            if start == root or branch not in spine:
+                length, way = tree.longest(branch, start)
+                length += tree.length(start, branch)
+                if length > best[0]:
+                    best = (length, way)
+        if best[1]:
+            break
+    return best[1] if best[0] > 0.02 * tree.extent else ()

@@ -1,0 +1,90 @@
+"""Where along a chain of joints the hip, the knee and the ankle are: by what people are like.
+
+A chain from the trunk outwards may hold more joints than a limb has: twists, helpers. Of all ways
+to name its joints the most likely one is taken, given how long the parts of a limb are relative to
+each other ([DrillisContini1966], as in `mplearn.body.human_model`) and that a bone does not bend.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from ..recording import FloatArray
+
+BENT = 0.03  # how much of its length a bone may seem to lose by bending
+STRANGE = 12.0  # what a limb costs that no person has
+
+
+class LimbLaw(NamedTuple):
+    """What a limb's parts are like, relative to its upper bone: logarithm of mean, deviation."""
+
+    inner: tuple[float, float]  # from the trunk's joint to the limb's first
+    lower: tuple[float, float]  # shank or forearm
+    outer: tuple[float, float]  # foot to the ball, hand to the knuckles
+    cosine: tuple[float, float]  # between the lower bone and what follows it, usually
+
+
+LEG = LimbLaw((np.log(0.25), 0.6), (0.0, 0.14), (np.log(0.34), 0.45), (0.35, 0.3))
+ARM = LimbLaw((np.log(0.55), 0.7), (np.log(0.80), 0.14), (np.log(0.40), 0.5), (0.95, 0.25))
+
+
+class Limb(NamedTuple):
+    """Places on a chain: first, middle and last joint, and what it costs to believe it."""
+
+    places: tuple[int, int, int]
+    cost: float
+
+
+def fit_limb(chain: FloatArray, law: LimbLaw) -> Limb:
+    """Find a limb's three joints on a chain.
+
+    Args:
+        chain: Where its joints are, the trunk's first, shape (T, n, 3) [m], n >= 3.
+        law: What the limb is like.
+
+    Returns:
+        The likeliest places (of chains of three joints the trunk's joint may be the limb's first),
+        and minus the logarithm of its likelihood.
+    """
+    n = chain.shape[1]
+    bones = np.median(np.linalg.norm(np.diff(chain, axis=1), axis=2), axis=0)  # (n - 1,)
+    along = np.concatenate(([0.0], np.cumsum(bones)))
+    best = Limb((0, 1, 2), np.inf)
+    for first, middle, last in combinations(range(n), 3):
+        if first == 0 and n > 3:
+            continue
+        cost = _cost(chain, along, (first, middle, last), law)
+        if cost < best.cost:
+            best = Limb((first, middle, last), cost)
+    return best
+
+
+def _cost(
+    chain: FloatArray, along: FloatArray, places: tuple[int, int, int], law: LimbLaw
+) -> float:
+    first, middle, last = places
+    upper, lower = along[middle] - along[first], along[last] - along[middle]
+    inner = along[first]
+    cost = _penalty(np.log(lower / upper), law.lower)
+    cost += _penalty(np.log(max(inner, 0.02 * upper) / upper), law.inner) if first else 0.5
+    for a, b in ((first, middle), (middle, last)):
+        straight = np.linalg.norm(chain[:, b] - chain[:, a], axis=1).min()
+        cost += 0.5 * ((1.0 - straight / (along[b] - along[a])) / BENT) ** 2 if b > a + 1 else 0.0
+    # a joint that is passed over bends less than the one that is taken for the knee or the elbow
+    if last + 1 < len(along):
+        cost += _penalty(np.log((along[last + 1] - along[last]) / upper), law.outer)
+        bone = chain[:, last] - chain[:, middle]
+        after = chain[:, last + 1] - chain[:, last]
+        lengths = np.linalg.norm(bone, axis=1) * np.linalg.norm(after, axis=1)
+        cosine = float(np.median((bone * after).sum(axis=1) / np.maximum(lengths, 1e-9)))
+        cost += _penalty(cosine, law.cosine)
+    else:
+        cost += 1.0
+    return min(float(cost), 4 * STRANGE)
+
+
+def _penalty(value: float, law: tuple[float, float]) -> float:
+    return 0.5 * ((value - law[0]) / law[1]) ** 2

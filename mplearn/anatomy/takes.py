@@ -1,0 +1,110 @@
+"""Recordings of several takes, or of several dialects, as points of one body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from ..body import find_marker_set
+from ..errors import BodyError, MPLearnError
+from ..recording import Recording, marker_channels
+from .body_map import BodyMap
+from .skeletons import recognise_skeleton
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """Takes as points of one body.
+
+    Attributes:
+        recordings: Those in which a body was recognised, all with the same channels: a point that a
+            take lacks is NaN there.
+        maps: How each was recognised, by its name; None where its names are those of a known
+            marker set.
+        refused: Why not, by name, for the others.
+    """
+
+    recordings: tuple[Recording, ...]
+    maps: Mapping[str, BodyMap | None]
+    refused: Mapping[str, MPLearnError]
+
+
+def recognise(recording: Recording) -> BodyMap | None:
+    """Find the body in a recording; None where its names are those of a known marker set.
+
+    Raises:
+        BodyError: There is no body in it, with the reason, and the option that would settle it.
+    """
+    if recording.skeleton is not None and recording.is_markers:
+        return recognise_skeleton(recording)
+    find_marker_set(recording.marker_names)
+    return None
+
+
+def as_bodies(recordings: Sequence[Recording], *, strict: bool = False) -> Bodies:
+    """Recognise the body in each take, and join takes by the places of the body.
+
+    Takes of another kind than most (markers among skeletons) are refused: their points differ.
+
+    Args:
+        recordings: Markers, or joint positions with their skeleton (`Hints.joint_axes`).
+        strict: Whether a take in which nobody is recognised is an error; otherwise it is refused as
+            long as another one is recognised.
+
+    Raises:
+        BodyError: No take holds a body, or one does not and ``strict`` is set.
+    """
+    maps: dict[str, BodyMap | None] = {}
+    refused: dict[str, MPLearnError] = {}
+    found: list[Recording] = []
+    for recording in recordings:
+        try:
+            body = recognise(recording)
+            found.append(recording if body is None else body.apply(recording))
+        except MPLearnError as error:
+            if strict or len(recordings) == 1:
+                raise
+            refused[recording.name] = error
+            continue
+        maps[recording.name] = body
+    if not found:
+        first = next(iter(refused.values()))
+        raise BodyError(f"no body in any of {len(recordings)} takes; the first: {first}")
+    found = _of_one_kind(found, maps, refused)
+    return Bodies(_joined(found), MappingProxyType(maps), MappingProxyType(refused))
+
+
+def _of_one_kind(
+    found: list[Recording], maps: dict[str, BodyMap | None], refused: dict[str, MPLearnError]
+) -> list[Recording]:
+    """Return the takes of the marker set that most have."""
+    kinds = [find_marker_set(recording.marker_names).name for recording in found]
+    usual = max(kinds, key=kinds.count)
+    for recording, kind in zip(found, kinds, strict=True):
+        if kind != usual:
+            refused[recording.name] = BodyError(
+                f"take {recording.name!r} is of {kind!r}, and most others are of {usual!r}; learn "
+                "them by themselves"
+            )
+            del maps[recording.name]
+    return [r for r, kind in zip(found, kinds, strict=True) if kind == usual]
+
+
+def _joined(recordings: list[Recording]) -> tuple[Recording, ...]:
+    """Return the takes with the same points in the same order, NaN where one lacks a point."""
+    names = list(dict.fromkeys(name for r in recordings for name in r.marker_names))
+    joined = []
+    for recording in recordings:
+        if recording.marker_names != tuple(names):
+            markers = np.full((len(recording), len(names), 3), np.nan)
+            markers[:, [names.index(name) for name in recording.marker_names]] = recording.markers
+            recording = replace(
+                recording,
+                frames=markers.reshape(len(recording), -1),
+                channels=marker_channels(tuple(names)),
+            )
+        joined.append(recording)
+    return tuple(joined)
