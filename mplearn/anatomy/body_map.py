@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import RecordingError
-from ..recording import FloatArray, Recording, marker_channels
+from ..recording import BoolArray, FloatArray, Recording, marker_channels
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +68,9 @@ class BodyMap:
 
     def see(self, points: FloatArray) -> FloatArray:
         """Return the places for points, shape (T, N, 3) to (T, K, 3) [m]."""
-        gone = np.isnan(points).any(axis=2)  # (T, N)
+        gone: BoolArray = np.asarray(np.isnan(points).any(axis=2))  # (T, N)
         known = np.where(gone[..., None], 0.0, points)
         places = self.weights @ known @ (self.factor * self.turn).T  # (T, K, 3)
         used = (self.weights != 0.0).astype(np.float64)
-        missing = (gone @ used.T)[..., None] > 0.0
+        missing: BoolArray = np.expand_dims(gone @ used.T, 2) > 0.0
         return np.where(missing, np.nan, places)
