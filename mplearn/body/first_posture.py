@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mplearn.errors import BodyError
+from mplearn.maths.rigid_fit import fit_similarity
+from mplearn.maths.rotations import matrix_to_quaternion
 from mplearn.recording import FloatArray, IntArray
 
 from .follower import Follower
@@ -69,33 +71,28 @@ def place_trunk(
         )
     expected = follower.tree.points(follower.tree.rest, bodies[rows], template[rows])
     measured = frame[rows]
-    a, b = expected - expected.mean(axis=0), measured - measured.mean(axis=0)
-    u, s, vt = np.linalg.svd(b.T @ a)
-    handed = np.sign(np.linalg.det(u @ vt))
-    signs = np.array([1.0, 1.0, handed])
-    turn = (u * signs) @ vt
-    spread = float((a**2).sum())
-    size = float((s * signs).sum() / spread)
-    if handed < 0 and s[2] > 0.02 * spread:
+    fit = fit_similarity(expected, measured)
+    if fit.mirrored > 0.02:
         raise BodyError(
             "the markers are mirrored: left and right names are swapped, or an axis points the "
             "other way"
         )
-    if not SMALLEST < size < LARGEST:
+    if not SMALLEST < fit.size < LARGEST:
         raise BodyError(
-            f"the trunk is {size:.3g} times as large as {follower.body.name!r}'s; {SMALLEST} to "
-            f"{LARGEST} are people, in metres"
+            f"the trunk is {fit.size:.3g} times as large as {follower.body.name!r}'s; "
+            f"{SMALLEST} to {LARGEST} are people, in metres"
         )
-    if turn[2, 2] < LEAST_UPRIGHT:
-        lean = np.degrees(np.arccos(np.clip(turn[2, 2], -1, 1)))
+    up = fit.rotation[2, 2]
+    if up < LEAST_UPRIGHT:
+        lean = np.degrees(np.arccos(np.clip(up, -1, 1)))
         raise BodyError(
             f"the trunk leans {lean:.0f} deg from upright in the first frames: calibrate on a "
             f"standing person, with z up"
         )
     q = follower.tree.rest
-    q[:3] = measured.mean(axis=0) + size * turn @ (q[:3] - expected.mean(axis=0))
-    q[3:7] = _quaternion(turn)
-    return size, q
+    q[:3] = fit.apply(q[:3])
+    q[3:7] = matrix_to_quaternion(fit.rotation)
+    return fit.size, q
 
 
 def first_posture(
@@ -197,12 +194,3 @@ def _below(tree: KinematicTree, name: str) -> list[int]:
         if tree.parent[b] in found:
             found.append(b)
     return found
-
-
-def _quaternion(mat: FloatArray) -> FloatArray:
-    """Return the quaternion (w, x, y, z) of a rotation matrix."""
-    import mujoco
-
-    q = np.empty(4)
-    mujoco.mju_mat2Quat(q, np.ascontiguousarray(mat).ravel())
-    return q

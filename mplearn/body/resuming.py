@@ -7,6 +7,9 @@ from typing import Any
 import numpy as np
 
 from mplearn.errors import BodyError
+from mplearn.maths.quaternions import quaternion_product
+from mplearn.maths.rigid_fit import fit_rigid
+from mplearn.maths.rotations import matrix_to_quaternion
 from mplearn.recording import FloatArray
 
 from .first_posture import first_posture, place_trunk, settle
@@ -52,21 +55,15 @@ class ResumingKinematics(InverseKinematics):
 
     def _moved(self, frame: FloatArray) -> FloatArray:
         """Return the last posture, moved rigidly onto a frame [Kabsch1976]."""
-        import mujoco
-
         assert self.calibration is not None
         q = self._posture.copy()
         seen = np.isfinite(frame).all(axis=1)
         if seen.sum() < 3:
             return q
         then = self._tree.points(q, self._bodies, self.calibration.offsets)[seen]
-        now = frame[seen]
-        u, _, vt = np.linalg.svd((now - now.mean(axis=0)).T @ (then - then.mean(axis=0)))
-        turn = (u * (1.0, 1.0, np.linalg.det(u @ vt))) @ vt
-        quaternion, base = np.empty(4), q[3:7].copy()
-        mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(turn).ravel())
-        mujoco.mju_mulQuat(q[3:7], quaternion, base)
-        q[:3] = now.mean(axis=0) + turn @ (q[:3] - then.mean(axis=0))
+        fit = fit_rigid(then, frame[seen])
+        q[:3] = fit.apply(q[None, :3])[0]
+        q[3:7] = quaternion_product(matrix_to_quaternion(fit.rotation), q[3:7])
         return q
 
 

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import RecordingError
+from ..maths.rigid_fit import fit_upright
 from ..recording import FloatArray, LabelledSegment, Recording
 
 TRAVEL_RATIO = 3.0  # a limb that travels this much farther than its mirror image names the side
@@ -24,28 +25,10 @@ _MARKERS = {"leg": "ANK", "arm": "WR"}
 _JOINTS = {"leg": ("hip", "knee"), "arm": ("shoulder", "elbow")}
 
 
-class RigidFit(NamedTuple):
-    """A turn about the vertical and a horizontal shift: ``x -> turn @ x + shift``."""
-
-    turn: FloatArray
-    shift: FloatArray
-
-    def apply(self, frames: FloatArray) -> FloatArray:
-        """Move marker frames, shape (T, D)."""
-        points = frames.reshape(len(frames), -1, 3)
-        return (points @ self.turn.T + self.shift).reshape(frames.shape)
-
-
-def fit_standing(source: FloatArray, target: FloatArray) -> RigidFit:
-    """Fit one frame of markers, shape (D,), to another by heading and horizontal position."""
-    a, b = source.reshape(-1, 3)[:, :2], target.reshape(-1, 3)[:, :2]
-    ca, cb = a.mean(axis=0), b.mean(axis=0)
-    da, db = a - ca, b - cb
-    angle = np.arctan2((da[:, 0] * db[:, 1] - da[:, 1] * db[:, 0]).sum(), (da * db).sum())
-    c, s = np.cos(angle), np.sin(angle)
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    shift = np.array([*cb, 0.0]) - turn @ np.array([*ca, 0.0])
-    return RigidFit(turn, shift)
+def stood_like(frames: FloatArray, frame: FloatArray) -> FloatArray:
+    """Move marker frames, shape (T, D), so that the first stands where one frame does, (D,) [m]."""
+    points = frames.reshape(len(frames), -1, 3)
+    return fit_upright(points[0], frame.reshape(-1, 3)).apply(points).reshape(frames.shape)
 
 
 def without_gaps(frames: FloatArray, name: str = "") -> FloatArray:
@@ -196,14 +179,14 @@ def _rest(takes: Sequence[Recording], filled: Sequence[FloatArray]) -> FloatArra
         for label in take.labels[1:]:
             start = frames[label.start]
             if take.is_markers and starts:
-                start = fit_standing(start, starts[0]).apply(start[None])[0]
+                start = stood_like(start[None], starts[0])[0]
             starts.append(start)
     return np.asarray(np.median(starts, axis=0))
 
 
 def _posture_distance(take: Recording, frame: FloatArray, rest: FloatArray) -> float:
     if take.is_markers:
-        frame = fit_standing(frame, rest).apply(frame[None])[0]
+        frame = stood_like(frame[None], rest)[0]
     return float(np.linalg.norm(frame - rest))
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import InvalidValueError, RecordingError
 from ..recording import FloatArray, LabelledSegment, Recording
-from .executions import fit_standing, split_repetitions, without_gaps
+from .executions import split_repetitions, stood_like, without_gaps
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def _continue(
     there is one, but not less than a time drawn from them.
     """
     if aligned:
-        frames = fit_standing(frames[0], last).apply(frames)
+        frames = stood_like(frames, last)
     offset = last - frames[0]
     fastest = np.linalg.norm(frames[4:] - frames[:-4], axis=1).max() / 4.0
     needed = 1.875 * np.linalg.norm(offset) / max(float(fastest), 1e-12)

@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import RecordingError
+from ..maths.rigid_fit import RigidFit, fit_upright
 from ..recording import FloatArray, LabelledSegment, Recording
-from .executions import RigidFit, fit_standing
 from .sessions import check_alike
 
 
@@ -60,7 +60,9 @@ def join_people(
         piece = left[at].pop()
         if at != before and frames and piece.is_markers:
             fit = _fit_seen(piece.frames, frames[-1])
-        frames.append(piece.frames if fit is None else fit.apply(piece.frames))
+        frames.append(
+            piece.frames if fit is None else fit.apply(piece.markers).reshape(piece.frames.shape)
+        )
         labels += [
             replace(
                 label,
@@ -99,7 +101,7 @@ def _fit_seen(frames: FloatArray, before: FloatArray) -> RigidFit:
         frame.reshape(-1, 3) for frame in (_held(frames[::-1])[-1], _held(before)[-1])
     )
     seen = np.isfinite(source).all(axis=1) & np.isfinite(target).all(axis=1)
-    return fit_standing(source[seen].ravel(), target[seen].ravel())
+    return fit_upright(source[seen], target[seen])
 
 
 def _held(frames: FloatArray) -> FloatArray:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..maths.rigid_fit import fit_rigid
 from ..recording import BoolArray, FloatArray, IntArray
 
 _STEP_S = 0.1  # time between two looks at the distances
@@ -94,17 +95,7 @@ class RigidNeighbours:
         doubt = self._variance[which] + _UNKNOWN_M**2 / np.maximum(self._looks[which], 1)
         weights = np.where(helps, (doubt + _NOISE_M**2) ** -2.0, 0.0)
         enough = helps.sum(axis=1) >= 3
-        weights[~enough] = 1.0  # any, to be thrown away below
-        weights /= weights.sum(axis=1, keepdims=True)
-        then, now = np.nan_to_num(then), np.nan_to_num(positions)
-        middle_then = np.einsum("km,kmi->ki", weights, then)
-        middle_now = weights @ now
-        spread = np.einsum(
-            "km,kmi,kmj->kij", weights, now - middle_now[:, None], then - middle_then[:, None]
-        )
-        left, _, right = np.linalg.svd(spread)
-        left[:, :, 2] *= np.linalg.det(left @ right)[:, None]  # a rotation, not a reflection
-        rotation = left @ right
-        predicted: FloatArray = np.einsum("kij,kj->ki", rotation, own - middle_then) + middle_now
-        predicted[~enough] = np.nan
+        fit = fit_rigid(then[enough], positions, weights[enough])
+        predicted = np.full((len(which), 3), np.nan)
+        predicted[enough] = fit.apply(own[enough][:, None])[:, 0]
         return predicted

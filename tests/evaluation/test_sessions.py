@@ -12,8 +12,8 @@ from mplearn.errors import InvalidValueError, RecordingError
 from mplearn.evaluation.executions import (
     find_limb,
     find_reversal,
-    fit_standing,
     split_repetitions,
+    stood_like,
     without_gaps,
 )
 from mplearn.evaluation.sessions import SessionConfig, make_session
@@ -117,10 +117,10 @@ def test_joins_are_smooth_though_bodies_stand_elsewhere():
     assert np.ptp(hips[:, :2], axis=0).max() < 1.0
 
 
-def test_fit_standing_undoes_a_turn_and_a_shift():
+def test_standing_like_a_frame_undoes_a_turn_and_a_shift():
     c, s = np.cos(0.7), np.sin(0.7)
     moved = STAND @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T + [2.0, -1.0, 0.0]
-    back = fit_standing(moved.ravel(), STAND.ravel()).apply(moved.reshape(1, -1))
+    back = stood_like(moved.reshape(1, -1), STAND.ravel())
     assert np.allclose(back[0], STAND.ravel(), atol=1e-12)
 
 
