@@ -64,7 +64,7 @@ def double_support() -> Row:
     env.reset(seed=0)
     slots = [env.repertoire.slots[env.library[name].id] for name in CYCLE]
     simulation, model = env.simulation, env.model
-    plan = env.repertoire.plan
+    plan = env.repertoire.skills.plan
     sent: list[np.ndarray] = []
 
     def planned(*wanted: object) -> object:
@@ -72,7 +72,7 @@ def double_support() -> Row:
         sent.append(made.commands)
         return made
 
-    env.repertoire.plan = planned
+    env.repertoire.skills.plan = planned
     raw = mujoco.MjData(model)
     times: dict[str, list[float]] = {"environment": [], "mj_step": []}
     for _ in range(15):
@@ -91,7 +91,7 @@ def double_support() -> Row:
         times["mj_step"].append(time.process_time() - ready)
         times["environment"].append(middle - begin)
     took = {name: float(np.median(each[1:])) / len(slots) for name, each in times.items()}
-    env.repertoire.plan = plan
+    env.repertoire.skills.plan = plan
     return (
         "step, both feet down",
         f"{1e3 * took['environment']:.1f} ms",

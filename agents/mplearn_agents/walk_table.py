@@ -45,7 +45,7 @@ def walk_table(
             "mplearn/PrimitiveHumanoid-v0", library=library, disable_env_checker=True
         )
         repertoire = env.unwrapped.repertoire  # type: ignore[attr-defined]
-        feasible = sum(repertoire.feasibility(id).feasible for id in library.ids)
+        feasible = sum(repertoire.skills.feasibility(id).feasible for id in library.ids)
         known = f"{feasible} of {len(library)}"
         rows += [
             _row((name, str(seed), known), walk(env, RandomWalk(), steps, seed)) for seed in seeds

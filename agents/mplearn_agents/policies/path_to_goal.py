@@ -68,7 +68,7 @@ class PathToGoal(Policy):
         """
         repertoire = env.unwrapped.repertoire  # type: ignore[attr-defined]
         target = repertoire.library[goal]
-        verdict = repertoire.feasibility(target.id)
+        verdict = repertoire.skills.feasibility(target.id)
         if not verdict.feasible:
             raise RobotError(
                 f"the robot cannot perform the goal {target.name!r}: "
@@ -148,7 +148,7 @@ def graph_of_actions(env: gymnasium.Env[Any, Any]) -> nx.DiGraph[int]:
     graph: nx.DiGraph[int] = nx.DiGraph()
     for id in repertoire.feasible_ids:
         slot = repertoire.slots[id]
-        graph.add_node(slot, duration_s=repertoire.duration_s(id))
+        graph.add_node(slot, duration_s=repertoire.skills.duration_s(id))
         prior = repertoire.after(id).prior
         for after in np.flatnonzero(prior[1:]) + 1:
             graph.add_edge(slot, int(after), probability=float(prior[after]))

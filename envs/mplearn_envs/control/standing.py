@@ -9,9 +9,14 @@ import numpy as np
 from mplearn.errors import FrameError
 from mplearn.recording import FloatArray
 from mplearn_envs.mechanics.gravity import standing_commands
-from mplearn_envs.mechanics.reference import Reference, reference_robot, rest_reference
+from mplearn_envs.mechanics.reference import (
+    Reference,
+    reference_robot,
+    rest_reference,
+    tracked_columns,
+)
 from mplearn_envs.mechanics.servos import servo_commands
-from mplearn_envs.robot import BASE_CHANNELS, Robot
+from mplearn_envs.robot import Robot
 
 from .balance import BalanceController
 from .upper_body import UpperBodyTracker
@@ -77,10 +82,3 @@ class StandingController(Controller):
         rate = (after.q - before.q)[7:] / self.period_s
         held = standing_commands(self.robot, after.q)
         return np.asarray(servo_commands(self.robot, held[None], rate[None])[0])
-
-
-def tracked_columns(robot: Robot) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """Return which of the robot's channels are tracked, not left to balance: shape (U,)."""
-    return np.concatenate(
-        (np.arange(len(BASE_CHANNELS)), len(BASE_CHANNELS) + robot.upper_joints)
-    ).astype(np.int64)

@@ -73,7 +73,7 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
 
     @cached_property
     def _frame_steps(self) -> int:
-        period_s = self.repertoire.planner.config.period_s
+        period_s = self.repertoire.skills.planner.config.period_s
         return max(1, round(1.0 / (self.frame_rate_hz * period_s)))
 
     # ---- what derived environments do besides

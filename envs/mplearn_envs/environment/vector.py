@@ -94,7 +94,7 @@ class _Begun(gymnasium.Wrapper[Any, Any, Any, Any]):
         env = cast(PrimitiveHumanoidEnv, self.unwrapped)
         known = self.action_space.contains(action)
         id = env.repertoire.primitive(int(action)) if known else None
-        return env.hold_s if id is None else env.repertoire.duration_s(id)
+        return env.hold_s if id is None else env.repertoire.skills.duration_s(id)
 
     def begin(self, pool: ThreadPoolExecutor, action: np.int64) -> Future[Any]:
         """Begin the step that `step` will be asked for."""

@@ -49,7 +49,7 @@ def earliest_arrivals(repertoire: Repertoire, choices: Choices) -> dict[int, Arr
         for slot in np.flatnonzero(following.mask).tolist():
             id = repertoire.primitive(slot)
             if slot != HOLD and id is not None and id not in found:
-                plan = repertoire.plan(here, id)
+                plan = repertoire.skills.plan(here, id)
                 heapq.heappush(queue, (time_s + plan.duration_s, len(offered), plan.end))
                 offered.append(id)
 

@@ -57,7 +57,7 @@ class KinematicPerformer(Performer):
         self, id: int | None, on_frame: Callable[[], None] | None, frame_steps: int
     ) -> Outcome:
         """Perform a primitive; None holds. See `Performer.perform`."""
-        motion = ("hold", self.hold_s) if id is None else self.repertoire.key(id)
+        motion = ("hold", self.hold_s) if id is None else self.repertoire.skills.key(id)
         key = (self._here.key, motion)
         known: _Known | None = self.repertoire.memory.get(key)
         if known is None or on_frame is not None:

@@ -109,5 +109,5 @@ class Performer(ABC):
 
     def _plan(self, id: int | None) -> Plan:
         if id is None:
-            return self.repertoire.hold(self.reference, self.hold_s)
-        return self.repertoire.plan(self.reference, id)
+            return self.repertoire.skills.hold(self.reference, self.hold_s)
+        return self.repertoire.skills.plan(self.reference, id)

@@ -8,10 +8,10 @@ import numpy as np
 
 from mplearn.evaluation.table import Table
 from mplearn.library import PrimitiveLibrary
-from mplearn_envs.planning import Planner
 from mplearn_envs.robot import Robot, humanoid
+from mplearn_envs.skills.skills import Skills
 
-from .walks import Walk, go, skills
+from .walks import Walk, go
 
 
 def learned_table(
@@ -35,32 +35,37 @@ def learned_table(
         error: Largest model error, as a share.
         robot: Who performs; None is the humanoid.
     """
-    planner = Planner(robot or humanoid())
+    robot = robot or humanoid()
     rows = []
     for name, library in libraries:
-        known = skills(library, planner, speed)
-        able = [id for id, skill in known.items() if skill.verdict.feasible]
+        skills = Skills(library, robot, speed)
+        verdicts = {id: skills.feasibility(id) for id in library.ids}
+        able = [id for id, verdict in verdicts.items() if verdict.feasible]
         walks = [Walk(speed, lifting=True) for _ in seeds]
         for walk, seed in zip(walks, seeds, strict=True):
             if able:
                 rng = np.random.default_rng(seed)
-                go(walk, None, known, able, planner, n_primitives, error, rng)
+                go(walk, skills, able, n_primitives, error, rng, any_order=True)
         steps = [step for walk in walks for step in walk.steps]
-        lifting = sum(known[id].lifts for id in able)
-        refused = (s for s in known.values() if not s.verdict.feasible)
+        lifting = sum(skills[id].lifts for id in able)
+        refused = (
+            f"{library[id].name}: {verdict.problems[0]}"
+            for id, verdict in verdicts.items()
+            if not verdict.feasible
+        )
         rows.append(
             (
                 name,
-                f"{len(able)} of {len(known)}",
+                f"{len(able)} of {len(library)}",
                 str(lifting),
                 f"{len(walks)} x {max(len(walk.steps) for walk in walks)}",
                 str(sum(bool(walk.fell) for walk in walks)),
                 f"{100 * max((step[1] for step in steps), default=np.nan):.2f}",
-                "; ".join(f"{s.name}: {s.verdict.problems[0]}" for s in refused) or "-",
+                "; ".join(refused) or "-",
             )
         )
     return Table(
-        f"What robot {planner.robot.name!r} performs of what it learned from people",
+        f"What robot {robot.name!r} performs of what it learned from people",
         ("learned from", "feasible", "lift a foot", "walks", "falls", "COG off [cm]", "refused"),
         tuple(rows),
         f"At {speed:g} of the human's speed; masses, gains and friction wrong by up to "

@@ -8,10 +8,10 @@ import numpy as np
 
 from mplearn.evaluation.table import Table, percent
 from mplearn.library import PrimitiveLibrary
-from mplearn_envs.planning import Planner
 from mplearn_envs.robot import Robot, humanoid
+from mplearn_envs.skills.skills import Skills
 
-from .walks import FASTEST, Walk, skills
+from .walks import FASTEST, Walk
 
 _COLUMNS = ("COG off [cm]", "ZMP margin [cm]", "RMSE [deg]", "drift [mm]", "turn [deg]")
 _NOTE = (
@@ -73,14 +73,15 @@ def speed_table(
     library: PrimitiveLibrary, robot: Robot | None = None, speeds: Sequence[float] = (0.5, 1.0)
 ) -> Table:
     """Return which share of the primitives the robot performs at a speed, and why not the rest."""
-    planner = Planner(robot or humanoid())
+    robot = robot or humanoid()
     rows = []
     for speed in speeds:
-        known = skills(library, planner, speed)
-        verdicts = [skill.verdict for skill in known.values()]
+        skills = Skills(library, robot, speed)
+        named = {library[id].name: skills.feasibility(id) for id in library.ids}
+        verdicts = list(named.values())
         full = [v for v in verdicts if v.feasible and v.speed >= 0.999 * speed]
         slowed = [v for v in verdicts if v.feasible and v.speed < 0.999 * speed]
-        refused = [s for s in known.values() if not s.verdict.feasible]
+        refused = {name: v for name, v in named.items() if not v.feasible}
         rows.append(
             (
                 _speed_name(speed),
@@ -88,11 +89,11 @@ def speed_table(
                 percent(len(slowed) / len(verdicts)),
                 percent(len(refused) / len(verdicts)),
                 f"{np.median([v.tempo for v in full + slowed]) / speed:.2f}" if full else "-",
-                "; ".join(f"{s.name}: {s.verdict.problems[0]}" for s in refused) or "-",
+                "; ".join(f"{name}: {v.problems[0]}" for name, v in refused.items()) or "-",
             )
         )
     return Table(
-        f"What robot {planner.robot.name!r} performs of {len(library)} learned primitives",
+        f"What robot {robot.name!r} performs of {len(library)} learned primitives",
         ("speed", "performed", "performed slower", "refused", "pace", "why"),
         tuple(rows),
         "Pace: duration wanted over duration, time to shift the weight included; median.",

@@ -14,33 +14,13 @@ from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.execution.tracking_report import TrackingReport
 from mplearn_envs.mechanics import reference_robot, rest_reference
 from mplearn_envs.mechanics.kinematics import places
-from mplearn_envs.planning import Motion, Plan, Planner
-from mplearn_envs.robot import Retargeting, Robot, humanoid
-from mplearn_envs.skills.feasibility import Feasibility, FeasibilityCheck
+from mplearn_envs.planning import Plan
+from mplearn_envs.robot import Robot, humanoid
+from mplearn_envs.skills.skills import Skills
 
 from .model_error import disturb
 
 FASTEST = 2.0  # as a share of the human's speed; limits slow down most motions
-
-
-@dataclass(frozen=True)
-class Skill:
-    """One primitive as the robot performs it.
-
-    Attributes:
-        name: Its name.
-        motion: What shall be performed.
-        verdict: Whether it can be, and how fast.
-    """
-
-    name: str
-    motion: Motion
-    verdict: Feasibility
-
-    @property
-    def lifts(self) -> bool:
-        """Whether a foot leaves the ground."""
-        return self.motion.footwork is not None
 
 
 @dataclass
@@ -64,22 +44,6 @@ class Walk:
     steps: list[tuple[str, float, float, float, float, float, float]] = field(default_factory=list)
 
 
-def skills(library: PrimitiveLibrary, planner: Planner, speed: float) -> dict[int, Skill]:
-    """Judge all primitives of a library at a speed, as a share of the human's."""
-    check = FeasibilityCheck(planner)
-    retargeting = Retargeting(library.channels, library.body, planner.robot)
-    out = {}
-    for id in library.ids:
-        generated = library.generate([id])
-        frames = retargeting(generated.frames)
-        if len(frames) == 1:
-            frames = np.repeat(frames, 2, axis=0)
-        motion = planner.motion(frames, generated.rate_hz)
-        verdict = check.judge(frames, generated.rate_hz, speed)
-        out[id] = Skill(library[id].name, motion, verdict)
-    return out
-
-
 def random_walks(
     library: PrimitiveLibrary,
     seeds: Sequence[int],
@@ -101,61 +65,61 @@ def random_walks(
         error: Largest model error, as a share.
         robot: Who walks; None is the humanoid.
     """
-    planner = Planner(robot or humanoid())
     out = []
     for speed in speeds:
-        known = skills(library, planner, speed)
+        skills = Skills(library, robot or humanoid(), speed)
+        feasible = [id for id in library.ids if skills.feasibility(id).feasible]
         for lifting in (False, True):
-            allowed = [
-                id for id, s in known.items() if s.verdict.feasible and (lifting or not s.lifts)
-            ]
+            allowed = [id for id in feasible if lifting or not skills[id].lifts]
             for seed in seeds:
                 rng = np.random.default_rng(seed)
                 walk = Walk(speed, lifting)
-                go(walk, library, known, allowed, planner, n_primitives, error, rng)
+                go(walk, skills, allowed, n_primitives, error, rng)
                 out.append(walk)
     return out
 
 
 def go(
     walk: Walk,
-    library: PrimitiveLibrary | None,
-    known: dict[int, Skill],
+    skills: Skills,
     allowed: list[int],
-    planner: Planner,
     n_primitives: int,
     error: float,
     rng: np.random.Generator,
+    *,
+    any_order: bool = False,
 ) -> None:
     """Walk, until the end or a fall.
 
     Args:
         walk: What came of it is written here.
-        library: Whose transitions are followed; None follows any primitive by any.
-        known: Its primitives.
+        skills: The primitives, as the robot performs them.
         allowed: Ids of those that may be performed.
-        planner: Plans for the robot.
         n_primitives: Primitives in a row.
         error: Largest model error, as a share.
         rng: Source of randomness.
+        any_order: Whether any primitive follows any other, and not as the demonstrator chose.
     """
-    simulation = Simulation(planner.robot)
+    library = skills.library
+    simulation = Simulation(skills.robot)
     disturb(simulation.model, error, rng)
     simulation.reset()
-    here = rest_reference(planner.robot)
+    here = rest_reference(skills.robot)
     last: int | None = None
     for _ in range(n_primitives):
-        last = _next(library, last, allowed, rng)
-        skill = known[last]
-        plan = planner.plan(here, skill.motion, skill.verdict.speed, (last, walk.speed))
+        last = _next(None if any_order else library, last, allowed, rng)
+        plan = skills.plan(here, last)
         before = simulation.data.qpos.copy()
         report = simulation.perform(plan)
         walk.duration_s += report.duration_s
         after = simulation.data.qpos.copy()
-        walk.steps.append(_figures(skill, plan, report, before, after, planner.robot))
+        pace = skills[last].motion.duration_s / plan.duration_s
+        name = library[last].name
+        figures = _figures(plan, report, before, after, skills.robot)
+        walk.steps.append((name, *figures, pace))
         here = plan.end
         if report.fallen:
-            walk.fell = skill.name
+            walk.fell = name
             return
 
 
@@ -171,13 +135,12 @@ def _next(
 
 
 def _figures(
-    skill: Skill,
     plan: Plan,
     report: TrackingReport,
     before: FloatArray,
     after: FloatArray,
     robot: Robot,
-) -> tuple[str, float, float, float, float, float, float]:
+) -> tuple[float, float, float, float, float]:
     ref = reference_robot(robot)
     drift, turn = np.nan, np.nan
     stood = [side for side in range(2) if side not in (plan.up[0], plan.up[-1])]
@@ -187,13 +150,11 @@ def _figures(
         moved = _moved(feet) - _moved(wanted)
         drift, turn = float(np.hypot(moved[0], moved[1])), float(abs(moved[2]))
     return (
-        skill.name,
         float(report.cog_deviation_m.max()),
         float(report.zmp_margin_m.min()),
         float(np.mean(report.tracking_error_rad**2)),
         drift,
         turn,
-        skill.motion.duration_s / plan.duration_s,
     )
 
 

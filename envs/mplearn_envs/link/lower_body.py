@@ -11,8 +11,8 @@ from mplearn.errors import InvalidValueError
 from mplearn.generation.joins import drawn_from
 from mplearn.recording import FloatArray
 from mplearn_envs.control import StandingController
-from mplearn_envs.control.standing import tracked_columns
 from mplearn_envs.mechanics import reference_robot, rest_reference
+from mplearn_envs.mechanics.reference import tracked_columns
 from mplearn_envs.robot import Robot
 
 from .datagram import base_coordinates

@@ -15,7 +15,8 @@ from mplearn.recording import FloatArray
 from mplearn_envs.data.library_source import LibrarySource
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.mechanics import rest_reference
-from mplearn_envs.robot import Retargeting, Robot, make_robot
+from mplearn_envs.robot import Robot, make_robot
+from mplearn_envs.skills.skills import Skills
 
 from .disturbance import Disturbance, DisturbedSender
 from .lower_body import LowerBody
@@ -126,7 +127,7 @@ def path_frames(robot: Robot, path: Sequence[str], speed: float, period_s: float
     ids = [library[name].id for name in path]
     motion = library.generate(ids, style="smooth", rate_hz=1.0 / period_s)
     motion = retime(motion, speed=speed)
-    frames = Retargeting(library.channels, library.body, robot)(motion.frames)
+    frames = Skills(library, robot).frames_of(motion)
     rest = np.zeros(frames.shape[1])
     rest[0] = rest_reference(robot).target[0]
     return drawn_from(frames, rest, np.zeros_like(rest), 1.0 / period_s, _BLEND_S)

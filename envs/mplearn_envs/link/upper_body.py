@@ -7,8 +7,8 @@ import numpy as np
 from mplearn.errors import FrameError
 from mplearn.recording import FloatArray
 from mplearn_envs.control import UpperBodyTracker
-from mplearn_envs.control.standing import tracked_columns
 from mplearn_envs.mechanics import reference_robot, rest_reference
+from mplearn_envs.mechanics.reference import tracked_columns
 from mplearn_envs.robot import Robot
 
 from .datagram import base_frame

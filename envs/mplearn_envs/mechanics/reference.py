@@ -163,6 +163,11 @@ def rest_reference(robot: Robot) -> Reference:
     )
 
 
+def tracked_columns(robot: Robot) -> IntArray:
+    """Return which of the robot's channels are tracked, not left to balance: shape (U,)."""
+    return np.concatenate((np.arange(N_BASE), N_BASE + robot.upper_joints))
+
+
 def sole_corners(robot: Robot) -> FloatArray:
     """Return the lower corners of both soles in their feet's frames, shape (2, 4, 3) [m]."""
     model = robot.model()

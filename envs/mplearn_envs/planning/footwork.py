@@ -97,6 +97,19 @@ def read_footwork(robot: Robot, frames: FloatArray, rate_hz: float) -> Footwork:
     return Footwork(legs, rise, relative, tuple(lifts))
 
 
+def read_flight(robot: Robot, frames: FloatArray) -> float:
+    """Return how high both soles are at once, at most, while the base is above its standing height.
+
+    Where it is not, what the features have in the air is the squat of someone who stands [m].
+
+    Args:
+        robot: The robot.
+        frames: Values of the robot's channels, shape (T, 3 + n) [m, rad].
+    """
+    high = frames[frames[:, 0] > reference_robot(robot).standing_height + LIFT_M]
+    return max(0.0, float(sole_heights(robot, high).min(axis=1).max())) if len(high) else 0.0
+
+
 def sole_heights(robot: Robot, frames: FloatArray) -> FloatArray:
     """Return the height of each sole's lowest corner along a motion, shape (T, 2) [m].
 

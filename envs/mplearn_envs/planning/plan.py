@@ -47,11 +47,13 @@ class Motion(NamedTuple):
         frames: Tracked coordinates at human speed, shape (T, U) [m, rad].
         rate_hz: Frames per second [1/s].
         footwork: What the feet do; None where both stay down.
+        flight_m: How high both soles are at once, at most, see `read_flight` [m].
     """
 
     frames: FloatArray
     rate_hz: float
     footwork: Footwork | None = None
+    flight_m: float = 0.0
 
     @property
     def duration_s(self) -> float:

@@ -15,12 +15,18 @@ from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray
 from mplearn_envs.lru_cache import LRUCache
 from mplearn_envs.mechanics.gravity import holding_torques
-from mplearn_envs.mechanics.reference import N_BASE, Reference, reference_robot, sole_middles
+from mplearn_envs.mechanics.reference import (
+    N_BASE,
+    Reference,
+    reference_robot,
+    sole_middles,
+    tracked_columns,
+)
 from mplearn_envs.mechanics.servos import servo_commands
 from mplearn_envs.robot import Robot
 
 from .draft import Draft, Drafter, Pace
-from .footwork import Footwork, Lift, read_footwork
+from .footwork import Footwork, Lift, read_flight, read_footwork
 from .plan import Motion as Motion
 from .plan import Plan as Plan
 from .plan import PlannerConfig as PlannerConfig
@@ -51,7 +57,7 @@ class Planner:
             (self._reference.velocity[:N_BASE], robot.per_joint("velocity"))
         )
         self._stiffness = robot.per_joint("stiffness")
-        self._tracked = np.concatenate((np.arange(N_BASE), N_BASE + robot.upper_joints))
+        self._tracked = tracked_columns(robot)
         self._cache = LRUCache(self.config.cache_size)
 
     def motion(self, frames: FloatArray, rate_hz: float) -> Motion:
@@ -75,7 +81,8 @@ class Planner:
             raise InvalidValueError(f"rate_hz must be positive and finite, not {rate_hz}")
         footwork = read_footwork(self.robot, frames, rate_hz)
         tracked = np.ascontiguousarray(frames[:, self._tracked])
-        return Motion(tracked, rate_hz, footwork if footwork.lifts else None)
+        flight_m = read_flight(self.robot, frames)
+        return Motion(tracked, rate_hz, footwork if footwork.lifts else None, flight_m)
 
     def plan(
         self, start: Reference, motion: Motion, speed: float = 0.5, key: Hashable = None

@@ -7,11 +7,14 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from mplearn.recording import FloatArray
-from mplearn_envs.control.standing import tracked_columns
 from mplearn_envs.mechanics.inverse_dynamics import InverseDynamics
-from mplearn_envs.mechanics.reference import Reference, reference_robot, rest_reference
-from mplearn_envs.planning.footwork import Footwork, Lift, sole_heights
+from mplearn_envs.mechanics.reference import (
+    Reference,
+    reference_robot,
+    rest_reference,
+    tracked_columns,
+)
+from mplearn_envs.planning.footwork import Footwork, Lift
 from mplearn_envs.planning.plan import Motion, Plan
 from mplearn_envs.planning.planner import Planner
 
@@ -111,18 +114,16 @@ class FeasibilityCheck:
         self._dynamics = InverseDynamics(planner.robot)
         self._columns = tracked_columns(planner.robot)
 
-    def judge(self, frames: FloatArray, rate_hz: float, speed: float) -> Feasibility:
+    def judge(self, motion: Motion, speed: float) -> Feasibility:
         """Return whether a motion can be performed.
 
         Args:
-            frames: Values of the robot's channels, shape (T, 3 + n) [m, rad].
-            rate_hz: Frames per second, at human speed [1/s].
+            motion: See `Planner.motion`.
             speed: Wanted speed, as a share of the human's.
         """
-        motion = self.planner.motion(frames, rate_hz)
         footwork = motion.footwork
         feet = (-1, -1) if footwork is None else (footwork.up_at(False), footwork.up_at(True))
-        problems = (*self._flight(frames), *self._overshoot(frames))
+        problems = (*self._flight(motion), *self._overshoot(motion))
         if problems:  # nothing to plan
             return Feasibility(problems, speed, np.nan, np.nan, np.nan, *feet)
         start = self.posture(motion)
@@ -161,20 +162,15 @@ class FeasibilityCheck:
             ).end
         return self.planner.plan(here, Motion(first, 1.0), 1.0).end
 
-    def _flight(self, frames: FloatArray) -> tuple[Problem, ...]:
+    def _flight(self, motion: Motion) -> tuple[Problem, ...]:
         """Look for soles in the air while the base is higher than it can stand."""
-        standing = reference_robot(self.planner.robot).standing_height
-        high = frames[frames[:, 0] > standing + 0.5 * self.config.flight_m]
-        if not len(high):
+        if motion.flight_m <= self.config.flight_m:
             return ()
-        flight = float(sole_heights(self.planner.robot, high).min(axis=1).max())
-        if flight <= self.config.flight_m:
-            return ()
-        return (Problem("flight", "both feet", flight, self.config.flight_m),)
+        return (Problem("flight", "both feet", motion.flight_m, self.config.flight_m),)
 
-    def _overshoot(self, frames: FloatArray) -> tuple[Problem, ...]:
+    def _overshoot(self, motion: Motion) -> tuple[Problem, ...]:
         limits = reference_robot(self.planner.robot).limits
-        tracked = frames[:, self._columns]
+        tracked = motion.frames
         beyond = np.maximum(limits[:, 0] - tracked, tracked - limits[:, 1]).max(axis=0)
         return tuple(
             Problem(

@@ -13,7 +13,6 @@ from mplearn.errors import LibraryError, RobotError
 from mplearn.generation import StyleName
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import FloatArray
-from mplearn_envs.control.standing import tracked_columns
 from mplearn_envs.lru_cache import LRUCache
 from mplearn_envs.mechanics.reference import Reference
 from mplearn_envs.robot import Robot
@@ -28,7 +27,7 @@ HEIGHT_SCALE = 5.0  # 0.2 m of height count as much as 1 rad
 _OUTCOMES = 4096  # of about 6 kB each
 
 
-class Repertoire(Skills):
+class Repertoire:
     """The primitives of a library, in slots of a fixed number: slot 0 is hold.
 
     Several environments may share a repertoire, in threads too.
@@ -44,6 +43,7 @@ class Repertoire(Skills):
         growing: Whether the library will be replaced by `update`; it may be empty then.
 
     Attributes:
+        skills: What the robot makes of them: motions, verdicts and plans.
         slots: Slot of each primitive.
         ids: Ids of the primitives that have one.
         growing: See above.
@@ -70,13 +70,22 @@ class Repertoire(Skills):
             raise LibraryError("the library is empty: there is nothing to perform")
         self._slots = Slots(capacity, len(library))
         self._slots.require_room(len(library))
-        super().__init__(library, robot, speed, style, limits)
+        self.skills = Skills(library, robot, speed, style, limits)
         self.capacity = self._slots.capacity
         self.novel = novel
         self.growing = growing
         self.memory = LRUCache(_OUTCOMES)
-        self._tracked = tracked_columns(robot)
         self.update(library)
+
+    @property
+    def library(self) -> PrimitiveLibrary:
+        """The primitives, as `update` had them last."""
+        return self.skills.library
+
+    @property
+    def robot(self) -> Robot:
+        """Who performs."""
+        return self.skills.robot
 
     def update(self, library: PrimitiveLibrary) -> tuple[int, ...]:
         """Take a newer snapshot; primitives that live on keep their slots.
@@ -87,8 +96,8 @@ class Repertoire(Skills):
         Raises:
             LibraryError: The library is for another body.
         """
-        with self.lock:
-            self.take(library)
+        with self.skills.lock:
+            self.skills.take(library)
             left_out = self._slots.update(library.ids)
             self.slots = self._slots.of
             self.ids = tuple(sorted(self.slots))
@@ -98,8 +107,8 @@ class Repertoire(Skills):
 
     def forget(self) -> None:
         """Forget all and free all slots: what comes is another learner's, of other ids."""
-        with self.lock:
-            super().forget()
+        with self.skills.lock:
+            self.skills.forget()
             self._slots.clear()
 
     def require_room(self, n_primitives: int) -> None:
@@ -117,11 +126,11 @@ class Repertoire(Skills):
     @property
     def feasible_ids(self) -> tuple[int, ...]:
         """Ids of the primitives that the robot can perform; judges them all."""
-        return tuple(id for id in self.ids if self.feasibility(id).feasible)
+        return tuple(id for id in self.ids if self.skills.feasibility(id).feasible)
 
     def after(self, id: int) -> Choices:
         """Return what may follow a primitive: observed transitions that are feasible, and hold."""
-        with self.lock:
+        with self.skills.lock:
             if id not in self._after:
                 graph = self.library.graph
                 row = graph.prior(id)
@@ -145,14 +154,14 @@ class Repertoire(Skills):
         """
         if not self.ids:
             return self._choices({})
-        with self.lock:
+        with self.skills.lock:
             gaps = self._gaps(reference)
             near = sorted(self.ids, key=lambda id: (gaps[id], id))
             # no more is judged than is needed
             first = next((id for id in near if self._starts_on(id, reference.lifted)), None)
             other_feet = first is None
             if first is None:
-                first = next((id for id in near if self.feasibility(id).feasible), None)
+                first = next((id for id in near if self.skills.feasibility(id).feasible), None)
             if first is None:
                 raise RobotError(self._nothing_feasible(near))
             within = [id for id in near if gaps[id] <= gaps[first] + ENTRY_GAP]
@@ -160,26 +169,27 @@ class Repertoire(Skills):
                 within = [
                     id
                     for id in within
-                    if self._starts_on(id, reference.lifted) or not self.feasibility(id).feasible
+                    if self._starts_on(id, reference.lifted)
+                    or not self.skills.feasibility(id).feasible
                 ]
             return self._choices({id: float(self.library[id].n_exemplars) for id in within})
 
     def _starts_on(self, id: int, lifted: int) -> bool:
         """Return whether the robot can perform a primitive, and it starts with that foot up."""
-        verdict = self.feasibility(id)
+        verdict = self.skills.feasibility(id)
         return verdict.feasible and verdict.starts_up == lifted
 
     def _gaps(self, reference: Reference) -> dict[int, float]:
         """Return how far from a reference each primitive starts [rad]."""
         if self._starts is None:
-            self._starts = np.array([self.frames(id)[0][0, self._tracked] for id in self.ids])
+            self._starts = np.array([self.skills[id].motion.frames[0] for id in self.ids])
         apart = np.abs(self._starts - reference.target)
         apart[:, 0] *= HEIGHT_SCALE
         return dict(zip(self.ids, apart.max(axis=1).tolist(), strict=True))
 
     def _nothing_feasible(self, ids: list[int]) -> str:
         reasons = "; ".join(
-            f"{self.library[id].name}: {self.feasibility(id).problems[0]}" for id in ids[:6]
+            f"{self.library[id].name}: {self.skills.feasibility(id).problems[0]}" for id in ids[:6]
         )
         return (
             f"robot {self.robot.name!r} can perform none of the library's "
@@ -192,7 +202,7 @@ class Repertoire(Skills):
             slot = self.slots.get(id)
             if slot is None:
                 continue
-            verdict = self.feasibility(id)
+            verdict = self.skills.feasibility(id)
             if verdict.feasible:
                 possible[slot] = weight
             else:
@@ -211,10 +221,10 @@ class Repertoire(Skills):
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what can be worked out again, and is large."""
-        return {name: value for name, value in super().__getstate__().items() if name != "memory"}
+        return {name: value for name, value in self.__dict__.items() if name != "memory"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        super().__setstate__(state)
+        self.__dict__.update(state)
         self.memory = LRUCache(_OUTCOMES)
 
 

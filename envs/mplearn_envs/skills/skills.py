@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from threading import RLock
 from typing import Any
@@ -9,15 +10,36 @@ from typing import Any
 import numpy as np
 
 from mplearn.errors import InvalidValueError, LibraryError, RobotError
-from mplearn.generation import StyleName
+from mplearn.generation import StyleName, Trajectory
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import FloatArray
 from mplearn_envs.mechanics.reference import Reference, rest_reference
-from mplearn_envs.planning.plan import Motion, Plan
-from mplearn_envs.planning.planner import Planner
+from mplearn_envs.planning import Motion, Plan, Planner
 from mplearn_envs.robot import Retargeting, Robot
 
 from .feasibility import Feasibility, FeasibilityCheck, FeasibilityConfig
+
+
+@dataclass
+class Skill:
+    """A primitive as one robot performs it.
+
+    Attributes:
+        frames: Its motion in the robot's channels, shape (T, 3 + n) [m, rad].
+        motion: The same, ready to be planned: what is tracked, and what the feet do.
+        version: How often the primitive's motion has changed.
+        verdict: Whether the robot can perform it; None until that is asked.
+    """
+
+    frames: FloatArray
+    motion: Motion
+    version: int
+    verdict: Feasibility | None = None
+
+    @property
+    def lifts(self) -> bool:
+        """Whether a foot leaves the ground."""
+        return self.motion.footwork is not None
 
 
 class Skills:
@@ -46,9 +68,9 @@ class Skills:
         self,
         library: PrimitiveLibrary,
         robot: Robot,
-        speed: float,
-        style: StyleName,
-        limits: FeasibilityConfig | None,
+        speed: float = 0.5,
+        style: StyleName = "deterministic",
+        limits: FeasibilityConfig | None = None,
     ) -> None:
         if not (np.isfinite(speed) and speed > 0):
             raise InvalidValueError(f"speed must be positive and finite, not {speed}")
@@ -57,7 +79,7 @@ class Skills:
         self.style = style
         self.limits = limits
         self.lock = RLock()
-        self._revision: dict[int, int] = {}
+        self._version: dict[int, int] = {}
         self.forget()
         self.take(library)
 
@@ -87,65 +109,61 @@ class Skills:
         with self.lock:
             self.library = library
             self._retargeting = retargeting
-            gone = self._frames.keys() - set(library.ids)
-            for known in (self._frames, self._motions, self._verdicts):
-                for id in gone & known.keys():
-                    del known[id]
-            self._fresh: set[int] = set()  # ids whose frames are known to be this library's
+            for id in self._known.keys() - set(library.ids):
+                del self._known[id]
+            self._fresh: set[int] = set()  # ids whose skill is known to be this library's
 
     def forget(self) -> None:
         """Forget all: what comes is another learner's, whose ids mean something else."""
         with self.lock:
-            self._frames: dict[int, tuple[FloatArray, float]] = {}
-            self._motions: dict[int, Motion] = {}
-            self._verdicts: dict[int, Feasibility] = {}
+            self._known: dict[int, Skill] = {}
 
-    def frames(self, id: int) -> tuple[FloatArray, float]:
-        """Return a primitive's motion in the robot's channels, (T, 3 + n), and its rate [1/s]."""
+    def frames_of(self, generated: Trajectory) -> FloatArray:
+        """Return a motion that the library generated, in the robot's channels, (T, 3 + n)."""
+        return np.ascontiguousarray(self._retargeting(generated.frames))
+
+    def __getitem__(self, id: int) -> Skill:
+        """Return a primitive as the robot performs it."""
         with self.lock:
             if id not in self._fresh:
-                self._generate(id)
+                self._renew(id)
                 self._fresh.add(id)
-            return self._frames[id]
+            return self._known[id]
 
-    def _generate(self, id: int) -> None:
-        motion = self.library.generate([id], style=self.style)
-        frames = self._retargeting(motion.frames)
+    def _renew(self, id: int) -> None:
+        generated = self.library.generate([id], style=self.style)
+        frames = self.frames_of(generated)
         if len(frames) == 1:
             frames = np.repeat(frames, 2, axis=0)
-        known = self._frames.get(id)
-        if known is None or known[1] != motion.rate_hz or not np.array_equal(known[0], frames):
-            self._frames[id] = (np.ascontiguousarray(frames), motion.rate_hz)
-            self._motions.pop(id, None)
-            self._verdicts.pop(id, None)
-            self._revision[id] = self._revision.get(id, 0) + 1
+        known = self._known.get(id)
+        if (
+            known is None
+            or known.motion.rate_hz != generated.rate_hz
+            or not np.array_equal(known.frames, frames)
+        ):
+            version = self._version[id] = self._version.get(id, 0) + 1
+            self._known[id] = Skill(frames, self.planner.motion(frames, generated.rate_hz), version)
 
     def feasibility(self, id: int) -> Feasibility:
         """Return whether the robot can perform a primitive; judged once."""
         with self.lock:
-            frames, rate_hz = self.frames(id)
-            if id not in self._verdicts:
-                self._verdicts[id] = self._check.judge(frames, rate_hz, self.speed)
-            return self._verdicts[id]
+            skill = self[id]
+            if skill.verdict is None:
+                skill.verdict = self._check.judge(skill.motion, self.speed)
+            return skill.verdict
 
     def key(self, id: int) -> tuple[int, int]:
         """Return what tells a primitive's motion from all others, earlier versions included."""
-        with self.lock:
-            self.frames(id)
-            return id, self._revision[id]
+        return id, self[id].version
 
     def duration_s(self, id: int) -> float:
         """Return how long a primitive that it can perform takes the robot from where it starts."""
-        frames, rate_hz = self.frames(id)
-        return (len(frames) - 1) / rate_hz / self.feasibility(id).tempo
+        return self[id].motion.duration_s / self.feasibility(id).tempo
 
     def plan(self, start: Reference, id: int) -> Plan:
         """Return the commands that perform a primitive from the present reference."""
         with self.lock:
-            frames, rate_hz = self.frames(id)
-            if id not in self._motions:
-                self._motions[id] = self.planner.motion(frames, rate_hz)
-            motion, speed, key = self._motions[id], self.feasibility(id).speed, self.key(id)
+            motion, speed, key = self[id].motion, self.feasibility(id).speed, self.key(id)
         return self._settled(self.planner.plan(start, motion, speed, key))
 
     def hold(self, start: Reference, duration_s: float) -> Plan:

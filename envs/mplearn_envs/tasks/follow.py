@@ -106,7 +106,7 @@ class FollowTask(Task):
                 raise NoPathError("the demonstrator can begin with nothing that the robot can do")
             self._predicted: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
             self._usual_s = {
-                id: repertoire.duration_s(id) / self.pace for id in repertoire.feasible_ids
+                id: repertoire.skills.duration_s(id) / self.pace for id in repertoire.feasible_ids
             }
             self._median_s = float(np.median(list(self._usual_s.values())))
         self._ids: list[int] = []
@@ -220,7 +220,7 @@ class FollowTask(Task):
         graph = repertoire.library.graph
         out = np.zeros(repertoire.capacity)
         for id, probability in zip(graph.ids, graph.probabilities(history), strict=True):
-            if id in repertoire.slots and repertoire.feasibility(id).feasible:
+            if id in repertoire.slots and repertoire.skills.feasibility(id).feasible:
                 out[repertoire.slots[id]] = probability
         out[HOLD] = 0.0
         return np.asarray(out / out.sum()) if out.sum() > 0 else self._first.prior

@@ -174,7 +174,7 @@ def _require_possible(ids: tuple[int, ...], scene: Scene) -> None:
     direct = _direct(repertoire, None, scene)
     for id in ids:
         if id not in _reachable(repertoire, direct):
-            problems = repertoire.feasibility(id).problems
+            problems = repertoire.skills.feasibility(id).problems
             why = "; ".join(map(str, problems)) or "no way leads there from what comes before"
             raise NoPathError(f"the request's {library[id].name!r} cannot be performed: {why}")
         direct = _direct(repertoire, id, scene)

@@ -38,6 +38,6 @@ def test_the_robot_can_perform_all_of_it_feet_lifted_too():
     env = gymnasium.make("mplearn/PrimitiveHumanoid-v0").unwrapped
     repertoire = env.repertoire
     assert repertoire.feasible_ids == repertoire.ids
-    raised = [id for id in repertoire.ids if repertoire.feasibility(id).ends_up >= 0]
+    raised = [id for id in repertoire.ids if repertoire.skills.feasibility(id).ends_up >= 0]
     names = {env.library[id].name for id in raised}
     assert any("kick" in name for name in names) and any("march" in name for name in names)

@@ -69,7 +69,7 @@ def test_what_is_remembered_is_what_was_found_out():
         for _ in range(25):
             if forget:
                 env.unwrapped.repertoire.memory.clear()
-                env.unwrapped.repertoire.planner._cache.clear()
+                env.unwrapped.repertoire.skills.planner._cache.clear()
             action = rng.choice(np.flatnonzero(info["action_mask"]))
             observation, reward, _, _, info = env.step(action)
             seen.append((observation["posture"].tobytes(), observation["cog"].tobytes(), reward))
@@ -98,7 +98,7 @@ def test_environments_of_one_library_share_what_they_know():
     twin = pickle.loads(pickle.dumps(first))
     assert twin.repertoire is not first.repertoire
     for id in first.repertoire.library.ids:  # what is worked out on the way stays here
-        first.repertoire.feasibility(id)
+        first.repertoire.skills.feasibility(id)
     assert len(pickle.dumps(first)) < 2_000_000
 
 

@@ -11,9 +11,9 @@ import pytest
 from standing_library import BOW, RATE_HZ, sweep
 
 from mplearn_envs.control.ankle_feedback import correct, make_ankle_feedback
-from mplearn_envs.control.standing import tracked_columns
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.mechanics import rest_reference
+from mplearn_envs.mechanics.reference import tracked_columns
 from mplearn_envs.planning import Motion, Planner
 from mplearn_envs.robot import humanoid
 

@@ -9,9 +9,9 @@ from standing_library import ARMS, BOW, RATE_HZ, SQUAT, sweep
 
 from mplearn.errors import FrameError, InvalidValueError
 from mplearn_envs.control import StandingController, UpperBodyTracker
-from mplearn_envs.control.standing import tracked_columns
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.mechanics import reference_robot, rest_reference
+from mplearn_envs.mechanics.reference import tracked_columns
 from mplearn_envs.mechanics.support import convex_hull, support_margin
 from mplearn_envs.planning import Motion, Planner
 from mplearn_envs.planning.splines import refine

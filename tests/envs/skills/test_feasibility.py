@@ -11,6 +11,10 @@ from mplearn_envs.skills.feasibility import FeasibilityCheck, FeasibilityConfig
 CHECK = FeasibilityCheck(Planner(humanoid()))
 
 
+def judged(check, frames, rate_hz, speed):
+    return check.judge(check.planner.motion(frames, rate_hz), speed)
+
+
 def kinds(verdict):
     return [problem.kind for problem in verdict.problems]
 
@@ -18,7 +22,7 @@ def kinds(verdict):
 @pytest.mark.parametrize("end", [ARMS, BOW, SQUAT])
 @pytest.mark.parametrize("speed", [0.5, 1.0])
 def test_motions_with_both_feet_down_are_feasible(end, speed):
-    verdict = CHECK.judge(sweep({}, end, 1.0), RATE_HZ, speed)
+    verdict = judged(CHECK, sweep({}, end, 1.0), RATE_HZ, speed)
     assert verdict.feasible and verdict.speed == speed
     assert verdict.zmp_margin_m > 0.05 and 0.05 < verdict.torque_share < 0.6
 
@@ -29,7 +33,7 @@ def test_lifting_a_foot_is_feasible_and_says_which(side, speed):
     lift = {name.replace("_l", f"_{side}"): value for name, value in KICK.items()}
     which = "lr".index(side)
     for frames, feet in ((sweep({}, lift, 0.8), (-1, which)), (sweep(lift, {}, 0.8), (which, -1))):
-        verdict = CHECK.judge(frames, RATE_HZ, speed)
+        verdict = judged(CHECK, frames, RATE_HZ, speed)
         assert verdict.feasible, verdict.problems
         assert (verdict.starts_up, verdict.ends_up) == feet
         assert 0.3 < verdict.tempo <= speed + 0.01
@@ -37,7 +41,7 @@ def test_lifting_a_foot_is_feasible_and_says_which(side, speed):
 
 def test_a_jump_is_refused_with_that_reason():
     up = sweep({}, {"base_height": 0.2}, 0.3)
-    verdict = CHECK.judge(np.vstack((up, up[::-1])), RATE_HZ, 0.5)
+    verdict = judged(CHECK, np.vstack((up, up[::-1])), RATE_HZ, 0.5)
     assert kinds(verdict) == ["flight"]
     assert verdict.problems[0].value == pytest.approx(0.2, abs=0.01)
     assert "allowed 0.06" in str(verdict.problems[0])
@@ -45,28 +49,28 @@ def test_a_jump_is_refused_with_that_reason():
 
 def test_small_differences_of_the_feet_are_no_lift():
     shuffle = {"knee_l": 0.15, "hip_pitch_l": -0.08, "ankle_pitch_l": -0.07}
-    assert CHECK.judge(sweep({}, shuffle, 1.0), RATE_HZ, 0.5).feasible
+    assert judged(CHECK, sweep({}, shuffle, 1.0), RATE_HZ, 0.5).feasible
 
 
 def test_too_fast_a_motion_is_slowed_down_and_at_last_refused():
     fast = sweep({}, ARMS, 0.12)
-    slowed = CHECK.judge(fast, RATE_HZ, 1.0)
+    slowed = judged(CHECK, fast, RATE_HZ, 1.0)
     assert slowed.speed < 1.0
-    frantic = CHECK.judge(
-        np.vstack([sweep({}, ARMS, 0.05), sweep(ARMS, {}, 0.05)] * 3), RATE_HZ, 2.0
+    frantic = judged(
+        CHECK, np.vstack([sweep({}, ARMS, 0.05), sweep(ARMS, {}, 0.05)] * 3), RATE_HZ, 2.0
     )
     assert not frantic.feasible and {"velocity", "torque", "balance"} & set(kinds(frantic))
 
 
 def test_what_is_beyond_the_joints_is_refused():
-    verdict = CHECK.judge(sweep({}, {"elbow_l": 1.0}, 1.0), RATE_HZ, 0.5)
+    verdict = judged(CHECK, sweep({}, {"elbow_l": 1.0}, 1.0), RATE_HZ, 0.5)
     assert kinds(verdict) == ["limit"]
     assert verdict.problems[0].where == "elbow_l"
 
 
 def test_a_squat_too_deep_for_the_legs_is_out_of_reach():
     deep = sweep({}, {"base_height": -0.47}, 2.0)
-    verdict = CHECK.judge(deep, RATE_HZ, 0.5)
+    verdict = judged(CHECK, deep, RATE_HZ, 0.5)
     assert not verdict.feasible and "reach" in kinds(verdict)
     where = next(each.where for each in verdict.problems if each.kind == "reach")
     assert where.startswith("ankle_pitch_l, ankle_pitch_r")
@@ -75,15 +79,15 @@ def test_a_squat_too_deep_for_the_legs_is_out_of_reach():
 def test_torque_and_balance_limits_are_kept():
     motion = sweep({}, BOW, 1.0)
     weak = FeasibilityCheck(CHECK.planner, FeasibilityConfig(torque_share=0.05))
-    assert "torque" in kinds(weak.judge(motion, RATE_HZ, 0.5))
+    assert "torque" in kinds(judged(weak, motion, RATE_HZ, 0.5))
     timid = FeasibilityCheck(CHECK.planner, FeasibilityConfig(zmp_margin_m=0.2))
-    assert "balance" in kinds(timid.judge(motion, RATE_HZ, 0.5))
+    assert "balance" in kinds(judged(timid, motion, RATE_HZ, 0.5))
 
 
 def test_a_jerky_motion_is_slowed_for_balance():
     """A bow whose full speed would throw the zero-moment point out of the soles."""
     careful = FeasibilityCheck(CHECK.planner, FeasibilityConfig(zmp_margin_m=0.09))
-    verdict = careful.judge(sweep({}, {"base_pitch": 0.9}, 0.7), RATE_HZ, 1.0)
+    verdict = judged(careful, sweep({}, {"base_pitch": 0.9}, 0.7), RATE_HZ, 1.0)
     assert verdict.speed < 1.0
     assert verdict.feasible and verdict.zmp_margin_m > 0.09
 

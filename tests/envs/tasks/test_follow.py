@@ -76,7 +76,7 @@ def test_a_motion_is_shown_after_a_share_of_it_and_predicts(share):
         assert not following or after[repertoire.slots[following[0][0]]] > 0.0
         if known:
             id, began_s = known[-1]
-            usual_s = repertoire.duration_s(id) / task.pace
+            usual_s = repertoire.skills.duration_s(id) / task.pace
             assert shown[97] == pytest.approx(max(0.0, 1.0 - time_s / task.deadline_s))
             assert shown[96] == pytest.approx(min((time_s - began_s) / usual_s, 3.0))
             if repertoire.after(id).mask.sum() == 2 and following:
@@ -92,7 +92,7 @@ def test_the_demonstrator_takes_his_time():
             pass
         began_s = 0.0
         for id, end_s in schedule(task):
-            usual_s = env.unwrapped.repertoire.duration_s(id)
+            usual_s = env.unwrapped.repertoire.skills.duration_s(id)
             assert end_s - began_s == pytest.approx(usual_s / pace)
             began_s = end_s
 

@@ -73,5 +73,5 @@ class PrimitiveGoals(GoalKind):
     def missed(self, goal: Goal, arrivals: dict[int, Arrival]) -> str:
         """Say why a primitive cannot be reached."""
         assert isinstance(goal, PrimitiveGoal)
-        problems = self.repertoire.feasibility(goal.id).problems
+        problems = self.repertoire.skills.feasibility(goal.id).problems
         return "; ".join(map(str, problems)) or "no way leads there"
