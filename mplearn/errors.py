@@ -16,6 +16,10 @@ class RecordingError(MPLearnError):
     """A recording cannot be read, or does not hold what its format promises."""
 
 
+class RecordingWarning(UserWarning):
+    """A recording contradicts itself, or something of it had to be guessed: see its report."""
+
+
 class FrameError(MPLearnError, ValueError):
     """A frame of a stream has the wrong width, type, rate or content."""
 

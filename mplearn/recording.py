@@ -121,6 +121,30 @@ class Skeleton:
 
 
 @dataclass(frozen=True)
+class ReadReport:
+    """How a file was read: what it says, what was found out, what was left out.
+
+    Attributes:
+        format: Name of the dialect, as ``"C3D"`` or ``"Motive CSV"``.
+        rate_hz: Frames per second in the file [1/s], before any resampling.
+        unit_m: Length of the file's unit of length [m]; None where it holds no lengths.
+        up: The file's axis that points up, as ``"y"`` or ``"-z"``; empty where that is not known.
+        left_out: Names of points, markers or columns that the file holds and the recording not.
+        notes: What was found out or done that the file does not say, a sentence each.
+        warnings: What contradicts itself, or is in doubt, a sentence each; one in doubt names the
+            option that settles it.
+    """
+
+    format: str
+    rate_hz: float
+    unit_m: float | None = None
+    up: str = ""
+    left_out: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Recording:
     """A stretch of measured motion.
 
@@ -134,6 +158,7 @@ class Recording:
         labels: What is known about its segments, in order of their start.
         skeleton: The joints whose angles or positions it holds; None for plain markers, and
             where angles come without their skeleton. Positions are its joints', in the same order.
+        report: How its file was read; None where it comes from no file.
     """
 
     frames: FloatArray
@@ -143,6 +168,7 @@ class Recording:
     person: str = ""
     labels: tuple[LabelledSegment, ...] = field(default=())
     skeleton: Skeleton | None = None
+    report: ReadReport | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         frames = np.asarray(self.frames, dtype=np.float64)

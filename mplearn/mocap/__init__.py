@@ -2,10 +2,14 @@
 
 from .gaps import GapConfig as GapConfig
 from .gaps import GapTracker as GapTracker
-from .open import READERS as READERS
+from .open import Takes as Takes
 from .open import open_recording as open_recording
 from .open import open_recordings as open_recordings
+from .open import open_takes as open_takes
 from .open import take_names as take_names
+from .options import command_line as command_line
 from .reader import Hints as Hints
 from .reader import Reader as Reader
+from .registry import readers as readers
+from .registry import register_reader as register_reader
 from .resample import resample as resample

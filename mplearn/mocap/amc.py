@@ -28,6 +28,7 @@ class AMCReader(Reader):
     positions are those of dm_control's CMU humanoid, with its proportions and not the person's.
     """
 
+    format = "AMC"
     suffixes = (".amc",)
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:

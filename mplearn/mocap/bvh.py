@@ -25,6 +25,7 @@ class BVHReader(Reader):
     Each joint has its own order of channels. A joint's position channels replace its offset.
     """
 
+    format = "BVH"
     suffixes = (".bvh",)
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:

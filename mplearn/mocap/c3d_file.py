@@ -35,11 +35,13 @@ class C3DContent:
         points: Positions, shape (T, M, 3), in the file's unit and axes; NaN where not measured.
         parameters: Texts or numbers, by group and name, in upper case.
         rate_hz: Frames per second after the header [1/s].
+        said_frames: How many frames the file says that it holds, if that is not what it holds.
     """
 
     points: FloatArray
     parameters: Parameters
     rate_hz: float
+    said_frames: int | None = None
 
     def texts(self, group: str, name: str) -> list[str]:
         """Return a parameter's texts; none where it is missing or holds numbers."""
@@ -60,7 +62,7 @@ def parse_c3d(path: Path, data: bytes) -> C3DContent:
         data: Its content.
 
     Raises:
-        RecordingError: It is no C3D file, is cut off or damaged, or holds no points.
+        RecordingError: It is no C3D file, is damaged, or holds no points or no whole frame.
     """
     if len(data) < 2 * _BLOCK or data[1] != 0x50:
         raise bad_file(path, "no C3D header", _EXPECTED)
@@ -79,27 +81,37 @@ def parse_c3d(path: Path, data: bytes) -> C3DContent:
     if start < 2 or not np.isfinite(scale) or scale == 0.0:
         raise bad_file(path, f"frames at block {start}, scale {scale}", _EXPECTED)
 
-    content = C3DContent(np.empty((0, 0, 3)), _parameters(path, data, at + 4, processor), rate_hz)
-    n_frames = _frame_count(content, last - first + 1)
+    begin = (start - 1) * _BLOCK
+    n_blocks = data[at + 2]
+    stop = min(len(data), at + n_blocks * _BLOCK if n_blocks else begin)
+    content = C3DContent(
+        np.empty((0, 0, 3)), _parameters(path, data, at + 4, stop, processor), rate_hz
+    )
     width, real = 4 * n_points + n_analog, scale < 0.0
-    begin, size = (start - 1) * _BLOCK, n_frames * width * (4 if real else 2)
-    if n_frames < 1 or begin + size > len(data):
-        raise bad_file(path, f"{n_frames} frames, {len(data)} of {begin + size} bytes", _EXPECTED)
-    raw = data[begin : begin + size]
+    n_bytes = width * (4 if real else 2)
+    said, n_frames = _frame_count(content, last - first + 1, n_bytes, len(data) - begin)
+    if n_frames < 1:
+        raise bad_file(
+            path, f"{said} frames, {len(data)} of {begin + said * n_bytes} bytes", _EXPECTED
+        )
+    raw = data[begin : begin + n_frames * n_bytes]
     values = _reals(raw, processor) if real else np.frombuffer(raw, order + "i2")
     table = values.reshape(n_frames, width)[:, : 4 * n_points].reshape(n_frames, n_points, 4)
     points = table[:, :, :3].astype(np.float64) * (1.0 if real else scale)
     gone = (table[:, :, 3] < 0) | ~np.isfinite(table).all(axis=2) | (points == 0.0).all(axis=2)
     points[gone] = np.nan
-    return C3DContent(points, content.parameters, rate_hz)
+    return C3DContent(points, content.parameters, rate_hz, None if said == n_frames else said)
 
 
-def _parameters(path: Path, data: bytes, at: int, processor: int) -> Parameters:
-    """Walk the chain of records: groups have negative numbers, parameters their group's."""
+def _parameters(path: Path, data: bytes, at: int, stop: int, processor: int) -> Parameters:
+    """Walk the chain of records up to the end of their blocks.
+
+    Groups have negative numbers, parameters their group's.
+    """
     order = _BYTE_ORDER[processor]
     groups: dict[int, str] = {}
     found: dict[int, dict[str, list[str] | FloatArray]] = {}
-    while at + 2 <= len(data):
+    while at + 2 <= stop:
         name_length, number = struct.unpack_from("bb", data, at)
         if name_length == 0:
             break
@@ -114,6 +126,8 @@ def _parameters(path: Path, data: bytes, at: int, processor: int) -> Parameters:
             sizes = tuple(data[link + 4 : link + 4 + n_dimensions])
             begin = link + 4 + n_dimensions
             used = begin + prod(sizes) * abs(kind)
+            if end < used:  # some SGI files have the last offset in a PC's order
+                end = link + int.from_bytes(step.to_bytes(2, "big", signed=True), "little")
             if kind not in (-1, 1, 2, 4) or n_dimensions > 7 or used > min(end, len(data)):
                 raise bad_file(path, f"a damaged parameter {name!r} at byte {at}", _EXPECTED)
             found.setdefault(number, {})[name] = _value(data[begin:used], kind, sizes, processor)
@@ -143,11 +157,27 @@ def _reals(raw: bytes, processor: int) -> FloatArray:
     return np.frombuffer(raw, _BYTE_ORDER[processor] + "f4").astype(np.float64)
 
 
-def _frame_count(content: C3DContent, in_header: int) -> int:
-    """Return the number of frames; from 65,536 on, the header's 16 bits do not hold it."""
-    counts = [in_header, *content.numbers("POINT", "LONG_FRAMES")[:1]]
+def _frame_count(
+    content: C3DContent, in_header: int, n_bytes: int, n_there: int
+) -> tuple[int, int]:
+    """Return how many frames the file says it holds, and how many to read.
+
+    The header's 16 bits do not hold numbers from 65,536 on; of what other places say, that counts
+    which fills the file to its last block.
+    """
     ends = [content.numbers("TRIAL", f"ACTUAL_{end}_FIELD") for end in ("START", "END")]
+    counts = [int(count) for count in content.numbers("POINT", "LONG_FRAMES")[:1] if count > 0]
     if all(len(words) == 2 for words in ends):
         first, last = (low % 65536 + 65536 * (high % 65536) for low, high in ends)
-        counts.append(last - first + 1)
-    return next((int(count) for count in counts if 65535 < count < 2**32), in_header)
+        counts.append(int(last - first) + 1)
+    counts += [int(count) % 65536 for count in content.numbers("POINT", "FRAMES")[:1]]
+    counts = [count for count in (*counts, in_header) if 0 < count < 2**32]
+    if n_bytes <= 0 or not counts:
+        return max(in_header, 0), 0
+    filling = [n for n in counts if n * n_bytes <= n_there < n * n_bytes + _BLOCK]
+    fitting = [n for n in counts if n * n_bytes <= n_there]
+    if filling or fitting:
+        # with data behind the frames nothing fills the file: the header is right if it can be
+        said = filling[0] if filling else max(fitting)
+        return said, said
+    return min(counts), max(n_there, 0) // n_bytes

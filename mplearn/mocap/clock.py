@@ -1,25 +1,61 @@
-"""Frame numbers from a column of times, which tools round and from which frames may be dropped."""
+"""An even clock from a column of times, which tools round and from which frames may be dropped."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ..recording import FloatArray, IntArray
+from ..recording import FloatArray
 from .files import bad_file
 
+_EVEN = 0.3  # of a frame: what rounding leaves
 
-def frame_numbers(path: Path, times_s: FloatArray) -> tuple[IntArray, float]:
-    """Return the number of each frame on an even clock, and the clock's rate.
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """Where the frames of a file lie on an even clock.
+
+    Attributes:
+        rate_hz: Frames per second [1/s]; NaN for a single frame.
+        places: Place of each frame, shape (T,), from 0, with a step above 1 where frames were
+            dropped; whole numbers unless the times jitter.
+        jitters: Whether the times are off an even clock by more than rounding leaves.
+    """
+
+    rate_hz: float
+    places: FloatArray
+    jitters: bool
+
+    def even(self, values: FloatArray) -> FloatArray:
+        """Return values at even times, shape (T, D) to (T', D); NaN where frames were dropped.
+
+        Values that were taken at uneven times are interpolated linearly.
+        """
+        if not self.jitters:
+            index = self.places.astype(np.int64)
+            frames = np.full((index[-1] + 1, values.shape[1]), np.nan)
+            frames[index] = values
+            return frames
+        at = np.arange(int(np.floor(self.places[-1] + 1e-9)) + 1)
+        after = np.clip(np.searchsorted(self.places, at, side="left"), 1, len(values) - 1)
+        gap = self.places[after] - self.places[after - 1]
+        share = np.clip((at - self.places[after - 1]) / gap, 0.0, 1.0)[:, None]
+        frames = (1.0 - share) * values[after - 1] + share * values[after]
+        exact = np.where(share == 0.0, values[after - 1], values[after])  # spares NaN beside it
+        frames = np.where((share == 0.0) | (share == 1.0), exact, frames)
+        near = np.where(share[:, 0] < 0.5, after - 1, after)
+        frames[(gap >= 1.5) & (np.abs(self.places[near] - at) > 0.5)] = np.nan
+        return frames
+
+
+def even_clock(path: Path, times_s: FloatArray) -> Clock:
+    """Return the even clock that times belong to.
 
     Args:
         path: The file, for messages.
         times_s: Time of each frame, shape (T,) [s].
-
-    Returns:
-        Numbers, shape (T,), from 0, with a step above 1 where frames were dropped; and the rate
-        [1/s], NaN for a single frame.
 
     Raises:
         RecordingError: The times do not increase, or fit no even rate.
@@ -27,7 +63,7 @@ def frame_numbers(path: Path, times_s: FloatArray) -> tuple[IntArray, float]:
     if np.isnan(times_s).any():
         raise bad_file(path, "a time is missing", "a time in every row")
     if len(times_s) == 1:
-        return np.zeros(1, np.int64), np.nan
+        return Clock(np.nan, np.zeros(1), False)
     steps = np.diff(times_s)
     if (steps <= 0).any():
         row = int(np.argmax(steps <= 0)) + 1
@@ -37,13 +73,17 @@ def frame_numbers(path: Path, times_s: FloatArray) -> tuple[IntArray, float]:
         raise bad_file(
             path, "most of the time has no frames", "an even rate with few dropped frames"
         )
-    index = np.concatenate([[0], np.cumsum(whole)]).astype(np.int64)
+    index = np.concatenate([[0.0], np.cumsum(whole)])
     rate_hz = float(index[-1] / (times_s[-1] - times_s[0]))
-    off = np.abs((times_s - times_s[0]) * rate_hz - index)
-    if (whole < 1).any() or off.max() > 0.5:
+    places = (times_s - times_s[0]) * rate_hz
+    off = np.abs(places - index)
+    if (whole < 1).any():
+        row = int(np.argmax(whole < 1)) + 1
         raise bad_file(
             path,
-            f"frame {int(off.argmax())} lies {off.max():.2f} frames off an even rate",
+            f"frame {row} lies {off[row]:.2f} frames off an even rate",
             "evenly spaced times (a dropped frame leaves a gap of whole frames)",
         )
-    return index, rate_hz
+    if off.max() <= _EVEN:
+        return Clock(rate_hz, index, False)
+    return Clock(rate_hz, places, True)

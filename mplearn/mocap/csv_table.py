@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from ..recording import IntArray, LabelledSegment, Recording
-from .clock import frame_numbers
+from .clock import even_clock
 from .files import bad_file, read_text, stem
 from .numbers import numbers
 from .reader import Hints, Reader
@@ -36,6 +36,7 @@ _TEXTS = ("label", "segment", "person")
 class CSVReader(Reader):
     """Reads CSV files with named columns; see the module's docstring for the format."""
 
+    format = "CSV"
     suffixes = (".csv",)
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
@@ -60,14 +61,14 @@ class CSVReader(Reader):
             raise bad_file(path, "several columns of times", f"one of {', '.join(_TIMES)}")
         if times:
             column = numbers(path, [[row[times[0]]] for row in rows], 1, places)[:, 0]
-            index, clock_hz = frame_numbers(path, column)
-            rate_hz = rate_hz or clock_hz
+            clock = even_clock(path, column)
+            index, values = clock.places.astype(int), clock.even(values)
+            rate_hz = rate_hz or clock.rate_hz
         if rate_hz is None or np.isnan(rate_hz):
             raise bad_file(
                 path, "no rate", f"a column {' or '.join(_TIMES)} [s], or Hints(rate_hz=...)"
             )
-        frames = np.full((index[-1] + 1, len(measured)), np.nan)
-        frames[index] = values
+        frames = values
         texts = {
             name: [row[special[name]].strip() for row in rows] for name in special if name in _TEXTS
         }

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import gzip
 import re
+import stat
 import zlib
+from collections.abc import Callable
+from io import BufferedIOBase
 from pathlib import Path
 
 from ..errors import RecordingError
+
+_MOST_PACKED = 60  # times; tables of measured numbers pack to a half or a tenth
+_SMALL_BYTES = 4_000_000
 
 
 def suffix(path: Path) -> str:
@@ -31,21 +37,63 @@ def bad_file(path: Path, found: str, expected: str) -> RecordingError:
     return RecordingError(f"{path}: {found}; expected {expected}")
 
 
+def is_file(path: Path) -> bool:
+    """Whether a path is a regular file: no folder, no pipe, no device, and no nonsense."""
+    return _is(path, stat.S_ISREG)
+
+
+def is_folder(path: Path) -> bool:
+    """Whether a path is a folder."""
+    return _is(path, stat.S_ISDIR)
+
+
+def _is(path: Path, kind: Callable[[int], bool]) -> bool:
+    try:
+        return kind(path.stat().st_mode)
+    except (OSError, ValueError):  # too long a name, too many links, a null character
+        return False
+
+
+def head(path: Path, n_bytes: int = 8192) -> bytes:
+    """Return the start of a file, unpacked where its name ends in ``.gz``; empty if unreadable."""
+    if not is_file(path):
+        return b""
+    try:
+        with _opened(path) as file:
+            return file.read(n_bytes)
+    except (OSError, EOFError, zlib.error):
+        return b""
+
+
+def head_text(path: Path, n_bytes: int = 8192) -> str:
+    """Return the start of a text file; empty if it is unreadable, or no text."""
+    data = head(path, n_bytes)
+    return "" if b"\0" in data else data.decode("utf-8-sig", errors="replace")
+
+
 def read_bytes(path: Path) -> bytes:
     """Return the content of a file, unpacked where its name ends in ``.gz``.
 
     Raises:
-        RecordingError: The file is missing, empty, unreadable, or a damaged gzip file.
+        RecordingError: The file is missing, empty, unreadable, no regular file, or a gzip file that
+            is damaged or expands beyond what measured motion does.
     """
+    if not is_file(path):
+        raise bad_file(path, "no such file", "a readable file")
+    packed = path.suffix.lower() == ".gz"
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise bad_file(path, f"cannot be read ({error.strerror})", "a readable file") from error
-    if path.suffix.lower() == ".gz":
-        try:
-            data = gzip.decompress(data)
-        except (OSError, EOFError, zlib.error) as error:
+        limit = path.stat().st_size
+        if packed:
+            limit = max(_SMALL_BYTES, _MOST_PACKED * limit)
+        with _opened(path) as file:
+            data = file.read(limit + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        if packed and not (isinstance(error, OSError) and error.errno):
             raise bad_file(path, f"damaged ({error})", "a whole gzip file") from error
+        reason = getattr(error, "strerror", None) or error
+        raise bad_file(path, f"cannot be read ({reason})", "a readable file") from error
+    if packed and len(data) > limit:
+        raise bad_file(path, f"expands to more than {limit} bytes", "a recording of motion")
     if not data.strip():
         raise bad_file(path, "the file is empty", f"a {suffix(path)} recording")
     return data
@@ -64,6 +112,10 @@ def read_text(path: Path) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
         return data.decode("latin-1")
+
+
+def _opened(path: Path) -> BufferedIOBase:
+    return gzip.open(path) if path.suffix.lower() == ".gz" else path.open("rb")
 
 
 def _ungzipped(path: Path) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from array import array
+from collections.abc import Iterable, Sequence
 from itertools import chain
 from pathlib import Path
 
@@ -10,16 +11,20 @@ import numpy as np
 
 from ..recording import FloatArray
 from .files import bad_file
+from .findings import Findings
+
+MISSING = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "nil"})
+"""How tables write, in lower case, that there is no number."""
 
 
 def number(path: Path, cell: str, where: str) -> float:
-    """Return a finite number, or NaN for an empty cell or a written ``nan``.
+    """Return a finite number, or NaN where it is missing: an empty cell, or one of `MISSING`.
 
     Raises:
         RecordingError: The cell is not a number, or not finite.
     """
     text = cell.strip()
-    if not text:
+    if text.lower() in MISSING:
         return np.nan
     try:
         if "_" in text:  # Python reads "1_0" as ten
@@ -67,3 +72,79 @@ def numbers(
             ]
         )
     return values.reshape(len(rows), n_columns)
+
+
+def measured_rows(
+    path: Path,
+    rows: Iterable[tuple[int, list[str]]],
+    n_columns: int,
+    findings: Findings,
+    *,
+    group: int = 1,
+) -> FloatArray:
+    """Return the cells of a table as an array, as far as they are there.
+
+    Empty cells behind the last column are dropped, those of whole groups cut off at a row's end
+    are missing, and columns behind the last in most rows are left out: findings tell.
+
+    Args:
+        path: The file, for messages.
+        rows: The line of the file that each row stands on, and its cells.
+        n_columns: How many columns have a name.
+        findings: Where to tell what contradicts itself.
+        group: How many columns at a row's end belong together: three for markers.
+
+    Returns:
+        Shape (T, n_columns), NaN where a cell is empty.
+
+    Raises:
+        RecordingError: A row has another number of cells, or a cell is not a finite number.
+    """
+    values, lines = array("d"), array("q")
+    extra: list[tuple[int, int]] = []
+    n_cut = 0
+    for line, row in rows:
+        cells = row
+        while len(cells) > n_columns and not cells[-1].strip():
+            cells.pop()
+        if len(cells) > n_columns:
+            extra.append((line, len(cells)))
+            cells = cells[:n_columns]
+        elif len(cells) < n_columns:
+            if group == 1 or (n_columns - len(cells)) % group:
+                raise bad_file(path, f"line {line} has {len(cells)} columns", f"{n_columns}")
+            n_cut += 1
+            cells = cells + [""] * (n_columns - len(cells))
+        values.extend(_row(path, cells, line))
+        lines.append(line)
+    n_rows = len(lines)
+    if extra and len(extra) <= n_rows // 2:
+        line, count = extra[0]
+        raise bad_file(path, f"line {line} has {count} columns", f"{n_columns}")
+    if extra:
+        findings.leave_out(["(no name)"] * -(-(max(count for _, count in extra) - n_columns) // 3))
+        findings.warn("there are more columns than names; those behind the named ones are left out")
+    if n_cut:
+        findings.note(f"{n_cut} rows end early; what they would hold is missing")
+    table = np.frombuffer(values, np.float64).reshape(n_rows, n_columns).copy()
+    if np.isinf(table).any():
+        row_, column = (int(i) for i in np.argwhere(np.isinf(table))[0])
+        raise bad_file(
+            path,
+            f"line {lines[row_]}, column {column + 1} is infinite",
+            "a finite number, or nan where it is missing",
+        )
+    return table
+
+
+def _row(path: Path, cells: list[str], line: int) -> list[float]:
+    try:
+        row = [float(cell) if cell else np.nan for cell in cells]
+    except ValueError:
+        row = None
+    if row is None or any("_" in cell for cell in cells):
+        return [
+            number(path, cell, f"line {line}, column {column + 1}")
+            for column, cell in enumerate(cells)
+        ]
+    return row

@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
-from ..errors import RecordingError
-from ..recording import Recording
+from ..errors import RecordingError, RecordingWarning
+from ..recording import ReadReport, Recording
 from .amc import AMCReader
 from .bvh import BVHReader
 from .c3d import C3DReader
 from .csv_table import CSVReader
-from .files import bad_file, stem, suffix
+from .files import bad_file, is_file, is_folder, stem
 from .labels import labels_beside
 from .reader import Hints, Reader, joined
+from .registry import reader_for, reader_of, register_reader, suffixes
 from .resample import resample
 from .trc import TRCReader
 from .ui_prmd import UIPRMDReader
 
-_ALL = (UIPRMDReader(), C3DReader(), AMCReader(), BVHReader(), TRCReader(), CSVReader())
-
-READERS: Mapping[str, Reader] = MappingProxyType(
-    {ending: reader for reader in _ALL for ending in reader.suffixes}
-)
-"""The reader of each file suffix; every one reads gzipped files too."""
+# the most general first: the latest is asked first
+for _reader in (CSVReader(), TRCReader(), BVHReader(), AMCReader(), C3DReader(), UIPRMDReader()):
+    register_reader(_reader)
 
 
 def open_recording(
@@ -40,7 +39,7 @@ def open_recording(
     """Read one recording.
 
     Args:
-        path: A file (.c3d, .amc, .bvh, .trc, .csv, UI-PRMD's .txt; each plain or .gz), or a folder.
+        path: A file of any format that a reader is registered for, plain or gzipped, or a folder.
         take: Which take of a folder: UI-PRMD's ``"m01_s01"``, a file's name without its suffix, or
             with it where two formats hold the same take.
         rate_hz: Resample to this rate [1/s]; by default the file's own.
@@ -49,7 +48,9 @@ def open_recording(
         hints: What the file does not say about itself.
 
     Returns:
-        Markers [m] (z up, NaN where occluded) or angles [rad], with the labels that are known.
+        Markers [m] (z up, NaN where occluded) or angles [rad], with the labels that are known. Its
+        ``report`` tells how the file was read; what contradicts itself or is in doubt is also
+        issued as a `RecordingWarning`.
 
     Raises:
         RecordingError: The path holds no recording, several takes and none is named, or a file does
@@ -62,7 +63,9 @@ def open_recording(
     name = next(iter(takes)) if take is None else take
     if name not in takes:
         raise RecordingError(f"{path}: no take {take!r}; expected one of {_listed(takes)}")
-    return _read(name, takes[name], rate_hz, positions, hints)
+    recording = _read(name, takes[name], rate_hz, positions, hints)
+    _say(recording, takes[name].files[0])
+    return recording
 
 
 def open_recordings(
@@ -71,14 +74,62 @@ def open_recordings(
     rate_hz: float | None = None,
     positions: bool = False,
     hints: Hints | None = None,
+    strict: bool = False,
 ) -> tuple[Recording, ...]:
     """Read all takes of a folder, in order of their names, or one file.
 
-    Args, returns and errors are those of `open_recording`.
+    Args:
+        path: As for `open_recording`, as the others.
+        rate_hz: Resample to this rate [1/s].
+        positions: Joint-centre positions instead of joint angles.
+        hints: What the files do not say about themselves.
+        strict: Whether a take that cannot be read is an error; otherwise it is left out, with a
+            `RecordingWarning`, as long as another one can be read.
     """
-    return tuple(
-        _read(name, files, rate_hz, positions, hints) for name, files in _takes(Path(path)).items()
-    )
+    takes = open_takes(path, rate_hz=rate_hz, positions=positions, hints=hints, strict=strict)
+    for error in takes.unreadable.values():
+        warnings.warn(f"left out: {error}", RecordingWarning, stacklevel=2)
+    for recording in takes.recordings:
+        _say(recording, Path(path))
+    return takes.recordings
+
+
+@dataclass(frozen=True)
+class Takes:
+    """The takes of a folder.
+
+    Attributes:
+        recordings: Those that can be read, in order of their names.
+        unreadable: Why not, by name, for the others.
+    """
+
+    recordings: tuple[Recording, ...]
+    unreadable: Mapping[str, RecordingError]
+
+
+def open_takes(
+    path: str | os.PathLike[str],
+    *,
+    rate_hz: float | None = None,
+    positions: bool = False,
+    hints: Hints | None = None,
+    strict: bool = False,
+) -> Takes:
+    """Read all takes as `open_recordings` does, and tell which cannot be read, without warnings."""
+    found: list[Recording] = []
+    unreadable: dict[str, RecordingError] = {}
+    takes = _takes(Path(path))
+    for name, take in takes.items():
+        try:
+            found.append(_read(name, take, rate_hz, positions, hints))
+        except RecordingError as error:
+            if strict or len(takes) == 1:
+                raise
+            unreadable[name] = error
+    if not found:
+        first = next(iter(unreadable.values()))
+        raise RecordingError(f"none of {len(takes)} takes can be read; the first: {first}")
+    return Takes(tuple(found), MappingProxyType(unreadable))
 
 
 def take_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
@@ -90,42 +141,59 @@ def take_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
     return tuple(_takes(Path(path)))
 
 
-def _takes(path: Path) -> dict[str, tuple[Path, ...]]:
+@dataclass(frozen=True)
+class _Take:
+    reader: Reader
+    files: tuple[Path, ...]
+
+
+def _takes(path: Path) -> dict[str, _Take]:
     """Return the files of each take, by name."""
-    if path.is_file():
-        return {stem(path): (path,)}
-    if not path.is_dir():
+    if is_file(path):
+        return {stem(path): _Take(reader_for(path), (path,))}
+    if not is_folder(path):
         raise bad_file(path, "no such file or folder", "a recording or a folder of recordings")
-    files: dict[str, list[Path]] = {}
+    files: dict[Reader, list[Path]] = {}
     for file in sorted(path.iterdir()):
-        reader = READERS.get(suffix(file))
-        if reader is not None and reader.accepts(file) and file.is_file():
-            files.setdefault(reader.suffixes[0], []).append(file)
-    found = [(name, f) for s, group in files.items() for name, f in READERS[s].takes(group).items()]
+        reader = reader_of(file)
+        if reader is not None:
+            files.setdefault(reader, []).append(file)
+    found = [
+        (name, _Take(reader, take))
+        for reader, group in files.items()
+        for name, take in reader.takes(group).items()
+    ]
     if not found:
-        raise bad_file(path, "a folder with nothing readable", f"files named {', '.join(READERS)}")
+        raise bad_file(
+            path, "a folder with nothing readable", f"files named {', '.join(suffixes())}"
+        )
     names = [name for name, _ in found]
-    return dict(sorted((f[0].name if names.count(name) > 1 else name, f) for name, f in found))
+    return dict(
+        sorted(
+            ((t.files[0].name if names.count(name) > 1 else name, t) for name, t in found),
+            key=lambda item: item[0],
+        )
+    )
 
 
 def _read(
-    name: str,
-    files: tuple[Path, ...],
-    rate_hz: float | None,
-    positions: bool,
-    hints: Hints | None,
+    name: str, take: _Take, rate_hz: float | None, positions: bool, hints: Hints | None
 ) -> Recording:
-    reader = READERS.get(suffix(files[0]))
-    if reader is None:
-        raise bad_file(
-            files[0], f"unknown suffix {suffix(files[0])!r}", f"one of {', '.join(READERS)}"
-        )
     parts = []
-    for file in files:
-        part = reader.read(file, hints or Hints(), positions=positions)
-        parts.append(part if part.labels else replace(part, labels=labels_beside(file, part)))
+    for file in take.files:
+        part = take.reader.read(file, hints or Hints(), positions=positions)
+        if not part.labels:
+            part = replace(part, labels=labels_beside(file, part))
+        if part.report is None:
+            part = replace(part, report=ReadReport(take.reader.format, part.rate_hz))
+        parts.append(part)
     recording = parts[0] if len(parts) == 1 else joined(name, parts)
     return recording if rate_hz is None else resample(recording, rate_hz)
+
+
+def _say(recording: Recording, path: Path) -> None:
+    for text in recording.report.warnings if recording.report else ():
+        warnings.warn(f"{path}: {recording.name}: {text}", RecordingWarning, stacklevel=3)
 
 
 def _listed(takes: Mapping[str, object]) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import InvalidValueError, RecordingError
 from ..recording import Recording
 from .files import stem
+from .vertical import DIRECTIONS
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class Hints:
     Attributes:
         rate_hz: Frames per second at which the file was recorded [1/s].
         unit_m: Length of the file's unit of length [m].
-        up_axis: The file's vertical axis: ``"x"``, ``"y"`` or ``"z"``.
+        up_axis: The file's axis that points up: ``"x"``, ``"y"``, ``"z"``, or ``"-x"``, ...
         skeleton: The ASF file that belongs to an AMC file.
         joint_axes: With joint positions, also how each joint is turned: three points more
             (``Head>x``), 0.1 m along axes that turn with it.
@@ -39,17 +40,21 @@ class Hints:
             value = getattr(self, name)
             if value is not None and not (np.isfinite(value) and value > 0):
                 raise InvalidValueError(f"{name} must be positive and finite, not {value}")
-        if self.up_axis not in (None, "x", "y", "z"):
-            raise InvalidValueError(f"up_axis must be 'x', 'y' or 'z', not {self.up_axis!r}")
+        if self.up_axis is not None and self.up_axis not in DIRECTIONS:
+            raise InvalidValueError(
+                f"up_axis must be one of {', '.join(DIRECTIONS)}, not {self.up_axis!r}"
+            )
 
 
 class Reader(ABC):
-    """Reads one format.
+    """Reads one format, or one dialect of files that share a suffix.
 
     Attributes:
+        format: Name of the format or dialect, for reports and messages.
         suffixes: The file suffixes of the format, lower case, without ``.gz``.
     """
 
+    format: ClassVar[str]
     suffixes: ClassVar[tuple[str, ...]]
 
     @abstractmethod
@@ -69,7 +74,7 @@ class Reader(ABC):
         """
 
     def accepts(self, path: Path) -> bool:
-        """Whether a file with the right suffix is named like a recording of the format."""
+        """Whether a file with the right suffix is one of the format, by its name or its start."""
         return True
 
     def takes(self, paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,26 +10,15 @@ import numpy as np
 from ..errors import InvalidValueError, RecordingError
 from ..recording import FloatArray
 from .files import bad_file
-
-UNITS_M = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
-"""Length of the units that files name [m]."""
+from .findings import Findings
+from .options import option
+from .reader import Hints
+from .size import UNITS_M, find_unit
+from .vertical import find_vertical
 
 _FARTHEST_M = 100.0  # no capture volume is larger
 _SMALLEST_M = 0.02  # all markers of a body within less: not a body
 _BODY_EXTENT_M = (0.4, 3.0)  # largest extent of a person's skeleton, from a toddler's on
-
-
-def unit_m(path: Path, name: str) -> float:
-    """Return the length of a named unit [m].
-
-    Raises:
-        RecordingError: The unit is not known.
-    """
-    plain = name.strip().lower()
-    plain = {"meters": "m", "metres": "m", "inch": "in", "inches": "in"}.get(plain, plain)
-    if plain not in UNITS_M:
-        raise bad_file(path, f"unit of length {name!r}", f"one of {', '.join(UNITS_M)}")
-    return UNITS_M[plain]
 
 
 def to_z_up(up: str, forward: str) -> FloatArray:
@@ -50,11 +40,122 @@ def to_z_up(up: str, forward: str) -> FloatArray:
     return np.stack([f, np.cross(u, f), u])
 
 
+def upright(up: str) -> FloatArray:
+    """Return the smallest turn that makes a file's axis, one of `DIRECTIONS`, ours that is up."""
+    return to_z_up(up, {"x": "-z", "-x": "z"}.get(up, "x"))
+
+
 def file_axes(up_hint: str | None, up: str, forward: str) -> FloatArray:
     """Return `to_z_up` for a format's axes, or for a hinted vertical with the next axis forward."""
     if up_hint is None or up_hint == up:
         return to_z_up(up, forward)
-    return to_z_up(up_hint, {"x": "y", "y": "z", "z": "x"}[up_hint])
+    following = {"x": "y", "y": "z", "z": "x"}
+    return to_z_up(up_hint, following[up_hint]) if up_hint in following else upright(up_hint)
+
+
+@dataclass(frozen=True)
+class Space:
+    """What a file, or its format, says of its lengths and axes.
+
+    Attributes:
+        unit_m: Length of the unit [m].
+        up: The axis that points up.
+        forward: The axis that points forward.
+        says_unit: Whether the file itself names the unit, not only its format.
+        says_up: Whether the file itself names the axes.
+    """
+
+    unit_m: float
+    up: str = "z"
+    forward: str = "x"
+    says_unit: bool = True
+    says_up: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Points in metres, z up, and how they came to be so.
+
+    Attributes:
+        points: Shape (T, M, 3) [m].
+        unit_m: Length of the file's unit [m].
+        up: The file's axis that points up.
+    """
+
+    points: FloatArray
+    unit_m: float
+    up: str
+
+
+def placed(
+    path: Path,
+    points: FloatArray,
+    names: tuple[str, ...],
+    rate_hz: float,
+    space: Space,
+    hints: Hints,
+    findings: Findings,
+) -> Placed:
+    """Return a file's points in metres, z up, x forward where that is known, never mirrored.
+
+    Hints win; then what the file says, unless the person's size or posture contradicts it; what
+    was found out otherwise, or stays in doubt, is added to the findings.
+
+    Args:
+        path: The file, for messages.
+        points: In the file's unit and axes, shape (T, M, 3); NaN where missing.
+        names: Names of the points, length M.
+        rate_hz: Frames per second [1/s].
+        space: What the file or its format says.
+        hints: What the caller says.
+        findings: Where to tell what was found.
+
+    Raises:
+        RecordingError: No person can be meant by the points.
+    """
+    unit = hints.unit_m or _settled_unit(points, names, space, findings)
+    metres = checked_markers(path, points * unit, names)
+    up = hints.up_axis or _settled_up(metres, names, rate_hz, space, findings)
+    turn = to_z_up(up, space.forward) if up == space.up else upright(up)
+    return Placed(metres @ turn.T, unit, up)
+
+
+def _settled_unit(
+    points: FloatArray, names: tuple[str, ...], space: Space, findings: Findings
+) -> float:
+    found = find_unit(points, names, space.unit_m)
+    if found.contradicts:
+        said = unit_text(space.unit_m)
+        tell = findings.warn if space.says_unit else findings.note
+        tell(
+            f"the unit of length is taken as {unit_text(found.unit_m)}, by the size of the person; "
+            + (f"the file says {said}" if space.says_unit else f"usual is {said}")
+            + f" ({option('unit_m')} sets it)"
+        )
+    elif not space.says_unit and found.fits:
+        findings.note(f"the unit of length is taken as {unit_text(found.unit_m)}: it fits a person")
+    return found.unit_m
+
+
+def _settled_up(
+    metres: FloatArray, names: tuple[str, ...], rate_hz: float, space: Space, findings: Findings
+) -> str:
+    found = find_vertical(metres, names, rate_hz, space.up, says_so=space.says_up)
+    if found.contradicts:
+        tell = findings.warn if space.says_up else findings.note
+        said = "the file says" if space.says_up else "usual in the format is"
+        tell(
+            f"{found.up} is taken as the vertical axis, by feet, head and floor; {said} {space.up} "
+            f"({option('up_axis')} sets it)"
+        )
+    if found.doubtful and not (space.says_up and not found.contradicts):
+        findings.warn(f"whether {found.up} points up is in doubt; {option('up_axis')} settles it")
+    return found.up
+
+
+def unit_text(unit_m: float) -> str:
+    """Return the name of a unit, or its length where it has none."""
+    return next((name for name, length in UNITS_M.items() if length == unit_m), f"{unit_m:.6g} m")
 
 
 def checked_markers(path: Path, points: FloatArray, names: tuple[str, ...]) -> FloatArray:
@@ -71,7 +172,7 @@ def checked_markers(path: Path, points: FloatArray, names: tuple[str, ...]) -> F
         raise bad_file(
             path,
             f"marker {names[marker]!r} is {np.nanmax(size):.3g} m away in frame {frame}",
-            f"less than {_FARTHEST_M:g} m; is the unit of length right? Hints(unit_m=...) sets it",
+            f"less than {_FARTHEST_M:g} m; is the unit of length right? {option('unit_m')} sets it",
         )
     if points.shape[1] >= 5:
         some = points[:: max(1, len(points) // 200)]
@@ -83,7 +184,7 @@ def checked_markers(path: Path, points: FloatArray, names: tuple[str, ...]) -> F
                 path,
                 f"all {points.shape[1]} markers lie within {np.median(extent) * 1000:.3g} mm",
                 f"at least {_SMALLEST_M * 1000:g} mm: is the unit of length right? "
-                "(Hints(unit_m=...) sets it)",
+                f"({option('unit_m')} sets it)",
             )
     return points
 
@@ -103,7 +204,7 @@ def check_skeleton(path: Path, rest: FloatArray, unit: float) -> None:
     ]
     raise RecordingError(
         f"{path}: the skeleton measures {extent:.3g} m with a unit of {unit:g} m; expected "
-        f"{low:g} to {high:g} m. Hints(unit_m=...) sets the unit"
+        f"{low:g} to {high:g} m. {option('unit_m')} sets the unit"
         + (f": {' or '.join(fits)} would fit" if fits else "")
     )
 

@@ -2,81 +2,165 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ..recording import Recording, marker_channels
-from .clock import frame_numbers
+from ..recording import FloatArray, Recording, marker_channels
+from .clock import even_clock
 from .files import bad_file, cmu_subject, read_text, stem
-from .numbers import number, numbers
+from .findings import Findings
+from .names import chosen_names
+from .numbers import measured_rows, number
 from .reader import Hints, Reader
-from .space import checked_markers, file_axes, unit_m
+from .size import UNITS_M, named_unit
+from .space import Space, placed
 
 _EXPECTED = (
     "a TRC file: two header lines of names and values, then 'Frame#', 'Time' and the markers"
 )
+_SAME_RATE = 0.01  # how far the rates of header and times may differ, as a share
 
 
 class TRCReader(Reader):
     """Reads TRC files: y up, x forward as in OpenSim; missing is an empty cell or (0, 0, 0)."""
 
+    format = "TRC"
     suffixes = (".trc",)
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read the markers; see `Reader.read`."""
+        findings = Findings(self.format)
         lines = read_text(path).splitlines()
-        header = _header(path, lines)
-        names = tuple(name for name in lines[3].rstrip().split("\t")[2:] if name.strip())
-        names = tuple(name.strip().split(":")[-1] for name in names)
-        if not names or len(set(names)) != len(names):
-            raise bad_file(path, f"marker names {names[:6]}", "at least one, each different")
-        if len(names) != _count(path, header, "NumMarkers"):
-            raise bad_file(path, f"{len(names)} marker names", f"{header['NumMarkers']}, as said")
-        rows, places = [], []
-        width = 2 + 3 * len(names)
-        for place, line in enumerate(lines[5:], start=6):
-            if line.strip():
-                cells = line.split("\t")
-                while len(cells) > width and not cells[-1].strip():
-                    cells.pop()
-                rows.append(cells)
-                places.append(place)
-        if len(rows) != _count(path, header, "NumFrames") or not rows:
-            raise bad_file(
-                path, f"{len(rows)} frames", f"{header['NumFrames']}, as its header says"
-            )
-        values = numbers(path, rows, width, places)
-
-        rate_hz = hints.rate_hz or number(path, header.get("DataRate", ""), "DataRate")
-        if not 0 < rate_hz < np.inf:
-            raise bad_file(path, f"DataRate {header.get('DataRate')!r}", "a positive number [1/s]")
-        unit = hints.unit_m or unit_m(path, header.get("Units", ""))
-        measured = values[:, 2:].reshape(len(rows), -1, 3)
+        header = _Header.parse(path, lines)
+        values, labels = _table(path, lines, header, findings)
+        measured = values[:, 2:].reshape(len(values), -1, 3)
         measured[(measured == 0.0).all(axis=2)] = np.nan
-        index, _ = frame_numbers(path, values[:, 1])
-        points = np.full((index[-1] + 1, len(names), 3), np.nan)
-        points[index] = measured @ file_axes(hints.up_axis, "y", "x").T * unit
-        checked_markers(path, points, names)
+        seen = (~np.isnan(measured).any(axis=2)).sum(axis=0)
+        kept, names = chosen_names(path, labels, seen, findings)
+        header.compare(path, "NumFrames", len(values), "frames", findings)
+        header.compare(path, "NumMarkers", sum(bool(label) for label in labels), "names", findings)
+        rate_hz, points = _in_time(path, header, values[:, 1], measured[:, kept], hints, findings)
+        at = placed(path, points, names, rate_hz, _space(path, header, hints), hints, findings)
         return Recording(
-            frames=points.reshape(len(points), -1),
+            frames=at.points.reshape(len(points), -1),
             rate_hz=rate_hz,
             channels=marker_channels(names),
             name=stem(path),
             person=cmu_subject(stem(path)),
+            report=findings.report(rate_hz, at.unit_m, at.up),
         )
 
 
-def _header(path: Path, lines: list[str]) -> dict[str, str]:
-    if len(lines) < 6 or not lines[0].startswith("PathFileType"):
-        raise bad_file(path, f"starts with {lines[0][:40]!r}", _EXPECTED)
-    if lines[3].split("\t")[0].strip() != "Frame#":
-        raise bad_file(path, f"line 4 starts with {lines[3][:40]!r}", _EXPECTED)
-    return dict(zip(lines[1].split(), lines[2].split(), strict=False))
+@dataclass(frozen=True)
+class _Header:
+    """What the lines above the table say.
+
+    Attributes:
+        values: By name, as text.
+        names_at: Line of the markers' names, from 0.
+    """
+
+    values: dict[str, str]
+    names_at: int
+
+    @classmethod
+    def parse(cls, path: Path, lines: list[str]) -> _Header:
+        if len(lines) < 6 or not lines[0].startswith("PathFileType"):
+            raise bad_file(path, f"starts with {lines[0][:40]!r}", _EXPECTED)
+        first = [line.split("\t")[0].strip().lower() for line in lines[:12]]
+        at = next((i for i, cell in enumerate(first) if cell.strip("#") == "frame"), None)
+        if at is None:
+            raise bad_file(path, f"line 4 starts with {lines[3][:40]!r}", _EXPECTED)
+        names, values = (lines[at - 2], lines[at - 1]) if at >= 2 else ("", "")
+        pairs = [(names.split("\t"), values.split("\t")), (names.split(), values.split())]
+        # a value left empty shows between tabs only; without tabs, words are all there is
+        names_, values_ = pairs[0] if len(pairs[0][0]) > 1 else pairs[1]
+        stripped = ((n.strip(), v.strip()) for n, v in zip(names_, values_, strict=False))
+        return cls(dict(stripped), at)
+
+    def compare(self, path: Path, name: str, count: int, what: str, findings: Findings) -> None:
+        """Warn where a count in the header is another than what is there."""
+        said = self.values.get(name, "")
+        if said.isascii() and said.isdecimal() and said.lstrip("0") == str(count):
+            return
+        findings.warn(f"{name} is {said[:20] or 'missing'}, but {count} {what} are there and read")
 
 
-def _count(path: Path, header: dict[str, str], name: str) -> int:
-    text = header.get(name, "")
-    if not text.isdecimal():
-        raise bad_file(path, f"{name} is {text!r}", "a whole number")
-    return int(text)
+def _table(
+    path: Path, lines: list[str], header: _Header, findings: Findings
+) -> tuple[FloatArray, list[str]]:
+    """Return frame numbers, times and coordinates, shape (T, 2 + 3M), and the M names."""
+    cells = lines[header.names_at].rstrip("\r\n").split("\t")[2:]
+    labels = [name.strip() for name in cells]
+    if not all(not name for i, name in enumerate(labels) if i % 3):
+        labels = [name for name in labels if name]  # one name after the other
+    else:
+        labels = labels[::3]
+    while labels and not labels[-1]:
+        labels.pop()
+    if not labels:
+        raise bad_file(path, "no marker names", "at least one")
+    start = header.names_at + 1
+    if start < len(lines) and _names_axes(lines[start]):
+        start += 1
+    rows = (
+        (place, line.split("\t"))
+        for place, line in enumerate(lines[start:], start=start + 1)
+        if line.strip()
+    )
+    values = measured_rows(path, rows, 2 + 3 * len(labels), findings, group=3)
+    if not len(values):
+        raise bad_file(path, "0 frames", "at least one")
+    return values, labels
+
+
+def _names_axes(line: str) -> bool:
+    words = line.split()
+    return bool(words) and all(word[:1].upper() in ("X", "Y", "Z") for word in words)
+
+
+def _in_time(
+    path: Path,
+    header: _Header,
+    times_s: FloatArray,
+    points: FloatArray,
+    hints: Hints,
+    findings: Findings,
+) -> tuple[float, FloatArray]:
+    """Return the rate and the points at even times, shape (T', M, 3)."""
+    said = header.values.get("DataRate", "")
+    rate_hz = number(path, said, "DataRate") if said or hints.rate_hz is None else np.nan
+    clock = None
+    if np.isnan(times_s).all() or not np.ptp(times_s):
+        if len(points) > 1:
+            findings.note("there are no times; frames are taken as even")
+    else:
+        clock = even_clock(path, times_s)
+        points = clock.even(points.reshape(len(points), -1)).reshape(-1, *points.shape[1:])
+        if clock.jitters:
+            findings.note(f"times jitter: resampled to an even {clock.rate_hz:.6g} Hz")
+    if hints.rate_hz is not None:
+        return hints.rate_hz, points
+    if clock is None or np.isnan(clock.rate_hz):
+        if not 0 < rate_hz < np.inf:
+            raise bad_file(path, f"DataRate {said[:40]!r}", "a positive number [1/s]")
+        return rate_hz, points
+    rounded_s = 1e-3  # times may be rounded to milliseconds
+    slack = _SAME_RATE + 2 * rounded_s / max(float(np.ptp(times_s)), rounded_s)
+    if not (0 < rate_hz < np.inf and abs(clock.rate_hz / rate_hz - 1.0) <= slack):
+        findings.warn(
+            f"DataRate is {said[:20] or 'missing'}, the times say {clock.rate_hz:.6g} Hz, "
+            "which is used"
+        )
+        rate_hz = clock.rate_hz
+    return rate_hz, points
+
+
+def _space(path: Path, header: _Header, hints: Hints) -> Space:
+    text = header.values.get("Units", "")
+    unit = named_unit(text)
+    if unit is None and text and hints.unit_m is None:
+        raise bad_file(path, f"unit of length {text!r}", f"one of {', '.join(UNITS_M)}")
+    return Space(unit or 0.001, "y", "x", says_unit=unit is not None)

@@ -39,6 +39,7 @@ _RATE_HZ = 100.0
 class UIPRMDReader(Reader):
     """Reads UI-PRMD's Vicon positions: 117 columns [mm], 100 Hz, (0, 0, 0) where occluded."""
 
+    format = "UI-PRMD"
     suffixes = (".txt",)
 
     def accepts(self, path: Path) -> bool:

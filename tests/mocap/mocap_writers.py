@@ -256,19 +256,22 @@ def write_default_amc(path: Path) -> Path:
     return write_amc(path)
 
 
-WRITERS: dict[str, Callable[[Path], Path]] = {
-    ".txt": write_ui_prmd,
-    ".c3d": write_c3d,
-    ".amc": write_default_amc,
-    ".bvh": write_bvh,
-    ".trc": write_trc,
-    ".csv": write_csv,
+Writer = Callable[[Path], Path]
+WRITERS: dict[str, tuple[str, Writer]] = {
+    "UI-PRMD": (UI_PRMD_NAME, write_ui_prmd),
+    "C3D": ("take.c3d", write_c3d),
+    "AMC": ("take.amc", write_default_amc),
+    "BVH": ("take.bvh", write_bvh),
+    "TRC": ("take.trc", write_trc),
+    "CSV": ("take.csv", write_csv),
 }
+"""For each reader, by its format: a file name, and what writes a small valid file there."""
 
 
-def write(folder: Path, suffix: str) -> Path:
+def write(folder: Path, format: str) -> Path:
     """Write a small valid file of a format."""
-    return WRITERS[suffix](folder / (UI_PRMD_NAME if suffix == ".txt" else f"take{suffix}"))
+    name, writer = WRITERS[format]
+    return writer(folder / name)
 
 
 def zipped(path: Path) -> Path:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mocap_writers import person, write_c3d, write_csv, write_trc, write_ui_prmd
 
-from mplearn.errors import InvalidValueError, RecordingError
+from mplearn.errors import InvalidValueError, RecordingError, RecordingWarning
 from mplearn.mocap import Hints, open_recording, open_recordings, take_names
 from mplearn.mocap.space import to_z_up
 from mplearn.mocap.ui_prmd import PLUG_IN_GAIT_MARKERS
@@ -157,6 +157,10 @@ def test_c3d_of_every_machine(tmp_path: Path, processor: int, scale: float | Non
 def test_c3d_cut_off(tmp_path: Path) -> None:
     path = write_c3d(tmp_path / "a.c3d", person(300, 20))
     path.write_bytes(path.read_bytes()[:-2000])
+    with pytest.warns(RecordingWarning, match=r"300 frames, 294 are there"):
+        recording = open_recording(path)
+    assert recording.markers == pytest.approx(person(300, 20)[:294], abs=1e-6)
+    path.write_bytes(path.read_bytes()[: -294 * 20 * 16])
     with pytest.raises(RecordingError, match=r"300 frames.*bytes"):
         open_recording(path)
 
@@ -190,6 +194,7 @@ def test_c3d_negative_residual_is_occluded(tmp_path: Path) -> None:
     assert np.argwhere(missing.any(axis=2)).tolist() == [[3, 2]]
 
 
+@pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")  # four points: which is up?
 def test_c3d_leaves_model_outputs_and_unnamed_trajectories_out(tmp_path: Path) -> None:
     names = ["LASI", "LHipAngles", "*7", "RASI", "LTOE", "RTOE"]
     path = write_c3d(
@@ -215,8 +220,12 @@ def test_c3d_without_points(tmp_path: Path) -> None:
 
 def test_c3d_same_name_twice(tmp_path: Path) -> None:
     path = write_c3d(tmp_path / "a.c3d", person(), names=["A", "B", "A", "C", "D", "E"])
-    with pytest.raises(RecordingError, match=r"'A'.*more than once"):
-        open_recording(path)
+    with pytest.warns(RecordingWarning, match=r"same name more than once: A; the first"):
+        recording = open_recording(path)
+    assert recording.marker_names == ("A", "B", "C", "D", "E")
+    assert recording.markers[:, 0] == pytest.approx(person()[:, 0], abs=1e-6)
+    assert recording.report is not None
+    assert recording.report.left_out == ("A",)
 
 
 # TRC -----------------------------------------------------------------------------------------
@@ -232,6 +241,7 @@ def test_trc_is_y_up_and_x_forward(tmp_path: Path) -> None:
     assert recording.markers == pytest.approx(points, abs=1e-7, nan_ok=True)
 
 
+@pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")  # three points
 def test_trc_in_metres_and_a_dropped_frame(tmp_path: Path) -> None:
     points = person(10, 3)
     path = write_trc(tmp_path / "a.trc", points, units="m", scale_to_file=1.0)
@@ -249,12 +259,9 @@ def test_trc_in_metres_and_a_dropped_frame(tmp_path: Path) -> None:
         ("PathFileType", "FileType", "starts with"),
         ("Frame#", "Frames", "line 4"),
         ("\tmm\t", "\tparsec\t", "parsec"),
-        ("\t6\tmm", "\t7\tmm", "6 marker names"),
-        ("\t12\t6", "\t11\t6", "12 frames"),
-        ("M5", "M4", "marker names"),
         ("0.05000", "0.04000", "time goes back"),
         ("0.05000", "0.04600", None),
-        ("100.00\t100.00", "none\t100.00", "DataRate"),
+        ("100.00\t100.00", "often\t100.00", "DataRate"),
     ],
 )
 def test_broken_trc(tmp_path: Path, old: str, new: str, found: str | None) -> None:
@@ -266,6 +273,28 @@ def test_broken_trc(tmp_path: Path, old: str, new: str, found: str | None) -> No
         return
     with pytest.raises(RecordingError, match=rf"a\.trc.*{found}"):
         open_recording(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "n_markers", "said"),
+    [
+        ("\t6\tmm", "\t7\tmm", 6, "NumMarkers is 7, but 6 names"),
+        ("\t12\t6", "\t11\t6", 6, "NumFrames is 11, but 12 frames"),
+        ("M5", "M4", 5, "more than once: M4"),
+        ("100.00\t100.00", "none\t100.00", 6, "DataRate is none, the times say 100 Hz"),
+        ("100.00\t100.00", "250.00\t250.00", 6, "DataRate is 250.00, the times say 100 Hz"),
+    ],
+)
+def test_trc_whose_header_contradicts_it(
+    tmp_path: Path, old: str, new: str, n_markers: int, said: str
+) -> None:
+    path = write_trc(tmp_path / "a.trc")
+    whole = open_recording(path)
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.warns(RecordingWarning, match=said):
+        recording = open_recording(path)
+    assert recording.rate_hz == pytest.approx(100.0)
+    assert np.array_equal(recording.frames, whole.frames[:, : 3 * n_markers])
 
 
 # CSV -----------------------------------------------------------------------------------------

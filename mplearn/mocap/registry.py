@@ -1,0 +1,85 @@
+"""Which reader reads a file: by its suffix, and by a look at it where several share one."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+
+from ..errors import InvalidValueError, RecordingError
+from .files import bad_file, is_file, suffix
+from .reader import Reader
+
+ENTRY_POINTS = "mplearn.readers"
+"""Group of the entry points by which an installed package brings readers (classes) of its own."""
+
+_registered: list[Reader] = []  # the latest is asked first
+
+
+def register_reader(reader: Reader) -> None:
+    """Let `open_recording` and the ``mplearn`` command read one more format.
+
+    It is asked before those that were registered earlier, so it may take over a suffix, or those
+    of its files that it `Reader.accepts`.
+
+    Args:
+        reader: An instance; one of the same class, if there is one, is replaced.
+
+    Raises:
+        InvalidValueError: It is no reader, or names no suffix such as ``".abc"``.
+    """
+    if not isinstance(reader, Reader):
+        raise InvalidValueError(f"a reader must be an instance of Reader, not {reader!r}")
+    for ending in reader.suffixes or ("",):
+        if not ending.startswith(".") or ending != ending.lower() or ending == ".gz":
+            raise InvalidValueError(
+                f"a reader's suffixes are like '.abc', lower case, not {ending!r}"
+            )
+    _registered[:] = [reader, *(r for r in _registered if type(r) is not type(reader))]
+
+
+def readers() -> tuple[Reader, ...]:
+    """Return all readers, in the order in which they are asked."""
+    _load_entry_points()
+    return tuple(_registered)
+
+
+def suffixes() -> tuple[str, ...]:
+    """Return the suffixes that can be read, in order."""
+    return tuple(sorted({ending for reader in readers() for ending in reader.suffixes}))
+
+
+def reader_of(path: Path) -> Reader | None:
+    """Return the reader that takes a file; None for none."""
+    if not is_file(path):
+        return None
+    fitting = (r for r in readers() if suffix(path) in r.suffixes)
+    return next((reader for reader in fitting if reader.accepts(path)), None)
+
+
+def reader_for(path: Path) -> Reader:
+    """Return the reader for a file that is meant to be read; the most general one in doubt.
+
+    Raises:
+        RecordingError: No reader knows its suffix.
+    """
+    found = reader_of(path)
+    if found is None:
+        fitting = [r for r in readers() if suffix(path) in r.suffixes]
+        if not fitting:
+            raise bad_file(
+                path, f"unknown suffix {suffix(path)!r}", f"one of {', '.join(suffixes())}"
+            )
+        found = fitting[-1]
+    return found
+
+
+@cache
+def _load_entry_points() -> None:
+    for point in entry_points(group=ENTRY_POINTS):
+        try:
+            register_reader(point.load()())
+        except Exception as error:
+            raise RecordingError(
+                f"the reader {point.name!r} of an installed package cannot be loaded: {error!r}"
+            ) from error
