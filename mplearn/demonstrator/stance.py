@@ -11,6 +11,7 @@ import numpy as np
 
 from mplearn.body import Body
 from mplearn.errors import BodyError
+from mplearn.maths.rotations import euler_to_matrix, euler_to_quaternion
 from mplearn.recording import FloatArray
 
 from .channels import INDEX, UPPER_JOINTS
@@ -61,14 +62,13 @@ class Stance:
         n = len(plan)
         q = np.zeros((n, self.body.nq))
         q[:, self._upper] = plan[:, : len(UPPER_JOINTS)]
-        pelvis = _rotation(*(plan[:, INDEX[f"pelvis_{axis}"]] for axis in ("roll", "pitch", "yaw")))
+        angles = plan[:, [INDEX[f"pelvis_{angle}"] for angle in ("yaw", "pitch", "roll")]]
+        pelvis = euler_to_matrix("ZYX", angles)
         feet = [self._foot(plan, side) for side in range(2)]
         hips = np.einsum("tij,sj->tsi", pelvis, self._hips)  # (T, 2, 3) relative to the pelvis
         base = self._base(plan, hips, feet)
         q[:, :3] = base
-        q[:, 3:7] = _quaternion(
-            *(plan[:, INDEX[f"pelvis_{axis}"]] for axis in ("roll", "pitch", "yaw"))
-        )
+        q[:, 3:7] = euler_to_quaternion("ZYX", angles)
         for side, (ankle, rotation) in enumerate(feet):
             lifted = plan[:, INDEX[f"foot_z_{'lr'[side]}"]]
             q[:, self._legs[side]] = self._leg(
@@ -81,8 +81,8 @@ class Stance:
         """Return an ankle's positions (T, 3) and the foot's orientations (T, 3, 3)."""
         letter = "lr"[side]
         shift = plan[:, [INDEX[f"foot_{axis}_{letter}"] for axis in "xyz"]] * self.leg_m
-        pitch, yaw = (plan[:, INDEX[f"foot_{angle}_{letter}"]] for angle in ("pitch", "yaw"))
-        return self._ankles[side] + shift, _rotation(np.zeros(len(plan)), pitch, yaw)
+        angles = plan[:, [INDEX[f"foot_{angle}_{letter}"] for angle in ("yaw", "pitch")]]
+        return self._ankles[side] + shift, euler_to_matrix("ZY", angles)
 
     def _base(
         self, plan: FloatArray, hips: FloatArray, feet: list[tuple[FloatArray, FloatArray]]
@@ -129,41 +129,11 @@ class Stance:
         lean = np.arcsin(np.clip(thigh * np.sin(knee) / length, -1.0, 1.0))
         ankle_roll = np.arctan2(back[:, 1], back[:, 2])
         ankle_pitch = -np.arctan2(back[:, 0], np.hypot(back[:, 1], back[:, 2])) - lean
-        zero = np.zeros(len(hip))
         rest = np.einsum("tji,tjk->tik", pelvis, foot)
-        rest = (
-            rest @ _rotation(-ankle_roll, zero, zero) @ _rotation(zero, -knee - ankle_pitch, zero)
-        )
+        ankle = np.stack((ankle_roll, knee + ankle_pitch), axis=1)
+        rest = rest @ euler_to_matrix("XY", -ankle)
         hip_yaw = np.arctan2(-rest[:, 0, 1], rest[:, 1, 1])
         across = -rest[:, 0, 1] * np.sin(hip_yaw) + rest[:, 1, 1] * np.cos(hip_yaw)
         hip_roll = np.arctan2(rest[:, 2, 1], across)
         hip_pitch = np.arctan2(-rest[:, 2, 0], rest[:, 2, 2])
         return np.stack((hip_yaw, hip_roll, hip_pitch, knee, ankle_pitch, ankle_roll), axis=1)
-
-
-def _rotation(roll: FloatArray, pitch: FloatArray, yaw: FloatArray) -> FloatArray:
-    """Return Rz(yaw) Ry(pitch) Rx(roll), shape (T, 3, 3)."""
-    sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
-    sy, cy = np.sin(yaw), np.cos(yaw)
-    rows = (
-        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
-        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
-        (-sp, cp * sr, cp * cr),
-    )
-    return np.stack([np.stack(row, axis=1) for row in rows], axis=1)
-
-
-def _quaternion(roll: FloatArray, pitch: FloatArray, yaw: FloatArray) -> FloatArray:
-    """Return the quaternion (w, x, y, z) of Rz(yaw) Ry(pitch) Rx(roll), shape (T, 4)."""
-    sr, cr = np.sin(0.5 * roll), np.cos(0.5 * roll)
-    sp, cp = np.sin(0.5 * pitch), np.cos(0.5 * pitch)
-    sy, cy = np.sin(0.5 * yaw), np.cos(0.5 * yaw)
-    return np.stack(
-        (
-            cy * cp * cr + sy * sp * sr,
-            cy * cp * sr - sy * sp * cr,
-            cy * sp * cr + sy * cp * sr,
-            sy * cp * cr - cy * sp * sr,
-        ),
-        axis=1,
-    )

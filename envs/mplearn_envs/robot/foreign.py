@@ -9,6 +9,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from mplearn.errors import RobotError
 from mplearn.recording import FloatArray
@@ -18,7 +19,6 @@ from .drives import JointGroup
 
 _LEVEL = 0.995  # least cosine between the floor and the foot of a robot at attention
 _HALF_SOLE_M = 0.01
-_UNIT = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def read_spec(source: str | Path, name: str) -> Any:
@@ -66,7 +66,7 @@ def move_zero(spec: Any, attention: Mapping[str, float], name: str) -> None:
         RobotError: An angle lies outside its limits, or cannot become zero.
     """
     for body in spec.bodies[1:]:
-        later = _UNIT  # the turns of the hinges nearer to the body than the present one
+        later = Rotation.identity()  # by the hinges nearer to the body than the present one
         for joint in reversed(body.joints):
             if joint.type == mujoco.mjtJoint.mjJNT_FREE:
                 continue
@@ -86,9 +86,10 @@ def move_zero(spec: Any, attention: Mapping[str, float], name: str) -> None:
             joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
             joint.ref = joint.springref = 0.0
             axis = np.array(joint.axis, dtype=np.float64)
-            joint.axis = _rotated(axis, _inverse(later))
-            later = _product(_about(axis, angle), later)
-        body.quat = _product(np.array(body.quat, dtype=np.float64), later)
+            joint.axis = later.inv().apply(axis)
+            later = Rotation.from_rotvec(angle * axis) * later
+        turned = Rotation.from_quat(body.quat, scalar_first=True) * later
+        body.quat = turned.as_quat(scalar_first=True)
 
 
 def add_soles(spec: Any, feet: tuple[str, str], name: str) -> None:
@@ -201,27 +202,3 @@ def _child(element: ET.Element, tag: str) -> ET.Element:
 def _classless(element: ET.Element) -> ET.Element:
     element.attrib.pop("class", None)
     return element
-
-
-def _about(axis: FloatArray, angle: float) -> FloatArray:
-    out = np.empty(4)
-    mujoco.mju_axisAngle2Quat(out, axis, angle)
-    return out
-
-
-def _product(a: FloatArray, b: FloatArray) -> FloatArray:
-    out = np.empty(4)
-    mujoco.mju_mulQuat(out, a, b)
-    return out
-
-
-def _inverse(quaternion: FloatArray) -> FloatArray:
-    out = np.empty(4)
-    mujoco.mju_negQuat(out, quaternion)
-    return out
-
-
-def _rotated(vector: FloatArray, quaternion: FloatArray) -> FloatArray:
-    out = np.empty(3)
-    mujoco.mju_rotVecQuat(out, vector, quaternion)
-    return out
