@@ -10,9 +10,10 @@ from mplearn_envs.execution.modes import Dynamics
 from mplearn_envs.tasks import TASKS
 
 from .contest import Contest, Game
-from .policies import NEEDS_TASK, POLICIES
+from .policies import POLICIES
 from .rl import TrainingConfig
-from .rl.config import AlgorithmName, PriorUse, usual_prior, usual_steps
+from .rl.config import AlgorithmName, PriorUse
+from .suited import NEEDS_TASK, SUITED, suited
 
 DYNAMICS = get_args(Dynamics)
 SLOW = ("search",)  # plays as few episodes as the simulated robot does
@@ -27,19 +28,18 @@ class Comparison:
     Attributes:
         tasks: Names of tasks.
         dynamics: "kinematic", "simulated" or both. Agents are trained kinematically.
-        policies: Names of policies; those that do not suit a task are left out there, as is
-            "search" in "follow", where it foresees the demonstrator.
+        policies: Names of policies; those that do not suit a task are left out there, see `Suited`.
         algorithms: What agents are trained with.
         priors: What the transition prior is to them; "dqn" knows "feature" only. None: what
-            suits the task, see `usual_prior`.
+            suits the task, see `Suited`.
         seeds: Of the episodes, and of the trainings: one agent a seed.
         episodes: Episodes a seed, kinematic.
         simulated_episodes: Episodes a seed, simulated; and of policies that think long.
-        steps: Macro steps of a training; None: what suits the task, see `usual_steps`.
+        steps: Macro steps of a training; None: what suits the task, see `Suited`.
         library: File of the library; None is the built-in one.
     """
 
-    tasks: tuple[str, ...] = ("goal", "follow", "recite", "free")
+    tasks: tuple[str, ...] = tuple(SUITED)
     dynamics: tuple[str, ...] = ("kinematic",)
     policies: tuple[str, ...] = tuple(POLICIES)
     algorithms: tuple[AlgorithmName, ...] = ("maskable-ppo",)
@@ -69,7 +69,7 @@ class Comparison:
         policies = [
             name
             for name in self.policies
-            if task in NEEDS_TASK.get(name, (task,)) and (name, task) != ("search", "follow")
+            if task in NEEDS_TASK.get(name, (task,)) and name not in suited(task).foresees
         ]
         out = {}
         for name in [*policies, *trainings]:
@@ -85,7 +85,7 @@ class Comparison:
 
     def steps_of(self, task: str) -> int:
         """Return the macro steps of a training."""
-        return usual_steps(task) if self.steps is None else self.steps
+        return suited(task).steps if self.steps is None else self.steps
 
     def _n(self, name: str, dynamics: str) -> int:
         slow = dynamics == "simulated" or name in SLOW
@@ -97,7 +97,7 @@ class Comparison:
         uses: list[tuple[AlgorithmName, PriorUse]] = [
             (algorithm, "feature" if algorithm == "dqn" else prior)
             for algorithm in self.algorithms
-            for prior in self.priors or (usual_prior(task),)
+            for prior in self.priors or (suited(task).prior,)
         ]
         return {
             f"{algorithm}, prior as {use}": TrainingConfig(

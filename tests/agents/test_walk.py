@@ -6,13 +6,13 @@ import pytest
 
 from mplearn.errors import InvalidValueError, RobotError, UnknownPrimitiveError
 from mplearn_agents.policies import (
-    NEEDS_TASK,
     POLICIES,
     Greedy,
     PathToGoal,
     Policy,
     RandomWalk,
 )
+from mplearn_agents.suited import NEEDS_TASK
 from mplearn_agents.walk import walk
 from mplearn_envs.skills.feasibility import FeasibilityConfig
 

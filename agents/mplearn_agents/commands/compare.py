@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+from mplearn_agents.suited import SUITED
+
 if TYPE_CHECKING:
     from mplearn_agents.contest import Contest
 
@@ -18,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out", type=Path, default=Path("out/compare"), help="folder (default: out/compare)"
     )
     parser.add_argument("--library", type=Path, help="library file (default: the built-in one)")
-    parser.add_argument("--tasks", nargs="+", default=["goal", "follow", "recite", "free"])
+    parser.add_argument("--tasks", nargs="+", default=list(SUITED))
     parser.add_argument(
         "--dynamics",
         nargs="+",

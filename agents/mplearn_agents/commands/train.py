@@ -7,6 +7,8 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+from mplearn_agents.suited import suited
+
 if TYPE_CHECKING:
     from mplearn_agents.rl import TrainedPolicy, TrainingConfig
 
@@ -61,13 +63,13 @@ def run(args: argparse.Namespace) -> None:
     from rich.console import Console
 
     from mplearn_agents.rl import TrainingConfig
-    from mplearn_agents.rl.config import usual_prior, usual_steps
     from mplearn_agents.rl.train import train
 
     given = {f.name: getattr(args, f.name) for f in fields(TrainingConfig) if hasattr(args, f.name)}
     given["library"] = None if args.library is None else str(args.library)
-    given["prior"] = args.prior or usual_prior(args.task)
-    given["steps"] = usual_steps(args.task) if args.steps is None else args.steps
+    usual = suited(args.task)
+    given["prior"] = args.prior or usual.prior
+    given["steps"] = usual.steps if args.steps is None else args.steps
     console = Console()
     config = TrainingConfig(**given)
     start = None if args.start is None else _taken_along(args.start, config)

@@ -30,10 +30,3 @@ POLICIES: dict[str, Callable[[gymnasium.Env[Any, Any]], Policy]] = {
     "mirror": lambda _: Mirror(),
     "search": Search.for_env,
 }
-
-_PATHS = ("likely-path", "short-path", "quick-path")
-#: The policies that need a certain task, and which; the others act in any.
-NEEDS_TASK: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(_PATHS, ("goal", "recite")),
-    "mirror": ("follow",),
-}

@@ -8,27 +8,10 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
 
 from mplearn.errors import InvalidValueError, MPLearnError
+from mplearn_agents.suited import PriorUse as PriorUse
 
 VERSION = 2  # of agents: changes with networks, what they see, and what tasks show
 AlgorithmName: TypeAlias = Literal["maskable-ppo", "ppo", "dqn"]
-#: What the transition prior is to the policy: nothing but a feature (untrained, it waits as often
-#: as not, and else draws evenly); its initial logits; or what it is drawn to by a penalty on the
-#: divergence from it (instead of the entropy bonus).
-PriorUse: TypeAlias = Literal["feature", "logits", "regulariser"]
-
-
-def usual_prior(task: str) -> PriorUse:
-    """Return the use of the prior that suits a task.
-
-    Where an agent must learn to wait, which has prior 0, the prior is a feature; initial logits
-    else.
-    """
-    return "feature" if task == "follow" else "logits"
-
-
-def usual_steps(task: str) -> int:
-    """Return for how many macro steps to train for a task: more where more must be found out."""
-    return 80_000 if task == "follow" else 40_000
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,12 @@ class Task(ABC):
     In an episode the environment calls `reset`; then for every action `bonuses`, `rates`, `fall`
     (after a fall only) and `arrive`; after each of these steps `observe`, `done` and `report`. An
     environment has its task to itself: objects are not shared.
+
+    Attributes:
+        fallen: Price of a fall.
     """
+
+    fallen: float = 10.0
 
     def space(self, repertoire: Repertoire) -> spaces.Box | None:
         """Return the bounds of what `observe` returns; None if the task shows nothing.
@@ -95,9 +100,9 @@ class Task(ABC):
     def rates(self, report: TrackingReport) -> dict[str, FloatArray]:
         """Return what each moment earns per second, by term, shape (S,) each."""
 
-    @abstractmethod
     def fall(self) -> float:
-        """Return what a fall earns."""
+        """Return what a fall earns: its price, ``fallen``, unless you derive another."""
+        return -self.fallen
 
     def arrive(self, scene: Scene) -> dict[str, float]:
         """Return what the end of a macro step earns, by term."""

@@ -148,10 +148,6 @@ class FollowTask(Task):
             self._agreed_s += float(together.mean() * report.duration_s)
         return {"agree": self.agree * together}
 
-    def fall(self) -> float:
-        """Return the price of a fall."""
-        return -self.fallen
-
     def arrive(self, scene: Scene) -> dict[str, float]:
         """Let time pass: more is recognised."""
         self._time_s = scene.time_s

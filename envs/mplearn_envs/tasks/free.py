@@ -79,10 +79,6 @@ class FreeTask(Task):
             "balanced": self.balanced * safe,
         }
 
-    def fall(self) -> float:
-        """Return the price of a fall."""
-        return -self.fallen
-
     def arrive(self, scene: Scene) -> dict[str, float]:
         """Count what was performed lately."""
         self._shares = np.zeros(scene.repertoire.capacity)

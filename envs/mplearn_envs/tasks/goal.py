@@ -128,10 +128,6 @@ class GoalTask(Task):
         """Return the term ``hurry``."""
         return {"hurry": np.full(len(report.time_s), -self.hurry)}
 
-    def fall(self) -> float:
-        """Return the price of a fall."""
-        return -self.fallen
-
     def arrive(self, scene: Scene) -> dict[str, float]:
         """Return the term ``reached``."""
         self._now, self._time_s = scene.measured, scene.time_s

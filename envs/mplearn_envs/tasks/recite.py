@@ -113,10 +113,6 @@ class ReciteTask(Task):
         """Return the term ``hurry``."""
         return {"hurry": np.full(len(report.time_s), -self.hurry)}
 
-    def fall(self) -> float:
-        """Return the price of a fall."""
-        return -self.fallen
-
     def arrive(self, scene: Scene) -> dict[str, float]:
         """Return the terms ``said`` and ``complete``."""
         self._time_s = scene.time_s
