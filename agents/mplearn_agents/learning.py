@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from mplearn.learner import (
     Event,
+    FramesLost,
     MotionLearner,
     PrimitiveBorn,
     PrimitiveMerged,
@@ -33,6 +35,7 @@ class LearningLog:
         placements: What the tree said to each; None for a pause.
         recognised: For each segment that was recognised on arrival, by its start: its primitive.
         known: Number of primitives known, each with the frame from which on.
+        lost: Stretches from which nothing could be learned.
         watched_s: Length of the streams so far [s].
         learning_s: How long learning took [s], reading and drawing left out.
     """
@@ -41,6 +44,7 @@ class LearningLog:
     placements: list[Placement | None] = field(default_factory=list)
     recognised: dict[int, int] = field(default_factory=dict)
     known: list[tuple[int, int]] = field(default_factory=list)
+    lost: list[FramesLost] = field(default_factory=list)
     watched_s: float = 0.0
     learning_s: float = 0.0
     _alive: set[int] = field(default_factory=set)
@@ -54,6 +58,19 @@ class LearningLog:
     def times_real_time(self) -> float:
         """How much faster than real time learning was."""
         return self.watched_s / self.learning_s if self.learning_s > 0 else 0.0
+
+    @property
+    def n_lost(self) -> int:
+        """Number of frames from which nothing could be learned."""
+        return sum(lost.end - lost.start for lost in self.lost)
+
+    @property
+    def reasons(self) -> str:
+        """Why they were lost, the most frequent reason first."""
+        frames = Counter[str]()
+        for lost in self.lost:
+            frames[lost.reason] += lost.end - lost.start
+        return "; ".join(reason for reason, _ in frames.most_common())
 
     @property
     def moving(self) -> list[Segment]:
@@ -76,6 +93,8 @@ class LearningLog:
                 self.known.append((segment.end, len(self._alive)))
             case PrimitiveSplit(_, primitive, _):  # the new ones are born right after
                 self._alive.discard(primitive)
+            case FramesLost():
+                self.lost.append(event)
             case _:
                 pass
 

@@ -4,22 +4,39 @@ The distances between markers on one segment (`rigid`) hardly change while a per
 differ from one person to the next by millimetres to centimetres; in a frame where another body
 stands there, most of them change at once. That raises a doubt. What is seen over the next tenth of
 a second is then held against what could explain it: nothing has changed; it is somebody known; it
-is somebody new. How much the distances vary with posture is learned from the people themselves.
+is somebody new; it is no body at all. How much the distances vary with
+posture is learned from the people themselves.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from mplearn.errors import InvalidValueError
-from mplearn.recording import FloatArray
+from mplearn.recording import BoolArray, FloatArray
 
+from .first_posture import LARGEST, SMALLEST
 from .known_bodies import IdentityConfig as IdentityConfig
 from .known_bodies import KnownBodies
-from .rigid import NOISE, distances_of, follow_steadily, rigid_pairs
+from .rigid import (
+    ABSENT,
+    FULL,
+    IN_DOUBT,
+    NOISE,
+    SHAKE,
+    Memory,
+    Rules,
+    distances_of,
+    follow_steadily,
+    goes_on,
+    jumped,
+    rigid_pairs,
+    usual_distances,
+)
 
 
 class BodyIdentity:
@@ -45,10 +62,17 @@ class BodyIdentity:
         self.config = config or IdentityConfig()
         self.rate_hz = float(rate_hz)
         self._pairs, give = rigid_pairs(marker_names)
+        self._usual = usual_distances(marker_names, self._pairs)
+        self._n_markers = len(marker_names)
         self.person = -1
         self.bodies = KnownBodies(give, self.config)
-        self._quick = 1.0 - float(np.exp(-1.0 / (self.config.memory_s * rate_hz)))
-        self._slow = 1.0 - float(np.exp(-1.0 / (2.0 * rate_hz)))
+        self._rules = Rules(
+            quick=1.0 - float(np.exp(-1.0 / (self.config.memory_s * rate_hz))),
+            slow=1.0 - float(np.exp(-1.0 / (2.0 * rate_hz))),
+            reach_m=self.config.fastest_m_s / rate_hz,
+            absent_frames=self.config.absent_s * rate_hz,
+            block_frames=self.config.block_s * rate_hz,
+        )
         self.leave()
 
     @property
@@ -61,34 +85,45 @@ class BodyIdentity:
         """Frames of a doubt, before it is decided."""
         return max(4, round(self.config.look_s * self.rate_hz))
 
+    @property
+    def places(self) -> FloatArray:
+        """Each marker as last seen without doubt, shape (M, 3) [m]; NaN where never."""
+        return self._memory.places
+
     def leave(self) -> None:
         """Forget what stands there now, but nobody who was known."""
-        n_pairs = len(self._pairs)
         self.person = -1
-        self._near, self._last = np.full((2, n_pairs), np.nan)
-        self._steps, self._spread = np.full((2, n_pairs), (4 * NOISE) ** 2)
-        self._unseen = 0
-        self._sum, self._seen = np.zeros(n_pairs), np.zeros(n_pairs)
-        self._frames = self._strikes = 0
+        self._memory = Memory.empty(self._n_markers, len(self._pairs))
+        self._strikes = 0
 
-    def doubts(self, markers: FloatArray) -> bool:
-        """Take one frame, shape (M, 3); return whether another body may stand there.
+    def follow(self, frames: FloatArray) -> int:
+        """Take frames, shape (T, M, 3), up to the first in which another body may stand there.
 
-        A frame in doubt is not taken up.
+        Returns:
+            How many frames were taken; the next one, if there is one, is in doubt, and was not.
         """
-        seen = distances_of(markers, self._pairs)
-        visible = np.count_nonzero(seen == seen)
-        if 3 * visible < len(seen):
-            self._unseen += 1
-            return False
-        if self._unseen > self.config.absent_s * self.rate_hz:
-            self._near[:] = np.nan
-            return True
-        memory = self._last, self._near, self._steps, self._spread
-        if follow_steadily(seen, *memory, self._quick, self._slow):
-            return True
-        self._unseen = 0
-        return self._remember(seen)
+        done = 0
+        while done < len(frames):
+            n, why = follow_steadily(frames[done:], self._pairs, self._memory, self._rules)
+            done += n
+            if why == IN_DOUBT:
+                break
+            if why == FULL and self._fits_another():
+                return done - 1
+        return done
+
+    def returned(self, frames: FloatArray) -> bool:
+        """Say whether frames in doubt, shape (k, M, 3), end as what came before them went on."""
+        last = max(2, round(self.config.back_s * self.rate_hz))
+        return len(frames) > last and all(
+            goes_on(frames[k], self._pairs, self._memory, self._rules, k, 0.25)
+            for k in range(len(frames) - last, len(frames))
+        )
+
+    def went_on(self, frames: FloatArray) -> bool:
+        """Say whether most frames, shape (k, M, 3), go on from what came before them."""
+        rules = self._pairs, self._memory, self._rules
+        return 2 * sum(goes_on(each, *rules, k, 0.5) for k, each in enumerate(frames)) > len(frames)
 
     def decide(self, frames: FloatArray) -> int | None:
         """Say who stands there after a doubt.
@@ -97,27 +132,90 @@ class BodyIdentity:
             frames: What was seen since, shape (k, M, 3) [m].
 
         Returns:
-            The number of a known person; `n_people` for somebody new; None if too little is seen.
+            The number of a known person; `n_people` for somebody new; `NOBODY` where no body is
+            seen; None if too little is seen.
         """
-        seen = np.array([distances_of(markers, self._pairs) for markers in frames])
-        count = (seen == seen).sum(axis=0)
-        if 3 * np.count_nonzero(count) < len(count):
+        seen = self._distances(frames)
+        if 3 * np.count_nonzero((seen == seen).any(axis=0)) < seen.shape[1]:
             return None
-        mean = _mean(seen)
-        scores = self.bodies.scores(mean)
+        middle = _middle(seen)
+        scores = self.bodies.scores(middle)
         if self.person >= 0:
-            own = max(scores[self.person], self._unchanged(seen))
+            own = max(scores[self.person], self._unchanged(seen, middle))
             scores[self.person] = own + self.config.loyalty
         scores[-1] += self.config.caution
-        if self.n_people >= self.config.max_people:
-            scores = scores[: self.n_people]
-        return int(scores.argmax())
+        found = int(scores.argmax())
+        if found < self.n_people:
+            return found
+        if not self._is_body(seen, middle):
+            return NOBODY
+        return found if self.n_people < self.config.max_people else int(scores[:-1].argmax())
 
-    def stay(self) -> None:
-        """Go on with the same person after a doubt."""
-        self._near[:] = np.nan
-        self._unseen = self._frames = self._strikes = 0
-        self._sum[:], self._seen[:] = 0.0, 0.0
+    def misfits(self, frames: FloatArray, back: bool, like: int | None = None) -> BoolArray:
+        """Say which frames show something else than most do, or than what came before.
+
+        Args:
+            frames: Shape (k, M, 3) [m].
+            back: Whether they end as what came before them went on: they are held against that.
+            like: Held against only so many of the last; all where not given.
+        """
+        if not len(frames):
+            return np.zeros(0, dtype=np.bool_)
+        seen = self._distances(frames)
+        middle = self._memory.near if back else _middle(seen[-(like or len(seen)) :])
+        off = np.abs(seen - middle) > self.config.unlike * middle + 10 * NOISE
+        known = np.maximum((np.isfinite(seen) & np.isfinite(middle)).sum(axis=1), 1)
+        wrong: BoolArray = 2 * off.sum(axis=1) > known
+        if back and np.isfinite(middle).any():
+            rules = self._pairs, self._memory, self._rules
+            for k in np.flatnonzero(~wrong):
+                wrong[k] = not goes_on(frames[k], *rules, int(k), 1.0)
+        elif not back:
+            places = _middle(frames.reshape(len(frames), -1)).reshape(frames.shape[1:])
+            way = _middle(np.linalg.norm(frames - places, axis=2).T)
+            wrong |= way > self._rules.reach_m * len(frames) + SHAKE
+        return wrong
+
+    def shows_body(self, frames: FloatArray) -> BoolArray:
+        """Say which frames, shape (k, M, 3), show what can be a person's body."""
+        return np.array([self._is_body(each[None], each) for each in self._distances(frames)])
+
+    @property
+    def absent(self) -> bool:
+        """Whether nobody was in sight for so long that it may be anybody by now."""
+        return bool(self._memory.counts[ABSENT] > self._rules.absent_frames)
+
+    @property
+    def newcomer(self) -> int:
+        """Number of the next person who is new, or the last of those who can be told apart."""
+        return min(self.n_people, self.config.max_people - 1)
+
+    def skip(self, frames: int) -> None:
+        """Let frames pass in which nothing was seen."""
+        self._memory.counts[ABSENT] += frames
+        self._memory.unseen[:] += frames
+        if self.absent:
+            self._memory.forget_distances()
+
+    def joins(self, frames: FloatArray) -> bool:
+        """Say whether frames, shape (k, M, 3), begin where the same person was before."""
+        if not len(frames):
+            return True
+        return not (self.absent or jumped(frames[0], self._memory, self._rules.reach_m, 0))
+
+    def stay(self, frames: FloatArray) -> None:
+        """Go on with the same person after a doubt, from the frames of it, shape (k, M, 3)."""
+        memory = self._memory
+        self._strikes = 0
+        memory.begin_block()
+        for _ in range(2):
+            memory.forget_distances()
+            memory.places[:] = np.nan
+            memory.counts[ABSENT] = 0
+            if follow_steadily(frames, self._pairs, memory, self._rules)[0] == len(frames):
+                break
+            frames = frames[:0]
+        memory.begin_block()
 
     def meet(self, person: int) -> None:
         """Go on with another person, or the first; somebody new has the number `n_people`."""
@@ -127,29 +225,46 @@ class BodyIdentity:
         self.person = person
         self.bodies.n_people = max(self.n_people, person + 1)
 
-    def _unchanged(self, seen: FloatArray) -> float:
+    def _distances(self, frames: FloatArray) -> FloatArray:
+        return np.array([distances_of(markers, self._pairs) for markers in frames])
+
+    def _is_body(self, seen: FloatArray, middle: FloatArray) -> bool:
+        """Say whether distances, shape (k, K) and their medians, can be those of one body."""
+        if np.count_nonzero(middle == middle) < max(4, len(middle) / 3):
+            return True  # for all that is seen
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # nothing is seen
+            ratio = np.maximum(middle, NOISE) / self._usual
+            size = float(np.nanmedian(ratio))
+            shape = float(np.nanmedian(np.abs(np.log(ratio / size))))
+            swing = np.nanmedian(np.abs(seen - middle), axis=0) / np.maximum(middle, 10 * NOISE)
+            return (
+                SMALLEST < size < LARGEST
+                and shape < self.config.misshapen
+                and float(np.nanmedian(swing)) < self.config.unlike
+            )
+
+    def _unchanged(self, seen: FloatArray, middle: FloatArray) -> float:
         """Return how well it explains frames in doubt that nothing has changed, shape (k, K).
 
-        Either the distances are what they were, on average, or they go on from where they were:
+        Either the distances are what they were, at the median, or they go on from where they were:
         bodies that are replaced jump.
         """
-        noise = self._spread * (1.0 / len(seen) + 0.5 * self._quick) + NOISE**2
-        glide = self._steps + (self.config.glide_m_s / self.rate_hz) ** 2
+        memory, rules = self._memory, self._rules
+        noise = memory.spread * (1.0 / len(seen) + 0.5 * rules.quick) + NOISE**2
+        glide = memory.steps + (self.config.glide_m_s / self.rate_hz) ** 2
         return max(
-            self.bodies.fit(_mean(seen), self._near, noise, self.config.slips),
-            self.bodies.fit(seen[0], self._last, glide, self.config.slips),
+            self.bodies.fit(middle, memory.near, noise, self.config.slips),
+            self.bodies.fit(seen[0], memory.last, glide, self.config.slips),
         )
 
-    def _remember(self, seen: FloatArray) -> bool:
-        """Take a frame into the current block; say whether blocks fit somebody else."""
-        known = seen == seen
-        self._sum += np.where(known, seen, 0.0)
-        self._seen += known
-        self._frames += 1
-        if self._frames < self.config.block_s * self.rate_hz or self.person < 0:
+    def _fits_another(self) -> bool:
+        """Learn from a block of time; say instead whether blocks fit somebody else by now."""
+        memory = self._memory
+        if self.person < 0:
             return False
-        mean = np.where(self._seen > 0, self._sum / np.maximum(self._seen, 1), np.nan)
-        self._sum[:], self._seen[:], self._frames = 0.0, 0.0, 0
+        mean = np.where(memory.seen > 0, memory.total / np.maximum(memory.seen, 1), np.nan)
+        memory.begin_block()
         if self.bodies.blocks[self.person] >= 4 and self.n_people > 1:
             scores = self.bodies.scores(mean)[: self.n_people]
             scores[self.person] += self.config.loyalty
@@ -157,31 +272,29 @@ class BodyIdentity:
             if self._strikes:
                 if self._strikes < self.config.strikes:
                     return False
-                self._near[:] = np.nan
+                memory.forget_distances()
                 return True
         self.bodies.learn(self.person, mean)
         return False
 
     def state(self) -> dict[str, Any]:
         """Return everything as plain values and arrays."""
-        plain = {name: getattr(self, name) for name in _PLAIN}
-        arrays = {name: getattr(self, name).copy() for name in _ARRAYS}
-        return plain | arrays | {"bodies": self.bodies.state()}
+        memory = {name: value.copy() for name, value in self._memory._asdict().items()}
+        plain = {"person": self.person, "strikes": self._strikes}
+        return plain | {"memory": memory, "bodies": self.bodies.state()}
 
     def load_state(self, state: dict[str, Any]) -> None:
         """Resume from what `state` returned."""
-        for name in _PLAIN:
-            setattr(self, name, int(state[name]))
-        for name in _ARRAYS:
-            setattr(self, name, np.array(state[name], dtype=np.float64))
+        self.person, self._strikes = int(state["person"]), int(state["strikes"])
+        self._memory = Memory(**{name: each.copy() for name, each in state["memory"].items()})
         self.bodies.load_state(state["bodies"])
 
 
-_PLAIN = ("person", "_unseen", "_frames", "_strikes")
-_ARRAYS = ("_near", "_last", "_steps", "_spread", "_sum", "_seen")
+NOBODY = -2
 
 
-def _mean(seen: FloatArray) -> FloatArray:
-    """Return the mean over frames, shape (k, K) to (K,); NaN where nothing is seen."""
-    count = (seen == seen).sum(axis=0)
-    return np.where(count > 0, np.nan_to_num(seen).sum(axis=0) / np.maximum(count, 1), np.nan)
+def _middle(seen: FloatArray) -> FloatArray:
+    """Return the median over frames, shape (k, K) to (K,); NaN where nothing is seen."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of a column of NaN
+        return np.asarray(np.nanmedian(seen, axis=0))

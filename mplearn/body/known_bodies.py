@@ -30,6 +30,12 @@ class IdentityConfig:
         slips: Share of a known person's distances that may differ as people do: markers slip, or
             are attached anew.
         glide_m_s: How fast skin and straps let distances change [m/s]; another body's jump.
+        fastest_m_s: No part of a person is faster [m/s].
+        back_s: For how long frames must go on from what was seen before, for a doubt to be over
+            [s].
+        unlike: By how much, as a share, a distance differs in a frame that shows something else.
+        misshapen: Median deviation of the logarithms of distances from those usual in people, at
+            which they are no person's.
     """
 
     max_people: int = 32
@@ -44,6 +50,10 @@ class IdentityConfig:
     caution: float = 0.4
     slips: float = 0.03
     glide_m_s: float = 0.15
+    fastest_m_s: float = 15.0
+    back_s: float = 0.03
+    unlike: float = 0.1
+    misshapen: float = 0.35
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from mplearn.errors import BodyError, FrameError, InvalidValueError
-from mplearn.recording import FloatArray
+from mplearn.recording import BoolArray, FloatArray
 
+from .axes import Axes, axes_changed
 from .body import Body
 from .features import feature_channels, features_of
-from .first_posture import TooFewMarkersError
-from .identity import BodyIdentity, IdentityConfig
-from .inverse_kinematics import IKConfig
+from .identity import NOBODY, BodyIdentity, IdentityConfig
+from .inverse_kinematics import FEWEST_MARKERS, IKConfig
 from .resuming import ResumingKinematics
 from .robot import robot_body
 
@@ -22,6 +23,36 @@ if TYPE_CHECKING:
     from mplearn.mocap.gaps import GapTracker
 
 PATIENCE = 5  # times the calibration's length that a stream may take to show its markers
+FARTHEST = 1e9  # no marker is, in any unit
+NEWCOMER = 2  # times that length for which another body must be seen to be somebody new's
+ODD = "the markers are not where they can be on this person"
+NO_BODY = "the markers are not where they can be on any person"
+BRIEF = "another body was seen for too short a time to be a person"
+UNSEEN = "too few markers are in sight"
+
+
+class Watched(NamedTuple):
+    """What became of frames.
+
+    Attributes:
+        features: Of the robot's posture, of one person, shape (k, D).
+        lost: Which of them only go on from what was seen before, shape (k,).
+        why: The reason, where some are lost, or dropped.
+        dropped: Frames before these that have no features: nobody could be measured in them.
+        error: Why not.
+        joins: Whether the features go on from those before.
+        moved: A change of the stream's axes that was found, and is undone from here on.
+        taken: How many of the frames given were taken.
+    """
+
+    features: FloatArray
+    lost: BoolArray
+    why: str = ""
+    dropped: int = 0
+    error: BodyError | None = None
+    joins: bool = True
+    moved: Axes | None = None
+    taken: int = 0
 
 
 class MotionObserver:
@@ -33,7 +64,9 @@ class MotionObserver:
 
     Where another body seems to stand there (`BodyIdentity`), frames are held back for a tenth of a
     second, until it is known whose they are: a known person is followed on the body that was fitted
-    before; to a newcomer one is fitted, from as many frames as to the first.
+    before; to a newcomer one is fitted, from twice as many frames. Frames that show what
+    no person can do count as unseen, and where only the stream's axes or its unit have changed,
+    that is undone (`axes`).
 
     Args:
         marker_names: Names of the M markers of every frame.
@@ -46,6 +79,7 @@ class MotionObserver:
 
     Attributes:
         identity: Who is there, and who is known.
+        axes: What of a stream's changes of axes and unit is undone; None for nothing.
         arrivals: How often somebody came, or came back: features before and after do not join.
         channels: Names of the features; see `feature_channels`.
         ik: The inverse kinematics, for residuals and uncertainty.
@@ -77,7 +111,10 @@ class MotionObserver:
         self.identity = BodyIdentity(self.marker_names, self.rate_hz, identity)
         self._known: dict[int, dict[str, Any]] = {}  # each person's body, as last seen
         self._gaps: GapTracker | None = None
+        self.axes: Axes | None = None
         self._held: list[FloatArray] = []
+        self._sound: list[bool] = []  # of the held frames, while somebody is measured
+        self._measuring = True
         self._last_pitch = 0.0
         self.arrivals = 0
         self._begin()
@@ -89,11 +126,12 @@ class MotionObserver:
 
     def restart(self) -> None:
         """Begin another stream: whoever comes is measured again, and recognised."""
-        if not self._measuring:
+        if self.identity.person >= 0:
             self._known[self.identity.person] = self.ik.state()
         self.identity.leave()
-        self.ik.load_state({"calibration": None})
-        self._held.clear()
+        self.axes = None
+        self._measuring = True
+        self._release()
         self._begin()
 
     def update(self, frame: FloatArray) -> FloatArray:
@@ -118,23 +156,28 @@ class MotionObserver:
             )
         if np.isinf(frame).any():
             raise FrameError("a frame holds infinite values; a missing marker is NaN")
-        markers = frame.reshape(-1, 3)
-        if not self._measuring:
-            if not self._held and not self.identity.doubts(markers):
-                return self._follow(markers[None])
-            self._held.append(markers.copy())
-            return self._decide()
-        self._held.append(markers.copy())
-        if len(self._held) % self._needed:
-            return self._nothing
-        try:
-            return self.flush()
-        except BodyError as error:
-            if isinstance(error, TooFewMarkersError) or self._known:
-                if len(self._held) < PATIENCE * self._needed:
-                    return self._nothing
-                self._held.clear()
-            raise
+        return self._features(self.watch(frame[None]))
+
+    def watch(self, frames: FloatArray) -> Watched:
+        """Take the first of some frames, as many as belong together, and say what became of them.
+
+        Args:
+            frames: Shape (T, 3M) [m], T > 0; NaN where missing.
+        """
+        markers = _possible(frames).reshape(len(frames), -1, 3)
+        if self.axes is not None:
+            markers = self.axes.undo(markers)
+        if not self._measuring and not self._held:
+            steady = self.identity.follow(markers)
+            if steady:
+                return self._follow(markers[:steady])._replace(taken=steady)
+        self._held.append(markers[0].copy())
+        if self._measuring:
+            self._sound.append(bool(self.identity.shows_body(markers[:1])[0]))
+            watched = self._measure()
+        else:
+            watched = self._decide()
+        return watched._replace(taken=1)
 
     def flush(self) -> FloatArray:
         """Return the features of what is held back, as at the end of a stream, shape (k, D).
@@ -142,16 +185,21 @@ class MotionObserver:
         Raises:
             BodyError: The gathered frames are no calibration, with the reason.
         """
+        return self._features(self.finish())
+
+    def finish(self) -> Watched:
+        """Say what became of the frames that are held back, as at the end of a stream."""
         if not self._held:
             return self._nothing
         held = np.array(self._held)
-        if self._measuring:
-            self.ik.calibrate(held[-PATIENCE * self._needed :])
-            self._meet(held)
-        else:
-            self.identity.stay()
-        self._held.clear()
-        return self._follow(held)
+        if not self._measuring:
+            return self._go_on(held, self.identity.misfits(held, back=True))
+        if self.identity.person >= 0 and sum(self._sound) < self._needed:
+            return self._lose(held, BRIEF)
+        try:
+            return self._meet(held)
+        except BodyError as error:
+            return self._give_up(held, error)
 
     def observe(self, frames: FloatArray) -> FloatArray:
         """Return the features of a whole recording, shape (T, 3M) to (T, D), as the loop does."""
@@ -163,15 +211,18 @@ class MotionObserver:
 
     @property
     def _needed(self) -> int:
-        return max(2, round(self.calibration_s * self.rate_hz))
+        """Frames from which a person is measured: a newcomer must have stood there for longer."""
+        longer = NEWCOMER if self.identity.person >= 0 else 1
+        return longer * max(2, round(self.calibration_s * self.rate_hz))
 
     @property
-    def _measuring(self) -> bool:
-        return self.ik.calibration is None
+    def _nothing(self) -> Watched:
+        return Watched(np.empty((0, len(self.channels))), np.zeros(0, dtype=np.bool_))
 
-    @property
-    def _nothing(self) -> FloatArray:
-        return np.empty((0, len(self.channels)))
+    def _features(self, watched: Watched) -> FloatArray:
+        if watched.error is not None and not len(watched.features):
+            raise watched.error
+        return watched.features
 
     def _begin(self) -> None:
         """Begin with another body."""
@@ -181,49 +232,148 @@ class MotionObserver:
 
             self._gaps = GapTracker(len(self.marker_names), self.rate_hz)
 
-    def _decide(self) -> FloatArray:
+    def _release(self) -> None:
+        self._held.clear()
+        self._sound.clear()
+
+    def _decide(self) -> Watched:
         """Find out whose frames are held back, if there are enough of them."""
         look, held = self.identity.look_frames, np.array(self._held)
+        if self.identity.returned(held):
+            return self._go_on(held, self.identity.misfits(held, back=True))
         if len(held) < look:
             return self._nothing
-        person = self.identity.decide(held)
+        change = self._axes_changed(held)
+        if change is not None:
+            self.axes = change if self.axes is None else self.axes.then(change)
+            held = change.undo(held)
+            return self._go_on(held, self.identity.misfits(held, back=True))._replace(moved=change)
+        person = self.identity.decide(held[-look:])
         if person is None and len(held) < PATIENCE * look:
             return self._nothing
+        if person == NOBODY:
+            return self._lose(held[: len(held) - look // 2], NO_BODY)
+        wrong = self.identity.misfits(held, back=False)
         if person is None or person == self.identity.person:
-            self.identity.stay()
-        else:
-            self._known[self.identity.person] = self.ik.state()
-            self._begin()
-            if person not in self._known:
-                self.ik.load_state({"calibration": None})
-                return self._nothing
-            seen = np.isfinite(held).all(axis=2).sum(axis=1)
-            self.ik.resume(self._known[person], held[int(np.argmax(seen >= 0.9 * seen.max()))])
-            self._take_up(person, held)
-        self._held.clear()
-        return self._follow(held)
+            return self._go_on(held, wrong)
+        if person in self._known:
+            return self._change(person, held, wrong)
+        self._measuring = True
+        self._sound = [not each for each in wrong]
+        return self._nothing
 
-    def _meet(self, held: FloatArray) -> None:
-        """Find out who it is that was measured."""
+    def _axes_changed(self, held: FloatArray) -> Axes | None:
+        """Return the change of the stream's axes that explains frames in doubt, if one does."""
+        if self.identity.absent or self.identity.went_on(held):
+            return None
+        change = axes_changed(held[0], self.identity.places)
+        fits = change is not None and self.identity.went_on(change.undo(held))
+        return change if fits else None
+
+    def _go_on(self, held: FloatArray, wrong: BoolArray) -> Watched:
+        """Go on with the same person after a doubt."""
+        self.identity.skip(int(np.argmin(wrong)))
+        joins = self.identity.joins(held[~wrong])
+        if not joins:
+            self._begin()
+            self.ik.resume(self.ik.state(), _fullest(held[~wrong]))
+        self.identity.stay(held[~wrong])
+        self._measuring = False
+        self._release()
+        return self._follow(held, wrong, ODD)._replace(joins=joins)
+
+    def _change(self, person: int, held: FloatArray, wrong: BoolArray) -> Watched:
+        """Go on with somebody else who is known."""
+        self._known[self.identity.person] = self.ik.state()
+        self._begin()
+        self.ik.resume(self._known[person], _fullest(held[~wrong]))
+        self._measuring = False
+        self._take_up(person, held[~wrong])
+        self._release()
+        return self._follow(held, wrong, ODD)._replace(joins=False)
+
+    def _lose(self, lost: FloatArray, why: str) -> Watched:
+        """Let frames pass as if nothing had been seen in them; later ones stay held back."""
+        self._measuring = False
+        self._held = self._held[len(lost) :]
+        self._sound.clear()
+        self.identity.skip(len(lost))
+        return self._follow(lost, np.ones(len(lost), dtype=np.bool_), why)
+
+    def _measure(self) -> Watched:
+        """Measure who is there, once there are enough frames; unless somebody known is back."""
+        before, look = self.identity.person, self.identity.look_frames
+        if before >= 0 and len(self._held) % look == 0:
+            person = self.identity.decide(np.array(self._held[-look:]))
+            if person is not None and 0 <= person < self.identity.n_people:
+                held = np.array(self._held)
+                wrong = self.identity.misfits(held, back=False, like=look)
+                if person == before:
+                    return self._go_on(held, wrong)
+                return self._change(person, held, wrong)
+        error: BodyError | None = None
+        given_up = len(self._held) >= PATIENCE * self._needed
+        if given_up or (self._sound[-1] and sum(self._sound) % self._needed == 0):
+            try:
+                return self._meet(np.array(self._held))
+            except BodyError as failed:
+                error = failed
+        if given_up and error is not None:
+            return self._give_up(np.array(self._held), error)
+        return self._nothing
+
+    def _give_up(self, held: FloatArray, error: BodyError) -> Watched:
+        """Lose frames to which no body could be fitted."""
+        if self.identity.person >= 0:
+            return self._lose(held, str(error))._replace(error=error)
+        self._release()
+        return self._nothing._replace(dropped=len(held), why=str(error), error=error)
+
+    def _meet(self, held: FloatArray) -> Watched:
+        """Fit a body to the frames that are held back, and find out whose it is.
+
+        Raises:
+            BodyError: None fits, with the reason; nothing has changed then.
+        """
+        sound = np.array(self._sound)
+        if 2 * sound.sum() < self._needed:
+            sound[:] = True  # nothing is: the reason is told by trying, or there are too few
+        wrong = ~sound
+        wrong[sound] = self.identity.misfits(held[sound], back=False)
+        if self.identity.person >= 0:
+            self._known[self.identity.person] = self.ik.state()
+        self.ik.calibrate(held[~wrong][-PATIENCE * self._needed :])
+        self._begin()
         self.identity.leave()
-        person = self.identity.decide(held)
-        self._take_up(0 if person is None else person, held)
+        person = self.identity.decide(held[~wrong])
+        if person is None or not 0 <= person < self.identity.n_people:
+            person = self.identity.newcomer
+        self._measuring = False
+        self._take_up(person, held[~wrong])
+        self._release()
+        return self._follow(held, wrong, ODD)._replace(joins=False)
 
     def _take_up(self, person: int, held: FloatArray) -> None:
         self.identity.meet(person)
         for markers in held:
-            self.identity.doubts(markers)
+            self.identity.follow(markers[None])
         self._known.setdefault(person, self.ik.state())
         self.arrivals += 1
 
-    def _follow(self, frames: FloatArray) -> FloatArray:
+    def _follow(self, frames: FloatArray, wrong: BoolArray | None = None, why: str = "") -> Watched:
+        """Return the features of frames, shape (k, M, 3); what is wrong is not looked at."""
+        if wrong is None:
+            wrong = np.zeros(len(frames), dtype=np.bool_)
+        frames = np.where(wrong[:, None, None], np.nan, frames)
+        filled = frames
         if self._gaps is not None:
-            frames = np.array([self._gaps.update(markers) for markers in frames])
-        features = features_of(np.array([self.ik.update(markers) for markers in frames]), self.body)
+            filled = np.array([self._gaps.update(markers) for markers in frames])
+        features = features_of(np.array([self.ik.update(markers) for markers in filled]), self.body)
         for row in features:  # the pitch is an angle of the whole circle: keep it continuous
             row[2] += 2 * np.pi * np.round((self._last_pitch - row[2]) / (2 * np.pi))
             self._last_pitch = float(row[2])
-        return features
+        unseen = np.isfinite(frames).all(axis=2).sum(axis=1) < FEWEST_MARKERS
+        return Watched(features, unseen, why=why if wrong.any() else UNSEEN)
 
     def unite(self, other: MotionObserver) -> dict[int, int]:
         """Take over the people whom another has seen; return their numbers here."""
@@ -239,6 +389,9 @@ class MotionObserver:
             "ik": self.ik.state(),
             "gaps": None if self._gaps is None else self._gaps.state(),
             "held": np.array(self._held).reshape(-1, len(self.marker_names), 3),
+            "sound": list(self._sound),
+            "measuring": self._measuring,
+            "axes": None if self.axes is None else asdict(self.axes),
             "last_pitch": self._last_pitch,
             "arrivals": self.arrivals,
             "identity": self.identity.state(),
@@ -251,7 +404,23 @@ class MotionObserver:
         if self._gaps is not None:
             self._gaps.load_state(state["gaps"])
         self._held = list(np.array(state["held"], dtype=np.float64))
+        self._sound = [bool(each) for each in state["sound"]]
+        self._measuring = bool(state["measuring"])
+        self.axes = None if state["axes"] is None else Axes(**state["axes"])
         self._last_pitch = float(state["last_pitch"])
         self.arrivals = int(state["arrivals"])
         self.identity.load_state(state["identity"])
         self._known = {int(person): kept for person, kept in state["known"]}
+
+
+def _possible(frames: FloatArray) -> FloatArray:
+    """Return frames with NaN for what is no place in any unit."""
+    with np.errstate(invalid="ignore"):
+        absurd = np.abs(frames) > FARTHEST
+    return np.where(absurd, np.nan, frames) if absurd.any() else frames
+
+
+def _fullest(frames: FloatArray) -> FloatArray:
+    """Return the first of some frames, shape (k, M, 3), in which nearly most markers are seen."""
+    seen = np.isfinite(frames).all(axis=2).sum(axis=1)
+    return np.asarray(frames[int(np.argmax(seen >= 0.9 * seen.max()))])

@@ -2,7 +2,9 @@
 
 from .config import LearnerConfig as LearnerConfig
 from .events import Anomaly as Anomaly
+from .events import AxesChanged as AxesChanged
 from .events import Event as Event
+from .events import FramesLost as FramesLost
 from .events import PersonChanged as PersonChanged
 from .events import PrimitiveBorn as PrimitiveBorn
 from .events import PrimitiveMerged as PrimitiveMerged

@@ -45,6 +45,22 @@ class StreamChecks:
             )
         return frame
 
+    def frames(self, frames: FloatArray) -> FloatArray:
+        """Return many frames as an array, shape (T, D), whatever their values.
+
+        Raises:
+            FrameError: They have another shape.
+        """
+        try:
+            frames = np.asarray(frames, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise FrameError(f"frames must hold numbers, not {frames!r:.60}") from error
+        if frames.ndim != 2 or frames.shape[1] != len(self.channels):
+            raise FrameError(
+                f"frames must have shape (T, {len(self.channels)}), not {frames.shape}"
+            )
+        return frames
+
     def clock(self, before_s: float | None, time_s: float) -> None:
         """Check a frame's time against that of the frame before it, if there is one [s].
 

@@ -119,6 +119,37 @@ class PersonChanged:
 
 
 @dataclass(frozen=True)
+class FramesLost:
+    """Nothing was learned from a stretch of the stream, for it shows what cannot be.
+
+    A short stretch is bridged: the motion goes on through it. Where it lasts longer, the motion
+    that was going on counts as lost too, and what comes next does not follow what came.
+
+    Attributes:
+        start: First frame.
+        end: One past the last.
+        reason: What is wrong with it.
+    """
+
+    start: int
+    end: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class AxesChanged:
+    """The stream's origin, axes or unit changed, and nobody moved: it is undone from here on.
+
+    Attributes:
+        frame: First frame that was found so.
+        size: Size of its unit, relative to the stream's at its start.
+    """
+
+    frame: int
+    size: float
+
+
+@dataclass(frozen=True)
 class Anomaly:
     """Something out of the ordinary.
 
@@ -146,4 +177,6 @@ Event: TypeAlias = (
     | TransitionSeen
     | Anomaly
     | PersonChanged
+    | FramesLost
+    | AxesChanged
 )

@@ -6,27 +6,28 @@ frame of markers -> gap tracking -> inverse kinematics -> segmentation -> tree -
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
-from ..body import BodyView, MotionObserver, view_of
-from ..errors import BodyError
+from ..body import BodyView, MotionObserver, Watched, view_of
 from ..graph import TransitionGraph
 from ..library import MotionNovelty, PrimitiveLibrary
 from ..people import PeopleTree
-from ..recording import FloatArray, Recording, Segment, are_markers
+from ..recording import BoolArray, FloatArray, Recording, Segment, are_markers
 from ..segmentation import make_segmenter
 from ..tree import Change, MirrorMap, Placement
+from .absurd import AbsurdFrames
 from .buffer import FrameBuffer
 from .chain import Chain
 from .checks import StreamChecks
 from .config import LearnerConfig
 from .events import (
     Anomaly,
+    AxesChanged,
     Event,
+    FramesLost,
     PersonChanged,
     PrimitiveBorn,
     PrimitiveMerged,
@@ -40,6 +41,8 @@ from .snapshot import library_of
 STILL_M = (
     0.02  # a segment in which no part of the body, and no joint's lever, goes farther: a pause
 )
+BRIDGED_S = 0.3  # a motion goes on through what is lost, if it is no longer
+ABSURD = "a value is not finite, or far beyond all that was seen"
 
 
 class MotionLearner:
@@ -80,7 +83,8 @@ class MotionLearner:
         self._clock_s: float | None = None
         self._person = -1
         self._n_people = 0
-        self._arrivals = 0
+        self._lost_from, self._lost_why = -1, ""
+        self._absurd = AbsurdFrames(len(config.channels), config.rate_hz)
 
     @property
     def person(self) -> int:
@@ -106,16 +110,19 @@ class MotionLearner:
         frame = self._checks.frame(frame)
         if time_s is not None:
             self._checks.clock(self._clock_s, time_s)
-        features = frame[None] if self._observer is None else self._observer.update(frame)
         self._clock_s = time_s
-        return self._take(features)
+        return self._watch(frame[None])
 
     def learn_many(self, frames: FloatArray) -> list[Event]:
-        """Take many frames, shape (T, D): bit-identical to `learn_one` in a loop."""
-        events: list[Event] = []
-        for frame in frames:
-            events.extend(self.learn_one(frame))
-        return events
+        """Take many frames, shape (T, D): bit-identical to `learn_one` in a loop.
+
+        But frames that `learn_one` refuses because they are not finite are lost (`FramesLost`), and
+        cost nothing else.
+
+        Raises:
+            FrameError: The frames have the wrong width.
+        """
+        return self._watch(self._checks.frames(frames))
 
     def learn_recording(self, recording: Recording) -> Iterator[list[Event]]:
         """Learn a recording as a stream of its own; yield the events of each frame.
@@ -129,18 +136,19 @@ class MotionLearner:
         self._checks.recording(recording)
         if self.n_frames > self._stream_start:
             yield self.end_stream()
-        for frame in recording.frames:
-            yield self.learn_one(frame)
+        for frame in self._checks.frames(recording.frames):
+            yield self._watch(frame[None])
         yield self.end_stream()
 
     def end_stream(self) -> list[Event]:
         """Close what is open: what comes next is another stream, perhaps of another person."""
         events: list[Event] = []
         if self._observer is not None:
-            with suppress(BodyError):  # too short a stream to know whose it was
-                events = self._take(self._observer.flush())
+            events = self._take(self._observer.finish())
             self._observer.restart()
+        events += self._found()
         events += self._cut()
+        self._absurd = AbsurdFrames(len(self.config.channels), self.config.rate_hz)
         self._clock_s = None
         return events
 
@@ -196,6 +204,8 @@ class MotionLearner:
             "graph": self.graph.state(),
             "chain": self._chain.state(),
             "clock_s": self._clock_s,
+            "lost_why": self._lost_why,
+            "absurd": self._absurd.state(),
             **{name.lstrip("_"): getattr(self, name) for name in _COUNTS},
         }
 
@@ -211,6 +221,8 @@ class MotionLearner:
         learner.graph.load_state(state["graph"])
         learner._chain.load_state(state["chain"])
         learner._clock_s = state["clock_s"]
+        learner._lost_why = str(state["lost_why"])
+        learner._absurd.load_state(state["absurd"])
         for name in _COUNTS:
             setattr(learner, name, int(state[name.lstrip("_")]))
         return learner
@@ -227,29 +239,102 @@ class MotionLearner:
         names = tuple(channel[:-2] for channel in self.config.channels[::3])
         return MotionObserver(names, self.config.rate_hz)
 
-    def _take(self, features: FloatArray) -> list[Event]:
-        """Take features that are ready, shape (k, D), all of one person."""
-        if not len(features):
-            return []
+    def _watch(self, frames: FloatArray) -> list[Event]:
+        """Take frames of the stream, shape (T, D)."""
+        if self._observer is None:
+            held, absurd = self._absurd.hold(frames)
+            return self._pass_on(held, absurd, ABSURD)
         events: list[Event] = []
+        while len(frames):
+            watched = self._observer.watch(frames)
+            events += self._take(watched)
+            frames = frames[watched.taken :]
+        return events
+
+    def _take(self, watched: Watched) -> list[Event]:
+        """Take what became of frames of markers."""
+        events: list[Event] = []
+        if watched.dropped:
+            events += self._cut()
+            self._begin_loss(watched.why)
+            self._skip(watched.dropped)
         observer = self._observer
-        if observer is not None and observer.arrivals != self._arrivals:
-            events = self._cut() if self.n_frames > self._stream_start else []
+        if not watched.joins and observer is not None:
+            events += self._cut() if self.n_frames > self._stream_start else []
             before, self._person = self._person, observer.person
-            self._arrivals = observer.arrivals
             if before not in (-1, self._person):
                 new = self._person >= self._n_people
                 events.append(PersonChanged(self.n_frames, self._person, new))
             self._n_people = max(self._n_people, self._person + 1)
-        return events + self._learn(features)
+        if watched.moved is not None and observer is not None and observer.axes is not None:
+            events.append(AxesChanged(self.n_frames, 1.0 / observer.axes.size))
+        return events + self._pass_on(watched.features, watched.lost, watched.why)
+
+    def _pass_on(self, rows: FloatArray, lost: BoolArray, why: str) -> list[Event]:
+        """Learn rows that are ready, shape (k, D), and bridge those that are lost, if they are few.
+
+        Where they are many, the motion that is going on is lost with them.
+        """
+        events: list[Event] = []
+        while len(rows):
+            same = lost != lost[0]
+            n = int(np.argmax(same)) if same.any() else len(rows)
+            if not lost[0]:
+                events += self._found()
+                events += self._learn(rows[:n])
+            else:
+                self._begin_loss(why)
+                bridged = self._bridged(rows[:n])
+                if bridged:
+                    events += self._learn(rows[:bridged])
+                if bridged < n:
+                    self._leave_open()
+                    self._skip(n - bridged)
+            rows, lost = rows[n:], lost[n:]
+        return events
+
+    def _bridged(self, rows: FloatArray) -> int:
+        """Return how many of some lost rows still are a short stretch; none before the first."""
+        if np.isnan(rows).any() or self.n_frames == self._stream_start:
+            return 0
+        room = round(BRIDGED_S * self.config.rate_hz) - (self.n_frames - self._lost_from)
+        return min(max(room, 0), len(rows))
+
+    def _begin_loss(self, why: str) -> None:
+        if self._lost_from < 0:
+            self._lost_from, self._lost_why = self.n_frames, why
+
+    def _skip(self, frames: int) -> None:
+        """Let frames pass from which nothing can be learned."""
+        self.n_frames += frames
+        self._stream_start = self.n_frames
+
+    def _found(self) -> list[Event]:
+        """Say what was lost, if that is over."""
+        if self._lost_from < 0:
+            return []
+        lost, self._lost_from = FramesLost(self._lost_from, self.n_frames, self._lost_why), -1
+        return [lost]
+
+    def _leave_open(self) -> None:
+        """Give up the motion that is going on; what comes next does not follow it."""
+        if self.n_frames == self._stream_start:
+            return
+        open_from = self._buffer.first + self._stream_start
+        self._lost_from = min(self._lost_from, open_from)
+        self._segmenter.flush()
+        self._begin_stream()
 
     def _cut(self) -> list[Event]:
         """Close what is open; what comes next does not follow it."""
         events = [e for segment in self._segmenter.flush() for e in self._close(segment)]
+        self._begin_stream()
+        return events
+
+    def _begin_stream(self) -> None:
         self._stream_start = self.n_frames
         self._buffer = FrameBuffer(self._buffer.n_channels)
         self._chain.broken()
-        return events
 
     def _learn(self, features: FloatArray) -> list[Event]:
         """Take features that are ready, shape (k, D)."""
@@ -304,4 +389,4 @@ class MotionLearner:
         return [Anomaly(segment, "motion", *found)] if found.p_value <= allowed else []
 
 
-_COUNTS = ("n_frames", "_stream_start", "_person", "_n_people", "_arrivals")
+_COUNTS = ("n_frames", "_stream_start", "_person", "_n_people", "_lost_from")

@@ -69,6 +69,8 @@ def run(args: argparse.Namespace) -> None:
         config = replace(config, segmenter=args.segmenter)
     learner = MotionLearner(config)
     log = learn(learner, recordings, console)
+    if log.n_lost == learner.n_frames:
+        raise RecordingError(f"nothing can be learned from {args.data}: {log.reasons}")
     library = learner.snapshot()
     args.out.parent.mkdir(parents=True, exist_ok=True)
     library.save(args.out)
@@ -78,3 +80,8 @@ def run(args: argparse.Namespace) -> None:
         f"of motion in {len(log.moving)} segments, {log.times_real_time:.0f} x real time; "
         f"written to {args.out}"
     )
+    if log.lost:
+        console.print(
+            f"{log.n_lost / first.rate_hz:.1f} s in {len(log.lost)} stretches were left out: "
+            f"{log.reasons}"
+        )

@@ -1,0 +1,80 @@
+"""Frames of plain channels that cannot be: they are held at what was seen before."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from ..recording import BoolArray, FloatArray, IntArray
+
+FACTOR = 1000.0  # times the largest value so far that a value can be, or times one
+PATIENCE_S = 0.5  # after so long it is believed
+
+
+class AbsurdFrames:
+    """Finds frames that hold a value that is not finite, or far beyond all that was seen.
+
+    Args:
+        n_channels: Width of a frame.
+        rate_hz: Frames per second [1/s].
+    """
+
+    def __init__(self, n_channels: int, rate_hz: float) -> None:
+        self._last = np.full(n_channels, np.nan)
+        self._largest = np.ones(1)
+        self._in_a_row = np.zeros(1, dtype=np.int64)
+        self._patience = max(1, round(PATIENCE_S * rate_hz))
+
+    def hold(self, frames: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Return frames, shape (T, D), the absurd ones held at the one before; and which they are.
+
+        Before the first frame that can be, they stay what they are.
+        """
+        held, absurd = frames.copy(), np.zeros(len(frames), dtype=np.bool_)
+        _hold(held, absurd, self._last, self._largest, self._in_a_row, self._patience)
+        return held, absurd
+
+    def state(self) -> dict[str, Any]:
+        """Return everything as plain values and arrays."""
+        return {
+            "last": self._last.copy(),
+            "largest": float(self._largest[0]),
+            "in_a_row": int(self._in_a_row[0]),
+        }
+
+    def load_state(self, state: dict[str, Any]) -> None:
+        """Resume from what `state` returned."""
+        self._last = np.array(state["last"], dtype=np.float64)
+        self._largest[0], self._in_a_row[0] = state["largest"], state["in_a_row"]
+
+
+@njit(cache=True)
+def _hold(
+    frames: FloatArray,
+    absurd: BoolArray,
+    last: FloatArray,
+    largest: FloatArray,
+    in_a_row: IntArray,
+    patience: int,
+) -> None:
+    for t in range(len(frames)):
+        highest, finite = 0.0, True
+        for d in range(frames.shape[1]):
+            size = abs(frames[t, d])
+            finite &= size <= BEYOND  # not for NaN
+            highest = max(highest, size)
+        far = finite and highest > FACTOR * largest[0] and last[0] == last[0]
+        if not finite or (far and in_a_row[0] < patience):
+            in_a_row[0] += 1
+            absurd[t] = True
+            if last[0] == last[0]:
+                frames[t] = last
+            continue
+        in_a_row[0] = 0
+        largest[0] = max(largest[0], highest)
+        last[:] = frames[t]
+
+
+BEYOND = 1e100  # squares of larger numbers are not finite
