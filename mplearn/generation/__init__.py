@@ -2,7 +2,6 @@
 
 from .dynamics import Dynamics as Dynamics
 from .dynamics import estimate_dynamics as estimate_dynamics
-from .filters import lowpass as lowpass
 from .gaps import gaps_filled as gaps_filled
 from .generate import generate as generate
 from .retime import retime as retime

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..hmm import LeftRightHMM
+from ..maths.filters import lowpass
 from ..recording import FloatArray, IntArray
-from .filters import lowpass
 
 _CUTOFF_HZ = 6.0  # of human motion; what is faster in an exemplar's derivatives is noise
 _FLOOR = 0.02  # least standard deviation within a state, as a share of that over the motion

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import InvalidValueError
+from ..maths.filters import lowpass
 from ..recording import FloatArray
-from .filters import lowpass
 from .schedule import GenerativePrimitive, schedule
 from .styles import STYLES, Request, StyleName, from_start
 from .trajectory import Trajectory

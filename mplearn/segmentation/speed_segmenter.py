@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import FrameError, InvalidValueError
+from ..maths.filters import butterworth
 from ..recording import FloatArray, Segment
 from .base import Segmenter
-from .kernels import design_low_pass
 from .speed import STILL, ZeroVelocityConfig, all_low, initial_state, running_speed, settings_of
 
 
@@ -39,9 +39,11 @@ class SpeedSegmenter(Segmenter):
             raise InvalidValueError(f"rate_hz must lie in [10, 1000], not {rate_hz}")
         self.n_channels = n_channels
         self.rate_hz = rate_hz
-        low_pass = design_low_pass(speed.cutoff_hz, rate_hz)
-        self._filter = low_pass.coefficients
-        self._settings = settings_of(speed, rate_hz, low_pass.lag_frames)
+        gain, a1, a2, delay = butterworth(min(speed.cutoff_hz, 0.4 * rate_hz), rate_hz)
+        self._filter = np.array([gain, 2.0 * gain, gain, a1, a2, rate_hz])
+        self._settings = settings_of(
+            speed, rate_hz, delay + 0.5
+        )  # a difference is half a frame late
         self._out = np.zeros((1, 5))
 
     def _reset(self) -> None:

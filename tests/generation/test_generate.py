@@ -13,9 +13,9 @@ from mplearn.generation import (
     estimate_dynamics,
     gaps_filled,
     generate,
-    lowpass,
 )
 from mplearn.hmm import LeftRightHMM, fit
+from mplearn.maths.filters import lowpass
 
 RATE = 100.0
 CHANNELS = ("a", "b", "c")
@@ -188,18 +188,6 @@ def test_bad_requests_are_named():
             generate(PATH[:1], CHANNELS, RATE, **wrong)
     with pytest.raises(InvalidValueError, match="at least one primitive"):
         generate([], CHANNELS, RATE)
-
-
-def test_lowpass_keeps_ends_phase_and_slow_motion():
-    t = np.arange(400) / RATE
-    slow, fast = np.sin(2 * np.pi * 0.5 * t), np.sin(2 * np.pi * 20 * t)
-    filtered = lowpass(np.stack([slow, slow + fast, t], axis=1), RATE, 4.0)
-    np.testing.assert_allclose(filtered[:, 0], slow, atol=0.02)
-    np.testing.assert_allclose(filtered[30:-30, 1], slow[30:-30], atol=0.02)
-    np.testing.assert_allclose(filtered[:, 2], t, atol=1e-4)
-    np.testing.assert_array_equal(lowpass(slow[:, None], RATE, 60.0), slow[:, None])
-    halved = lowpass(np.sin(2 * np.pi * 4 * t)[:, None], RATE, 4.0)[150:250]
-    assert np.abs(halved).max() == pytest.approx(0.5, abs=0.02)
 
 
 def test_gaps_are_bridged_in_time_or_filled_from_the_model():

@@ -1,13 +1,11 @@
-"""Splines, banded matrices, filters and averages against scipy and whole matrices."""
+"""Splines, banded matrices and averages against scipy and whole matrices."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import make_interp_spline
-from scipy.signal import butter, sosfiltfilt
 
-from mplearn.generation import lowpass
 from mplearn.generation.averaging import average_of_motions, stretched
 from mplearn.generation.banded import factorise, multiply, solve
 from mplearn.generation.splines import interpolate
@@ -24,18 +22,6 @@ def test_a_spline_is_scipys(n_knots):
         degree = min(3, n_knots - 1)
         expected = make_interp_spline(np.arange(n_knots), knots, k=degree)(places)
     np.testing.assert_allclose(interpolate(knots, places), expected, atol=1e-12)
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.integers(3, 200), st.floats(0.3, 49.0), st.integers(0, 2**32))
-def test_the_filter_is_scipys(n_frames, cutoff_hz, seed):
-    frames = np.cumsum(np.random.default_rng(seed).standard_normal((n_frames, 2)), axis=0)
-    pad = min(n_frames - 1, int(np.ceil(200 / cutoff_hz)))
-    sections = butter(2, cutoff_hz, fs=100, output="sos")
-    expected = sosfiltfilt(sections, frames, axis=0, padtype="odd", padlen=pad)
-    np.testing.assert_allclose(
-        lowpass(frames, 100.0, cutoff_hz), expected, atol=1e-9 * np.abs(frames).max()
-    )
 
 
 def whole(columns):

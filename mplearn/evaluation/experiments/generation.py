@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ... import hmm
-from ...generation import generate, lowpass
+from ...generation import generate
 from ...library import Primitive
+from ...maths.filters import lowpass
 from ...recording import FloatArray, Recording
 from ..executions import split_repetitions
 from ..observing import observe
