@@ -11,12 +11,10 @@ from numba import njit
 from mplearn.maths.plane import turn_in_plane
 from mplearn.maths.yaw_roll_pitch import roll_pitch_of, yaw_of
 from mplearn.recording import FloatArray, IntArray
-from mplearn_envs.mechanics.reference import sole_corners
 from mplearn_envs.mechanics.support import convex_hull, support_margin
+from mplearn_envs.robot.feet import TOUCHES_M, sole_corners
 
 from .simulation import Simulation
-
-_DOWN_M = 0.015  # a corner of a sole that is lower than this above the floor supports
 
 
 class Measured(NamedTuple):
@@ -51,7 +49,7 @@ class Sensors:
         self.simulation = simulation
         robot = simulation.robot
         self._feet = np.array([simulation.model.body(name).id for name in robot.feet])
-        self._corners = sole_corners(robot)
+        self._corners = sole_corners(simulation.model)
 
     def at(self, q: FloatArray, velocity: FloatArray | None = None) -> Measured:
         """Put the robot into a posture and measure it there.
@@ -122,7 +120,7 @@ def _read(
     down = np.empty((8, 2))
     n = 0
     for k in range(8):
-        if soles[k, 2] < _DOWN_M:
+        if soles[k, 2] < TOUCHES_M:
             x, y = turn_in_plane(soles[k, 0] - middle_x, soles[k, 1] - middle_y, -yaw)
             down[n, 0], down[n, 1] = x, y
             n += 1

@@ -13,9 +13,10 @@ from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray
 from mplearn_envs.control.ankle_feedback import make_ankle_feedback
 from mplearn_envs.mechanics.gravity import standing_commands
-from mplearn_envs.mechanics.reference import rest_reference, sole_corners
+from mplearn_envs.mechanics.reference import rest_reference
 from mplearn_envs.planning.plan import Plan
 from mplearn_envs.robot import Robot
+from mplearn_envs.robot.feet import sole_corners
 
 from .mujoco_loop import Views, send
 from .tracking_report import TrackingReport as TrackingReport
@@ -48,7 +49,7 @@ class Simulation:
         self.feedback = feedback
         self.model = mujoco.MjModel.from_xml_string(robot.xml)
         self.data = mujoco.MjData(self.model)
-        self._corners = sole_corners(robot)
+        self._corners = sole_corners(self.model)
         self._feet = np.array([self.model.body(name).id for name in robot.feet])
         self._views = Views.of(self.data)
 

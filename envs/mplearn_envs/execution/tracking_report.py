@@ -14,10 +14,10 @@ from mplearn_envs.mechanics.reference import reference_robot, sole_middles
 from mplearn_envs.mechanics.support import margins_along
 from mplearn_envs.planning.plan import Plan
 from mplearn_envs.robot import Robot
+from mplearn_envs.robot.feet import TOUCHES_M
 
 FALL_TILT_RAD = 0.6
 FALL_DROP_M = 0.2
-_TOUCHES_M = 0.004  # a sole so near the floor carries
 
 
 class TrackingReport(NamedTuple):
@@ -62,7 +62,7 @@ def assess(robot: Robot, plan: Plan, q: FloatArray, v: FloatArray, fallen: bool)
     planned = np.concatenate((sole_middles(ref, ground), ground[..., 2:]), axis=-1)
     wanted = support(share, planned).see(plan.cog[:n, :2])
     soles = soles[1:]
-    landed = soles[..., 2].min(axis=2).max(axis=1) < _TOUCHES_M
+    landed = soles[..., 2].min(axis=2).max(axis=1) < TOUCHES_M
     up = np.where(landed, -1, plan.up[1:n])
     margin = margins_along(soles[..., :2], up, np.nan_to_num(zmp, nan=np.inf))
     error = q[1:, 7:] - plan.q[1:n, 7:]

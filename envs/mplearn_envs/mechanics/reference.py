@@ -12,6 +12,7 @@ from mplearn.maths.plane import turn_in_plane
 from mplearn.maths.rotations import quaternion_to_matrix
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.robot import Robot
+from mplearn_envs.robot.feet import sole_corners
 
 from .kinematics import MassTree, forward, mass_tree
 from .velocity_ik import Stance, settle
@@ -97,8 +98,7 @@ def reference_robot(robot: Robot) -> ReferenceRobot:
 
     straight = np.zeros(7 + len(names))
     straight[3] = 1.0
-    sole = lowest_sole(robot, straight)
-    straight[2] = -sole
+    straight[2] = -soles(robot, straight)[..., 2].min()
     pose = forward(tree, straight)
     centre = 0.5 * (pose.position[feet[0]] + pose.position[feet[1]])
     straight[:2] -= centre[:2]
@@ -110,7 +110,7 @@ def reference_robot(robot: Robot) -> ReferenceRobot:
         bent[[7 + k for k in knees]] = angle
         moved = forward(tree, bent).position
         out[:] = np.linalg.norm(moved[thighs] - moved[feet], axis=1)
-    limits = robot.position_limits
+    limits = robot.position_limits.copy()
     stance = Stance(
         robot.leg_joints,
         np.repeat(np.arange(2), [len(leg) for leg in robot.legs]),
@@ -120,7 +120,7 @@ def reference_robot(robot: Robot) -> ReferenceRobot:
         pose.position[feet],
         pose.rotation[feet],
         reach,
-        sole_centre(robot, straight),
+        soles(robot, straight)[..., :2].mean(axis=(0, 1)),
         np.zeros(2),
     )
     length = np.linalg.norm(pose.position[thighs] - pose.position[feet], axis=1)
@@ -133,6 +133,7 @@ def reference_robot(robot: Robot) -> ReferenceRobot:
         raise RobotError(
             f"robot {robot.name!r} cannot stand: its feet or COG miss by {worst:.3g} m"
         )
+    limits[[names.index(name) for name in robot.toes]] = 0.0  # one flat sole a foot
     upper = robot.upper_joints
     lowest = 0.45 * straight[2]
     base_limits = np.array([[lowest, straight[2]], [-0.6, 0.6], [-0.6, 1.6]])
@@ -141,7 +142,7 @@ def reference_robot(robot: Robot) -> ReferenceRobot:
         tree,
         np.einsum("bij,bj,bkj->bik", turn, model.body_inertia[1:], turn),
         stance,
-        sole_corners(robot),
+        sole_corners(model),
         np.column_stack((stance.foot_position[:, :2], np.zeros(2))),
         upper,
         np.vstack((base_limits, limits[upper])),
@@ -168,34 +169,13 @@ def tracked_columns(robot: Robot) -> IntArray:
     return np.concatenate((np.arange(N_BASE), N_BASE + robot.upper_joints))
 
 
-def sole_corners(robot: Robot) -> FloatArray:
-    """Return the lower corners of both soles in their feet's frames, shape (2, 4, 3) [m]."""
-    model = robot.model()
-    out = np.empty((2, 4, 3))
-    for side, geom in enumerate(("sole_l", "sole_r")):
-        half, centre = model.geom(geom).size, model.geom(geom).pos
-        signs = np.array([[1, 1, -1], [1, -1, -1], [-1, -1, -1], [-1, 1, -1]])
-        out[side] = centre + signs * half
-    return out
-
-
 def soles(robot: Robot, q: FloatArray) -> FloatArray:
     """Return the lower corners of both soles in posture ``q``, world frame, shape (2, 4, 3) [m]."""
     model = robot.model()
     pose = forward(mass_tree(model), q)
     feet = [model.body(n).id - 1 for n in robot.feet]
-    local = sole_corners(robot)
+    local = sole_corners(model)
     return np.stack([local[s] @ pose.rotation[f].T + pose.position[f] for s, f in enumerate(feet)])
-
-
-def lowest_sole(robot: Robot, q: FloatArray) -> float:
-    """Return the height of the lowest corner of the soles [m]."""
-    return float(soles(robot, q)[..., 2].min())
-
-
-def sole_centre(robot: Robot, q: FloatArray) -> FloatArray:
-    """Return the middle of both soles on the floor, shape (2,) [m]."""
-    return np.asarray(soles(robot, q)[..., :2].mean(axis=(0, 1)))
 
 
 def sole_middles(robot: ReferenceRobot, ground: FloatArray) -> FloatArray:

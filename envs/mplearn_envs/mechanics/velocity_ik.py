@@ -22,6 +22,7 @@ FEET = slice(0, 12)
 COG = slice(12, 14)
 HEIGHT = 14
 ORIENTATION = slice(15, 18)
+LONGEST_STEP = 0.2  # of one iteration [m, rad]
 
 
 class Stance(NamedTuple):
@@ -184,6 +185,18 @@ def advance(stance: Stance, q: FloatArray, step: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
+def nearer(
+    tree: MassTree, stance: Stance, pose: Pose, rows: FloatArray, q: FloatArray
+) -> FloatArray:
+    """Return a posture with smaller errors, not farther off than 0.2 rad and 0.2 m."""
+    step = rates(tree, stance, pose, rows)
+    longest = np.max(np.abs(step))
+    if longest > LONGEST_STEP:
+        step *= LONGEST_STEP / longest
+    return advance(stance, q, step)
+
+
+@njit(cache=True)
 def settle(
     tree: MassTree,
     stance: Stance,
@@ -196,7 +209,7 @@ def settle(
     """Follow the rates until the rows are met; return the posture and the largest error left.
 
     One iteration is one step of the gradient descent at a gain of one over its time, so the law has
-    no lag; steps are kept below 0.2 rad and 0.2 m.
+    no lag.
     """
     worst = np.inf
     for iteration in range(max_iterations + 1):
@@ -205,9 +218,5 @@ def settle(
         worst = np.max(np.abs(rows))
         if worst < tolerance or iteration == max_iterations:
             break
-        step = rates(tree, stance, pose, rows)
-        longest = np.max(np.abs(step))
-        if longest > 0.2:
-            step *= 0.2 / longest
-        q = advance(stance, q, step)
+        q = nearer(tree, stance, pose, rows, q)
     return q, worst

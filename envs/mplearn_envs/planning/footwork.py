@@ -16,11 +16,10 @@ from mplearn.maths.plane import turn_in_plane, wrap_angle
 from mplearn.maths.yaw_roll_pitch import yaw_roll_pitch_quaternion
 from mplearn.recording import BoolArray, FloatArray, IntArray
 from mplearn_envs.mechanics.kinematics import MassTree, forward
-from mplearn_envs.mechanics.reference import reference_robot, sole_corners
+from mplearn_envs.mechanics.reference import reference_robot
 from mplearn_envs.robot import Robot
+from mplearn_envs.robot.feet import DOWN_M, LIFT_M
 
-LIFT_M = 0.03  # a foot that rises so far over the other leaves the ground
-DOWN_M = 0.012  # and it is down where it is less
 CLEAR_M = 0.015  # a foot on its way clears the ground by this
 MOVING_M_S = 0.15  # a foot that still moves over the ground so fast has not landed
 _LONGEST_S = 0.4  # for which a foot may skim the ground before it lifts or after it lands
@@ -73,9 +72,7 @@ def read_footwork(robot: Robot, frames: FloatArray, rate_hz: float) -> Footwork:
         rate_hz: Frames per second [1/s].
     """
     ref = reference_robot(robot)
-    heights, relative = _feet(
-        ref.tree, ref.stance.feet, sole_corners(robot), np.ascontiguousarray(frames)
-    )
+    heights, relative = _feet(ref.tree, ref.stance.feet, ref.corners, np.ascontiguousarray(frames))
     gap = heights - heights.min(axis=1, keepdims=True)
     moving = np.zeros(len(frames))
     if len(frames) > 1:
@@ -118,8 +115,7 @@ def sole_heights(robot: Robot, frames: FloatArray) -> FloatArray:
         frames: Values of the robot's channels, shape (T, 3 + n) [m, rad].
     """
     ref = reference_robot(robot)
-    corners = sole_corners(robot)
-    return _feet(ref.tree, ref.stance.feet, corners, np.ascontiguousarray(frames))[0]
+    return _feet(ref.tree, ref.stance.feet, ref.corners, np.ascontiguousarray(frames))[0]
 
 
 def _lifts(gap: FloatArray, skims: BoolArray, longest: int) -> list[Lift]:

@@ -11,7 +11,7 @@ from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix
 from mplearn.recording import FloatArray
 from mplearn_envs.mechanics.kinematics import forward
 from mplearn_envs.mechanics.reference import ReferenceRobot
-from mplearn_envs.mechanics.velocity_ik import Stance, advance, errors, rates
+from mplearn_envs.mechanics.velocity_ik import Stance, errors, nearer
 
 TOLERANCE = 1e-8  # [m, rad] to which the feet, COG and base follow
 OFF_M = 0.08  # by no more than this a foot's height is its leg's and not the one it shall have
@@ -86,11 +86,7 @@ def balanced_path(
             worst[k + 1] = np.max(np.abs(rows))
             if worst[k + 1] < TOLERANCE or iteration == _MAX_ITERATIONS:
                 break
-            step = rates(robot.tree, stance, pose, rows)
-            longest = np.max(np.abs(step))
-            if longest > 0.2:
-                step *= 0.2 / longest
-            q = advance(stance, q, step)
+            q = nearer(robot.tree, stance, pose, rows, q)
         out[k + 1] = q
     return out, worst
 

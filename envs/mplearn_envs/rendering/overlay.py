@@ -9,8 +9,8 @@ import numpy as np
 
 from mplearn.recording import FloatArray
 from mplearn_envs.mechanics.support import convex_hull
+from mplearn_envs.robot.feet import CORNER_SIGNS, SOLES, TOUCHES_M
 
-_TOUCHING_M = 0.015  # as high as a corner of a sole may be and still carry
 _LIFT_M = 0.004  # what is drawn lies so far above the floor
 _EDGE_M, _SPOT_M = 0.006, 0.016
 _EDGE = (0.10, 0.45, 0.85, 1.0)
@@ -44,7 +44,7 @@ class BalanceMeter:
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
         self._data = mujoco.MjData(model)
-        self._soles = [model.geom(name).id for name in ("sole_l", "sole_r")]
+        self._soles = [model.geom(name).id for name in SOLES]
         self._state = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_INTEGRATION))
 
     def measure(self, data: mujoco.MjData) -> BalanceMarks:
@@ -64,14 +64,14 @@ class BalanceMeter:
 
     def _marks(self, zmp: FloatArray) -> BalanceMarks:
         data, model = self._data, self._model
-        signs = np.array([[1, 1, -1], [1, -1, -1], [-1, -1, -1], [-1, 1, -1]])
         corners = np.concatenate(
             [
-                signs * model.geom_size[g] @ data.geom_xmat[g].reshape(3, 3).T + data.geom_xpos[g]
+                CORNER_SIGNS * model.geom_size[g] @ data.geom_xmat[g].reshape(3, 3).T
+                + data.geom_xpos[g]
                 for g in self._soles
             ]
         )
-        down = corners[corners[:, 2] < _TOUCHING_M, :2]
+        down = corners[corners[:, 2] < TOUCHES_M, :2]
         polygon = convex_hull(down) if len(down) >= 3 else np.empty((0, 2))
         return BalanceMarks(polygon, data.subtree_com[1].copy(), zmp)
 

@@ -15,6 +15,7 @@ from mplearn.recording import FloatArray, IntArray
 
 from .compiling import compile_once
 from .drives import JointGroup
+from .feet import SOLES, foot_hinges, require_soles
 from .roles import BASE_CHANNELS
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ class Robot:
 
     The model has one free base and hinges; every hinge has one position servo of the same name.
     With all hinges at zero the robot stands upright, legs straight, arms hanging. The hinges of
-    ``legs`` balance, all others track.
+    ``legs`` balance, those of ``toes`` are held at zero, all others track.
 
     Attributes:
         name: Name of the body whose features the robot can perform.
@@ -37,12 +38,14 @@ class Robot:
         knees: The left and the right knee; they count positive when flexed.
         thighs: Bodies whose origin is the hip joint, left and right.
         feet: Bodies of the feet, whose origin is the ankle; the sole is geom ``sole_l``,
-            ``sole_r``.
+            ``sole_r``, a box along the foot's axes.
         stance_knee_rad: Knee flexion when standing [rad].
         guard_knee_rad: The knees are never made straighter than about this [rad].
         base_velocity: Velocity limits of base height [m/s], roll and pitch [rad/s].
         segments: Pairs of a role (see `ROLES`) and the body that has it, through which motions of
             other bodies are retargeted.
+        toes: Hinges within the feet: toes, or heels. They are held at zero, for a foot stands on
+            one flat sole; motions that bend them are refused.
     """
 
     name: str
@@ -56,6 +59,7 @@ class Robot:
     guard_knee_rad: float
     base_velocity: tuple[float, float, float]
     segments: tuple[tuple[str, str], ...]
+    toes: tuple[str, ...] = ()
 
     @classmethod
     def from_mjcf(
@@ -100,9 +104,16 @@ class Robot:
         missing -= set(hinges)
         bodies = {model.body(i).name for i in range(model.nbody)}
         missing |= {*self.thighs, *self.feet, *(body for _, body in self.segments)} - bodies
-        missing |= {"sole_l", "sole_r"} - {model.geom(i).name for i in range(model.ngeom)}
+        missing |= set(SOLES) - {model.geom(i).name for i in range(model.ngeom)}
         if missing:
             raise RobotError(f"robot {self.name!r} has no joint, body or sole {sorted(missing)}")
+        require_soles(model, self.feet, self.name)
+        toes = foot_hinges(model, self.feet)
+        if set(toes) != set(self.toes):
+            raise RobotError(
+                f"robot {self.name!r}: the hinges within its feet are {toes}, and its toes are "
+                f"said to be {self.toes}"
+            )
 
     def model(self) -> mujoco.MjModel:
         """Compile the simulation model."""

@@ -16,6 +16,7 @@ from mplearn.recording import FloatArray
 
 from .compiling import read_model
 from .drives import JointGroup
+from .feet import SOLES, below
 
 _LEVEL = 0.995  # least cosine between the floor and the foot of a robot at attention
 _HALF_SOLE_M = 0.01
@@ -102,9 +103,9 @@ def add_soles(spec: Any, feet: tuple[str, str], name: str) -> None:
     boxes = [_sole_box(model, foot, name) for foot in feet]
     for geom in spec.geoms:
         geom.contype = geom.conaffinity = 0
-    for foot, side, (middle, half) in zip(feet, "lr", boxes, strict=True):
+    for foot, sole, (middle, half) in zip(feet, SOLES, boxes, strict=True):
         spec.body(foot).add_geom(
-            name=f"sole_{side}",
+            name=sole,
             type=mujoco.mjtGeom.mjGEOM_BOX,
             pos=middle,
             size=half,
@@ -129,7 +130,7 @@ def _sole_box(model: mujoco.MjModel, foot: str, name: str) -> tuple[FloatArray, 
             f"there, or a foot whose z axis points up when it stands"
         )
     signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
-    own = model.body_weldid[model.geom_bodyid] == model.body_weldid[body]
+    own = np.isin(model.geom_bodyid, list(below(model, body)))  # the toes at zero, too
     collide = own & ((model.geom_contype != 0) | (model.geom_conaffinity != 0))
     corners = []
     for geom in np.flatnonzero(collide if collide.any() else own):

@@ -20,6 +20,7 @@ from mplearn.errors import RobotError
 
 from .compiling import compile_once, read_model
 from .drives import HUMANOID_BASE_VELOCITY, HUMANOID_DRIVES, JointGroup
+from .feet import foot_hinges
 from .foreign import (
     add_servos,
     add_soles,
@@ -31,7 +32,7 @@ from .foreign import (
 )
 from .roles import NEEDED_ROLES, ROLES
 
-_LOOSE = "hand_l"  # hinges that carry no segment (fingers, toes) are driven like a hand's
+_LOOSE = "hand_l"  # hinges that carry no segment (fingers) are driven like a hand's
 
 
 def described(
@@ -58,7 +59,7 @@ def described(
     feet = (segments["foot_l"], segments["foot_r"])
     add_soles(spec, feet, name)
     model = compiled(spec, name)
-    groups = _groups(model, segments)
+    groups = _groups(model, segments, feet)
     add_servos(spec, groups)
     legs = [_hinges_above(model, foot, segments["pelvis"]) for foot in feet]
     knees = [_knee(model, segments, side, name) for side in "lr"]
@@ -77,6 +78,7 @@ def described(
         "guard_knee_rad": radians(12.0),
         "base_velocity": (float(size) * height, roll, pitch),
         "segments": tuple((role, segments[role]) for role in ROLES if role in segments),
+        "toes": foot_hinges(model, feet),
     }
 
 
@@ -96,14 +98,16 @@ def hinge_roles(model: mujoco.MjModel, segments: Mapping[str, str]) -> dict[str,
     return {hinge: moved[body] for hinge, body in bodies.items() if body in moved}
 
 
-def _groups(model: mujoco.MjModel, segments: Mapping[str, str]) -> tuple[JointGroup, ...]:
-    """Return a group for each hinge."""
+def _groups(
+    model: mujoco.MjModel, segments: Mapping[str, str], feet: tuple[str, str]
+) -> tuple[JointGroup, ...]:
+    """Return a group for each hinge; toes carry the weight, so they are driven like ankles."""
     ours = _humanoid()
     ratio = _weight_moment(model) / _weight_moment(ours)
     roles = hinge_roles(ours, {role: role for role in ROLES})
     softest_first = sorted(HUMANOID_DRIVES, key=lambda group: group.stiffness)
     patterns = {roles[hinge]: group for group in softest_first for hinge in group.names}
-    own = hinge_roles(model, segments)
+    own = hinge_roles(model, segments) | dict.fromkeys(foot_hinges(model, feet), "foot_l")
     found = []
     for j in range(1, model.njnt):
         hinge = model.joint(j).name

@@ -25,6 +25,7 @@ from mplearn.errors import RobotError
 from mplearn.recording import FloatArray, IntArray
 
 from .description import Robot
+from .feet import SOLES
 from .roles import ROLES
 
 if TYPE_CHECKING:
@@ -145,7 +146,7 @@ def standing_height(robot: Robot) -> float:
     model = robot.model()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    soles = [model.geom(name).id for name in ("sole_l", "sole_r")]
+    soles = [model.geom(name).id for name in SOLES]
     return float(data.xpos[1, 2] - (data.geom_xpos[soles, 2] - model.geom_size[soles, 2]).min())
 
 

@@ -14,8 +14,12 @@ from scipy.spatial.transform import Rotation
 
 from mplearn.body import features_of, human_body, posture_of, robot_body
 from mplearn.errors import MissingDependencyError, RobotError
-from mplearn_envs.mechanics import reference_robot
+from mplearn_envs.execution.simulation import Simulation
+from mplearn_envs.mechanics import reference_robot, rest_reference
+from mplearn_envs.planning import Planner
 from mplearn_envs.robot import ROLES, Retargeting, Robot, humanoid, unitree_g1
+from mplearn_envs.robot.feet import sole_corners
+from mplearn_envs.skills.feasibility import FeasibilityCheck
 
 HUMAN = human_body(1.7)
 SEGMENTS = {role: role for role in ROLES}
@@ -105,6 +109,54 @@ def test_moving_the_zero_moves_nothing_else(seed):
         np.testing.assert_allclose(after[name], turn, atol=1e-5)  # 6 digits of text
     knee = robot.joint_names.index("knee_l")
     np.testing.assert_allclose(robot.position_limits[knee], np.radians([-5, 150]) - 0.9, atol=1e-5)
+
+
+TOES = """<body name="toes_{s}" pos=".13 0 -.04"><joint name="toe_{s}" axis="0 1 0" range="-60 30"/>
+  <geom type="box" size=".04 .05 .02" pos=".04 0 0"/></body>"""
+
+
+def with_toes():
+    text = biped()
+    for s in "lr":
+        end = text.index("</body>", text.index(f'name="tilt_{s}"'))
+        text = text[:end] + TOES.format(s=s) + text[end:]
+    return text
+
+
+def test_toes_are_described_held_and_stood_on():
+    """The sole reaches under the toes, they are as stiff as ankles, and bending them is refused."""
+    plain = Robot.from_mjcf(biped(), "biped", BIPED_SEGMENTS)
+    robot = Robot.from_mjcf(with_toes(), "toed", BIPED_SEGMENTS)
+    assert plain.toes == () and robot.toes == ("toe_l", "toe_r")
+    ahead = [corners[:, 0].max() for corners in sole_corners(robot.model())]
+    np.testing.assert_allclose(ahead, 0.13 + 0.08, atol=1e-6)
+    of = dict(zip(robot.joint_names, robot.per_joint("stiffness"), strict=True))
+    assert of["toe_l"] == of["ankle_l"]
+    reference = reference_robot(robot)
+    toe = 3 + robot.upper_joints.tolist().index(robot.joint_names.index("toe_l"))
+    assert reference.limits[toe].tolist() == [0.0, 0.0]
+    planner = Planner(robot)
+    frames = np.zeros((50, len(robot.channels)))
+    frames[:, 0] = reference.standing_height
+    check = FeasibilityCheck(planner)
+    assert check.judge(planner.motion(frames, 50.0), 0.5).feasible
+    frames[:, robot.channels.index("toe_l")] = np.linspace(0.0, -0.8, 50)
+    verdict = check.judge(planner.motion(frames, 50.0), 0.5)
+    assert [(each.kind, each.where) for each in verdict.problems] == [("limit", "toe_l")]
+    simulation = Simulation(robot)
+    simulation.reset()
+    hold = planner.hold(rest_reference(robot), 2.0)
+    assert not simulation.perform(hold).fallen
+    at = [7 + robot.joint_names.index(name) for name in robot.toes]
+    assert np.abs(simulation.data.qpos[at]).max() < 1e-3
+
+
+def test_hinges_within_the_feet_and_soles_must_be_described():
+    robot = Robot.from_mjcf(with_toes(), "toed", BIPED_SEGMENTS)
+    with pytest.raises(RobotError, match=r"within its feet are \('toe_l', 'toe_r'\)"):
+        replace(robot, toes=())
+    with pytest.raises(RobotError, match="'sole_l' must be a box on body 'foot_r'"):
+        replace(robot, feet=("foot_r", "foot_l"), toes=robot.toes)
 
 
 def test_a_robot_without_a_foot_and_other_broken_descriptions():
