@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from mplearn.errors import MPLearnError
 from mplearn.learner import (
     Event,
     FramesLost,
@@ -38,6 +39,7 @@ class LearningLog:
         lost: Stretches from which nothing could be learned.
         watched_s: Length of the streams so far [s].
         learning_s: How long learning took [s], reading and drawing left out.
+        refused: Recordings that could not be learned, or not to their end, by name: why.
     """
 
     segments: list[Segment] = field(default_factory=list)
@@ -47,6 +49,7 @@ class LearningLog:
     lost: list[FramesLost] = field(default_factory=list)
     watched_s: float = 0.0
     learning_s: float = 0.0
+    refused: dict[str, MPLearnError] = field(default_factory=dict)
     _alive: set[int] = field(default_factory=set)
 
     @property
@@ -99,10 +102,26 @@ class LearningLog:
                 pass
 
 
-def learn(learner: MotionLearner, recordings: Sequence[Recording], console: Console) -> LearningLog:
+def learn(
+    learner: MotionLearner,
+    recordings: Sequence[Recording],
+    console: Console,
+    *,
+    strict: bool = False,
+) -> LearningLog:
     """Show recordings to a learner, frame by frame, with a bar on the console.
 
-    A stream ends with each recording.
+    A stream ends with each recording. One that cannot be learned costs neither what was learned
+    before nor what comes after it.
+
+    Args:
+        learner: Who looks on.
+        recordings: What is shown, in order.
+        console: Where the bar is drawn.
+        strict: Whether a recording that cannot be learned is an error.
+
+    Raises:
+        MPLearnError: No recording can be learned, or one cannot and ``strict`` is set.
     """
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -122,17 +141,25 @@ def learn(learner: MotionLearner, recordings: Sequence[Recording], console: Cons
         for recording in recordings:
             before_s = log.watched_s
             begin = time.perf_counter()
-            for n, events in enumerate(learner.learn_recording(recording), start=1):
-                for event in events:
+            n = 0
+            try:
+                for n, events in enumerate(learner.learn_recording(recording), start=1):
+                    for event in events:
+                        log.note(event)
+                    if n % 50 == 0:
+                        now = time.perf_counter()
+                        log.learning_s += now - begin
+                        begin = now
+                        log.watched_s = before_s + min(n, len(recording)) / recording.rate_hz
+                        _show(progress, bar, log)
+            except MPLearnError as error:
+                if strict or len(log.refused) + 1 == len(recordings):
+                    raise
+                log.refused[recording.name] = error
+                for event in learner.end_stream():
                     log.note(event)
-                if n % 50 == 0:
-                    now = time.perf_counter()
-                    log.learning_s += now - begin
-                    begin = now
-                    log.watched_s = before_s + min(n / recording.rate_hz, recording.duration_s)
-                    _show(progress, bar, log)
             log.learning_s += time.perf_counter() - begin
-            log.watched_s = before_s + recording.duration_s
+            log.watched_s = before_s + min(n, len(recording)) / recording.rate_hz
             _show(progress, bar, log)
     return log
 

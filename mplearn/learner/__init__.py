@@ -1,6 +1,7 @@
 """The learner: where the stages meet, frame after frame."""
 
 from .config import LearnerConfig as LearnerConfig
+from .config import learnable_rate as learnable_rate
 from .events import Anomaly as Anomaly
 from .events import AxesChanged as AxesChanged
 from .events import Event as Event

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -9,6 +10,22 @@ from typing import Any, Literal
 from ..errors import InvalidValueError
 from ..people import PeopleConfig
 from ..tree import FormConfig, TreeConfig
+
+LOWEST_HZ, HIGHEST_HZ = 20.0, 250.0
+"""Rates at which a learner can watch [1/s]."""
+
+
+def learnable_rate(rate_hz: float) -> float:
+    """Return the rate nearest to a recording's, by a whole factor, at which it can be learned.
+
+    >>> learnable_rate(500.0), learnable_rate(1000.0), learnable_rate(15.0), learnable_rate(120.0)
+    (250.0, 250.0, 30.0, 120.0)
+    """
+    if rate_hz > HIGHEST_HZ:
+        return rate_hz / math.ceil(rate_hz / HIGHEST_HZ)
+    if rate_hz < LOWEST_HZ:
+        return rate_hz * math.ceil(LOWEST_HZ / rate_hz)
+    return rate_hz
 
 
 @dataclass(frozen=True)
@@ -44,7 +61,7 @@ class LearnerConfig:
         object.__setattr__(self, "channels", tuple(self.channels))
         if not self.channels:
             raise InvalidValueError("a learner needs at least one channel")
-        if not 20.0 <= self.rate_hz <= 250.0:
+        if not LOWEST_HZ <= self.rate_hz <= HIGHEST_HZ:
             raise InvalidValueError(f"rate_hz must lie in [20, 250], not {self.rate_hz}")
         if self.observe not in ("robot", "markers"):
             raise InvalidValueError(f"observe must be 'robot' or 'markers', not {self.observe!r}")

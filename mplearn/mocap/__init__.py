@@ -2,6 +2,7 @@
 
 from .gaps import GapConfig as GapConfig
 from .gaps import GapTracker as GapTracker
+from .joining import join_by_name as join_by_name
 from .open import Takes as Takes
 from .open import open_recording as open_recording
 from .open import open_recordings as open_recordings
@@ -13,3 +14,6 @@ from .reader import Reader as Reader
 from .registry import readers as readers
 from .registry import register_reader as register_reader
 from .resample import resample as resample
+from .size import UNITS_M as UNITS_M
+from .size import named_unit as named_unit
+from .vertical import DIRECTIONS as DIRECTIONS

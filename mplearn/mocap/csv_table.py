@@ -26,6 +26,7 @@ from ..recording import IntArray, LabelledSegment, Recording
 from .clock import even_clock
 from .files import bad_file, read_text, stem
 from .numbers import numbers
+from .options import option
 from .reader import Hints, Reader
 from .space import checked_markers, file_axes
 
@@ -66,7 +67,7 @@ class CSVReader(Reader):
             rate_hz = rate_hz or clock.rate_hz
         if rate_hz is None or np.isnan(rate_hz):
             raise bad_file(
-                path, "no rate", f"a column {' or '.join(_TIMES)} [s], or Hints(rate_hz=...)"
+                path, "no rate", f"a column {' or '.join(_TIMES)} [s], or {option('rate_hz')}"
             )
         frames = values
         texts = {

@@ -9,7 +9,7 @@ from contextvars import ContextVar
 _COMMAND_LINE = {
     "unit_m": "--unit",
     "up_axis": "--up",
-    "rate_hz": "--rate-hz",
+    "rate_hz": "--rate",
     "skeleton": "--skeleton",
 }
 _on_command_line: ContextVar[bool] = ContextVar("_on_command_line", default=False)

@@ -3,10 +3,20 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from mplearn.errors import RecordingError
+from mplearn.errors import MPLearnError, RecordingError
+from mplearn_agents.reading import add_reading_arguments, hints_of, say_left_out, say_takes
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from mplearn.recording import Recording
+
+_SAME_RATE = 1e-3  # rates that differ by a smaller share are one
 
 HELP = "Learn primitives and their order from recordings."
 
@@ -15,7 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument("data", type=Path, help="a recording, or a folder of them")
     parser.add_argument("--out", type=Path, required=True, help="library file to write")
-    parser.add_argument("--rate-hz", type=float, help="resample to this rate [1/s]")
+    parser.add_argument(
+        "--rate-hz", type=float, help="resample to this rate [1/s] (default: the recordings' own)"
+    )
     parser.add_argument(
         "--observe",
         choices=["robot", "positions", "channels"],
@@ -27,38 +39,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--person", action="append", help="learn from this person's takes only; may be repeated"
     )
+    add_reading_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> None:
     """Learn, save the library and print a summary."""
     from rich.console import Console
 
-    from mplearn.anatomy import as_bodies
     from mplearn.learner import LearnerConfig, MotionLearner
-    from mplearn.mocap import Hints, open_recordings
+    from mplearn.mocap import command_line, open_takes
     from mplearn_agents.learning import learn
     from mplearn_agents.tables import primitive_table
 
     console = Console()
-    recordings = open_recordings(
-        args.data,
-        rate_hz=args.rate_hz,
-        positions=args.observe != "channels",
-        hints=Hints(joint_axes=args.observe == "robot"),
-    )
-    if args.person:
-        persons = sorted({recording.person for recording in recordings})
-        recordings = tuple(r for r in recordings if r.person in args.person)
-        if not recordings:
-            raise RecordingError(
-                f"no take of {' or '.join(args.person)} in {args.data}; there are takes of "
-                f"{', '.join(person or 'a person unnamed' for person in persons)}"
-            )
-    if args.observe == "robot" and any(recording.is_markers for recording in recordings):
-        bodies = as_bodies(recordings)
-        for name, error in bodies.refused.items():
-            console.print(f"[yellow]left out: {name}: {error}")
-        recordings = bodies.recordings
+    with command_line():
+        takes = open_takes(
+            args.data,
+            positions=args.observe != "channels",
+            hints=hints_of(args, joint_axes=args.observe == "robot"),
+            strict=args.strict,
+        )
+        say_takes(console, takes)
+        recordings = _of_persons(args, takes.recordings)
+        recordings = _of_one_kind(args, recordings, console)
+    recordings = _at_one_rate(args, recordings, console)
     first = recordings[0]
     config = LearnerConfig(
         channels=first.channels,
@@ -68,20 +72,77 @@ def run(args: argparse.Namespace) -> None:
     if args.segmenter:
         config = replace(config, segmenter=args.segmenter)
     learner = MotionLearner(config)
-    log = learn(learner, recordings, console)
+    log = learn(learner, recordings, console, strict=args.strict)
     if log.n_lost == learner.n_frames:
         raise RecordingError(f"nothing can be learned from {args.data}: {log.reasons}")
+    for name, error in log.refused.items():
+        say_left_out(console, name, error)
     library = learner.snapshot()
     args.out.parent.mkdir(parents=True, exist_ok=True)
     library.save(args.out)
     console.print(primitive_table(library))
     console.print(
-        f"{len(library)} primitives from {len(recordings)} takes, {log.watched_s / 60:.1f} minutes "
-        f"of motion in {len(log.moving)} segments, {log.times_real_time:.0f} x real time; "
-        f"written to {args.out}"
+        f"{len(library)} primitives from {len(recordings) - len(log.refused)} takes, "
+        f"{log.watched_s / 60:.1f} minutes of motion in {len(log.moving)} segments, "
+        f"{log.times_real_time:.0f} x real time; written to {args.out}"
     )
     if log.lost:
         console.print(
             f"{log.n_lost / first.rate_hz:.1f} s in {len(log.lost)} stretches were left out: "
             f"{log.reasons}"
         )
+
+
+def _of_persons(
+    args: argparse.Namespace, recordings: tuple[Recording, ...]
+) -> tuple[Recording, ...]:
+    if not args.person:
+        return recordings
+    persons = sorted({recording.person for recording in recordings})
+    chosen = tuple(r for r in recordings if r.person in args.person)
+    if not chosen:
+        raise RecordingError(
+            f"no take of {' or '.join(args.person)} in {args.data}; there are takes of "
+            f"{', '.join(person or 'a person unnamed' for person in persons)}"
+        )
+    return chosen
+
+
+def _of_one_kind(
+    args: argparse.Namespace, recordings: tuple[Recording, ...], console: Console
+) -> tuple[Recording, ...]:
+    """Return the takes with the same channels: as bodies, or joined by the names they share."""
+    from mplearn.anatomy import as_bodies
+    from mplearn.mocap import join_by_name
+
+    refused: Mapping[str, MPLearnError]
+    if args.observe == "robot" and any(recording.is_markers for recording in recordings):
+        bodies = as_bodies(recordings, strict=args.strict)
+        refused, recordings = bodies.refused, bodies.recordings
+    else:
+        joined = join_by_name(recordings)
+        refused, recordings = joined.refused, joined.recordings
+        if joined.dropped:
+            console.print(f"not in every take, left out: {', '.join(joined.dropped)}")
+    for name, error in refused.items():
+        if args.strict:
+            raise error
+        say_left_out(console, name, error)
+    return recordings
+
+
+def _at_one_rate(
+    args: argparse.Namespace, recordings: tuple[Recording, ...], console: Console
+) -> tuple[Recording, ...]:
+    """Return the takes at the rate asked for, or at the usual one if that can be learned."""
+    from mplearn.learner import learnable_rate
+    from mplearn.mocap import resample
+
+    rates = [recording.rate_hz for recording in recordings]
+    rate_hz = args.rate_hz or learnable_rate(max(rates, key=rates.count))
+    others = sorted({rate for rate in rates if abs(rate - rate_hz) > _SAME_RATE * rate_hz})
+    if others:
+        console.print(
+            f"resampled from {', '.join(f'{rate:g}' for rate in others)} to {rate_hz:g} Hz"
+        )
+    return tuple(resample(r, rate_hz) if r.rate_hz in others else r for r in recordings)

@@ -1,0 +1,96 @@
+"""Options of the commands that read recordings, and what reading says on the console."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mplearn.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from mplearn.mocap import Hints, Takes
+    from mplearn.recording import Recording
+
+_SHOWN = 8  # names in a line
+
+
+def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what a file may not say about itself, and what to do with one that is refused."""
+    group = parser.add_argument_group("what the files do not say, or say wrongly")
+    group.add_argument("--unit", help="length of their unit: m, cm, mm, in, ... or a number [m]")
+    group.add_argument("--up", metavar="AXIS", help="their axis that points up: x, y, z, -x, ...")
+    group.add_argument("--rate", type=float, help="frames per second in the files [1/s]")
+    group.add_argument(
+        "--skeleton", type=Path, metavar="ASF", help="the skeleton that belongs to AMC files"
+    )
+    parser.add_argument(
+        "--strict", action="store_true", help="refuse all if one take is refused; else leave it out"
+    )
+
+
+def hints_of(args: argparse.Namespace, *, joint_axes: bool = False) -> Hints:
+    """Return what the options say about the files.
+
+    Raises:
+        InvalidValueError: A unit or an axis does not exist.
+    """
+    from mplearn.mocap import DIRECTIONS, UNITS_M, Hints, named_unit
+
+    unit_m: float | None = None
+    if args.unit is not None:
+        unit_m = named_unit(args.unit)
+        if unit_m is None:
+            try:
+                unit_m = float(args.unit)
+            except ValueError:
+                raise InvalidValueError(
+                    f"--unit must be one of {', '.join(UNITS_M)} or a length in metres, "
+                    f"not {args.unit!r}"
+                ) from None
+    if args.up is not None and args.up not in DIRECTIONS:
+        raise InvalidValueError(f"--up must be one of {', '.join(DIRECTIONS)}, not {args.up!r}")
+    return Hints(
+        rate_hz=args.rate,
+        unit_m=unit_m,
+        up_axis=args.up,
+        skeleton=args.skeleton,
+        joint_axes=joint_axes,
+    )
+
+
+def say_takes(console: Console, takes: Takes) -> None:
+    """Say how the takes of a folder were read, and which could not be."""
+    for name, error in takes.unreadable.items():
+        say_left_out(console, name, error)
+    said: dict[str, list[str]] = {}
+    for recording in takes.recordings:
+        for line in remarks(recording):
+            said.setdefault(line, []).append(recording.name)
+    for line, names in said.items():  # what is said of many takes is said once
+        console.print(f"{_listed(names)}: {line}", markup=False, highlight=False)
+
+
+def remarks(recording: Recording) -> list[str]:
+    """Return what the report of a recording notes and warns of, a line each."""
+    report = recording.report
+    if report is None:
+        return []
+    lines = [f"warning: {text}" for text in report.warnings] + list(report.notes)
+    if report.left_out:
+        lines.append(f"left out: {_listed(report.left_out)}")
+    return lines
+
+
+def say_left_out(console: Console, name: str, error: Exception) -> None:
+    """Say that a take is left out, and why."""
+    console.print(f"left out: {name}: {error}", markup=False, highlight=False, style="yellow")
+
+
+def _listed(names: Iterable[str]) -> str:
+    names = list(names)
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return ", ".join(names[:_SHOWN]) + more
