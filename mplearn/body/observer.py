@@ -340,6 +340,8 @@ class MotionObserver:
             sound[:] = True  # nothing is: the reason is told by trying, or there are too few
         wrong = ~sound
         wrong[sound] = self.identity.misfits(held[sound], back=False)
+        if wrong.all():
+            raise BodyError("the markers are in no frame as far apart as in most of the others")
         if self.identity.person >= 0:
             self._known[self.identity.person] = self.ik.state()
         self.ik.calibrate(held[~wrong][-PATIENCE * self._needed :])
