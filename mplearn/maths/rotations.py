@@ -114,6 +114,42 @@ def euler_to_quaternion(order: str, angles: FloatArray) -> FloatArray:
     return np.asarray(rotation.as_quat(scalar_first=True)).reshape(*angles.shape[:-1], 4)
 
 
+def matrix_to_euler(order: str, matrices: FloatArray) -> FloatArray:
+    """Return Euler angles of rotation matrices, the middle one within a right angle of zero.
+
+    Each rotation by itself: near gimbal lock, where the middle angle is +-pi/2, those of a motion
+    leap (see `continuous_euler`).
+
+    Args:
+        order: Three different axes, as ``"ZXY"``, intrinsic: ``R = R_z R_x R_y``.
+        matrices: Shape (..., 3, 3).
+
+    Returns:
+        Shape (..., 3) [rad].
+
+    Raises:
+        InvalidValueError: There is no such order.
+
+    Example:
+        >>> matrix_to_euler("ZXY", euler_to_matrix("ZXY", np.array([0.1, -0.2, 0.3]))).round(4)
+        array([ 0.1, -0.2,  0.3])
+    """
+    if sorted(order) != ["X", "Y", "Z"]:
+        raise InvalidValueError(f"an order is three different of X, Y, Z, not {order!r}")
+    i, j, k = ("XYZ".index(axis) for axis in order)
+    handed = 1.0 if (j - i) % 3 == 1 else -1.0
+    m = np.asarray(matrices, dtype=np.float64)
+    first = np.arctan2(-handed * m[..., j, k], m[..., k, k])
+    # from the first angle on, so that all three make the rotation again even at gimbal lock
+    sine, cosine = np.sin(first), np.cos(first)
+    middle = np.arctan2(handed * m[..., i, k], cosine * m[..., k, k] - handed * sine * m[..., j, k])
+    last = np.arctan2(
+        handed * (cosine * m[..., j, i] + handed * sine * m[..., k, i]),
+        cosine * m[..., j, j] + handed * sine * m[..., k, j],
+    )
+    return np.stack([first, middle, last], axis=-1)
+
+
 def axis_angle_to_matrix(axis: FloatArray, angles: FloatArray) -> FloatArray:
     """Return the rotation matrices about one axis (Rodrigues' formula).
 

@@ -2,30 +2,34 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 
 from ..recording import FloatArray, Recording
-from .asf import ASFSkeleton, read_asf
-from .cmu_humanoid import CMU_COLUMNS, CMU_UNIT_M, cmu_humanoid_positions
-from .files import bad_file, cmu_subject, read_text, stem
-from .kinematics import joint_positions, with_axes
+from .asf import read_asf
+from .cmu_humanoid import CMU_SKELETON, cmu_humanoid_recording
+from .files import bad_file, cmu_subject, read_text, stem, suffix
+from .findings import Findings
 from .numbers import numbers
 from .reader import Hints, Reader
-from .skeletal import Column, angle_recording, position_recording
-from .space import check_skeleton, file_axes
+from .skeletal import Column, SkeletalMotion, skeletal_recording
+from .space import Space
 
 _RATE_HZ = 120.0  # the format has no place for it; this is the database's
+_NAMED_RATES = (30, 50, 60, 100, 120, 200, 240)
 _EXPECTED = "an AMC file: ':DEGREES', then for each frame its number and a line a bone"
 
 
 class AMCReader(Reader):
     """Reads AMC files.
 
-    The skeleton is `Hints.skeleton`, or lies beside the file under its subject's or its own name
-    (``86.asf`` for ``86_01.amc``). Without one the bones must be CMU's: angles are the same, and
-    positions are those of dm_control's CMU humanoid, with its proportions and not the person's.
+    The skeleton is `Hints.skeleton`, or lies beside the file: under its own name, its subject's
+    (``86.asf`` for ``86_01.amc``) or the start of its name (``HDM_bd.asf`` for
+    ``HDM_bd_01-01_01_120.amc``), or as the only one in the folder. Without one the bones must be
+    CMU's: angles are the same, and positions are those of dm_control's CMU humanoid, with its
+    proportions and not the person's.
     """
 
     format = "AMC"
@@ -33,47 +37,53 @@ class AMCReader(Reader):
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read angles, or positions by forward kinematics; see `Reader.read`."""
-        degrees, layout, table = _frames(path)
-        skeleton_file = _skeleton_file(path, hints)
-        rate_hz = hints.rate_hz or _RATE_HZ
-        axes = file_axes(hints.up_axis, "y", "z")
+        findings = Findings(self.format)
+        degrees, layout, table = _frames(path, findings)
+        skeleton_file = _skeleton_file(path, hints, findings)
+        rate_hz = hints.rate_hz or _named_rate(stem(path)) or _RATE_HZ
         if skeleton_file is None:
-            columns, unit = CMU_COLUMNS, hints.unit_m or CMU_UNIT_M
-            values = _arranged(
-                path, columns, layout, table, "CMU's skeleton (its ASF is not beside it)"
-            )
-            angles = _in_si(values, columns, True if degrees is None else degrees, unit)
-            if positions:
-                return cmu_humanoid_positions(path, angles, rate_hz, unit, axes=hints.joint_axes)
-            return angle_recording(path, columns, (), angles, axes, rate_hz)
-
-        skeleton = read_asf(skeleton_file, hints.unit_m)
-        _check_size(skeleton_file, skeleton)
-        values = _arranged(path, skeleton.columns, layout, table, skeleton_file.name)
-        angles = _in_si(
-            values,
-            skeleton.columns,
-            skeleton.degrees if degrees is None else degrees,
-            skeleton.unit_m,
-        )
-        if positions:
-            shown = with_axes(skeleton.joints) if hints.joint_axes else skeleton.joints
-            return position_recording(path, shown, angles, axes, rate_hz)
-        return angle_recording(path, skeleton.columns, skeleton.joints, angles, axes, rate_hz)
+            skeleton = CMU_SKELETON
+            name = "CMU's skeleton (its ASF is not beside it)"
+        else:
+            skeleton = read_asf(skeleton_file)
+            name = skeleton_file.name
+        values = _arranged(path, skeleton.columns, layout, table, name, findings)
+        values *= _factors(skeleton.columns, skeleton.degrees if degrees is None else degrees)
+        space = Space(skeleton.unit_m, "y", "z", says_unit=skeleton_file is not None, says_up=True)
+        motion = SkeletalMotion(skeleton.joints, skeleton.columns, values, rate_hz, space)
+        if skeleton_file is None:
+            return cmu_humanoid_recording(path, motion, hints, findings, positions=positions)
+        return skeletal_recording(path, motion, hints, findings, positions=positions)
 
 
-def _skeleton_file(path: Path, hints: Hints) -> Path | None:
+def _skeleton_file(path: Path, hints: Hints, findings: Findings) -> Path | None:
     if hints.skeleton is not None:
         return Path(hints.skeleton)
-    subject = cmu_subject(stem(path)) or stem(path)
-    for name in (f"{stem(path)}.asf", f"{subject}.asf"):
-        for candidate in (path.parent / name, path.parent / f"{name}.gz"):
-            if candidate.is_file():
-                return candidate
+    own = stem(path).lower()
+    named = {own, cmu_subject(own)}
+    beside = sorted(file for file in path.parent.iterdir() if suffix(file) == ".asf")
+    starts = []
+    for file in beside:
+        name = stem(file).lower()
+        if name in named or (own.startswith(name) and not own[len(name)].isalnum()):
+            starts.append(file)
+    if starts:
+        return max(starts, key=lambda file: (stem(file).lower() == own, len(stem(file))))
+    if len(beside) == 1 and not cmu_subject(own):
+        findings.note(f"the skeleton is {beside[0].name}, the only one beside it")
+        return beside[0]
     return None
 
 
-def _frames(path: Path) -> tuple[bool | None, list[tuple[str, int]], FloatArray]:
+def _named_rate(name: str) -> float | None:
+    """Return the rate at the end of names like ``HDM_bd_01-01_01_120`` [1/s]."""
+    match = re.fullmatch(r"[A-Za-z].*_(\d{2,3})", name)
+    return float(match[1]) if match and int(match[1]) in _NAMED_RATES else None
+
+
+def _frames(
+    path: Path, findings: Findings
+) -> tuple[bool | None, list[tuple[str, int]], FloatArray]:
     """Return whether angles are degrees (None: not said), a frame's bones, and the table."""
     lines, places, modes = [], [], set()
     for place, line in enumerate(read_text(path).splitlines(), start=1):
@@ -92,6 +102,10 @@ def _frames(path: Path) -> tuple[bool | None, list[tuple[str, int]], FloatArray]
         wrong = next((i for i, s in enumerate(starts) if s != i * height), len(starts))
         raise bad_file(path, f"frame {wrong} has another number of bones than the first", _EXPECTED)
     count = [int(lines[start][0][:12]) for start in starts]
+    keep = np.append(True, np.diff(count) != 0)
+    if not keep.all():
+        findings.warn(f"{int((~keep).sum())} frames that stand twice are left out")
+        count = [number for number, first in zip(count, keep, strict=True) if first]
     if any(np.diff(count) != 1):
         wrong = int(np.argmax(np.diff(count) != 1))
         raise bad_file(path, f"frame {count[wrong + 1]} follows frame {count[wrong]}", _EXPECTED)
@@ -108,7 +122,7 @@ def _frames(path: Path) -> tuple[bool | None, list[tuple[str, int]], FloatArray]
         layout.append((bone, len(cells)))
         where = places[row::height]
         tables.append(numbers(path, [words[1:] for words in rows], len(cells), where))
-    return degrees, layout, np.concatenate(tables, axis=1)
+    return degrees, layout, np.concatenate(tables, axis=1)[keep]
 
 
 def _arranged(
@@ -117,8 +131,9 @@ def _arranged(
     layout: list[tuple[str, int]],
     table: FloatArray,
     skeleton: str,
+    findings: Findings,
 ) -> FloatArray:
-    """Return the table's columns in the skeleton's order."""
+    """Return the table's columns in the skeleton's order; a bone that it lacks rests."""
     places: dict[str, list[int]] = {}
     at = 0
     for bone, count in layout:
@@ -129,7 +144,8 @@ def _arranged(
     wanted: dict[str, int] = {}
     for column in columns:
         wanted[column.joint] = wanted.get(column.joint, 0) + 1
-    for bone in sorted(wanted.keys() | places.keys()):
+    missing = sorted(wanted.keys() - places.keys() - {"root"})
+    for bone in sorted((wanted.keys() | places.keys()) - set(missing)):
         there = len(places.get(bone, ()))
         if there != wanted.get(bone, 0):
             raise bad_file(
@@ -137,20 +153,20 @@ def _arranged(
                 f"bone {bone!r} has {there} numbers",
                 f"{wanted.get(bone, 0)}, after {skeleton}",
             )
-    if np.isnan(table).any():
-        raise bad_file(path, "a value is nan", "a number for each degree of freedom")
-    order = [place for bone in wanted for place in places[bone]]
-    return table[:, order]
+    if missing:
+        findings.warn(f"bones {', '.join(missing[:8])} have no numbers: they are taken to rest")
+    arranged = np.zeros((len(table), len(columns)))
+    at = 0
+    for bone, count in wanted.items():
+        if bone in places:
+            arranged[:, at : at + count] = table[:, places[bone]]
+        at += count
+    n_missing = int(np.isnan(arranged).sum())
+    if n_missing:
+        findings.warn(f"{n_missing} cells are not numbers: taken as missing")
+    return arranged
 
 
-def _in_si(
-    values: FloatArray, columns: tuple[Column, ...], degrees: bool, unit: float
-) -> FloatArray:
+def _factors(columns: tuple[Column, ...], degrees: bool) -> list[float]:
     turn = np.pi / 180.0 if degrees else 1.0
-    factors: FloatArray = np.array([turn if column.rotates else unit for column in columns])
-    return values * factors
-
-
-def _check_size(path: Path, skeleton: ASFSkeleton) -> None:
-    rest = joint_positions(skeleton.joints, np.zeros((1, len(skeleton.columns))))[0]
-    check_skeleton(path, rest, skeleton.unit_m)
+    return [turn if column.rotates else 1.0 for column in columns]

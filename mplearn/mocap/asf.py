@@ -13,6 +13,7 @@ from ..recording import FloatArray
 from .files import bad_file, read_text
 from .kinematics import Joint
 from .numbers import number
+from .size import named_unit
 from .skeletal import Column
 
 _INCH_M = 0.0254
@@ -35,9 +36,9 @@ class ASFSkeleton:
 
     Attributes:
         columns: What the numbers of an AMC frame mean, in the skeleton's order.
-        joints: Its joints, parents first; one a bone at its near end, and
+        joints: Its joints, parents first, in the file's unit; one a bone at its near end, and
             ``NAME_end`` where a chain ends.
-        unit_m: Length of the unit of length of both files [m].
+        unit_m: Length of the unit of length of both files [m], as the file says.
         degrees: Whether angles are in degrees.
     """
 
@@ -47,13 +48,13 @@ class ASFSkeleton:
     degrees: bool
 
 
-def read_asf(path: Path, unit_m: float | None = None) -> ASFSkeleton:
+def read_asf(path: Path) -> ASFSkeleton:
     """Read a skeleton, plain or gzipped.
+
+    Its unit is ``1 / length`` inches, with the ``length`` of its units, or the one named there.
 
     Args:
         path: The file.
-        unit_m: Length of its unit [m]; by default ``1 / length`` inches, with the ``length`` of its
-            units: the convention of the CMU database (0.0564 m).
 
     Raises:
         RecordingError: The file is not a skeleton, or its bones form no tree below ``root``.
@@ -61,14 +62,16 @@ def read_asf(path: Path, unit_m: float | None = None) -> ASFSkeleton:
     sections = _sections(path)
     units = {words[0].lower(): words[1:] for words in sections["units"]}
     degrees = units.get("angle", ["deg"])[:1] != ["rad"]
+    length = " ".join(units.get("length", ["1"]))
+    unit_m = named_unit(length)
     if unit_m is None:
-        length = number(path, " ".join(units.get("length", ["1"])), "length in :units")
-        if not length > 0:
-            raise bad_file(path, f"length {length} in :units", "a positive number")
-        unit_m = _INCH_M / length
+        inverse = number(path, length, "length in :units")
+        if not inverse > 0:
+            raise bad_file(path, f"length {inverse} in :units", "a positive number")
+        unit_m = _INCH_M / inverse
     turn = np.pi / 180.0 if degrees else 1.0
-    root, columns = _root(path, sections["root"], turn, unit_m)
-    bones = dict(_bones(path, sections["bonedata"], turn, unit_m))
+    root, columns = _root(path, sections["root"], turn)
+    bones = dict(_bones(path, sections["bonedata"], turn))
     if "root" in bones:
         raise bad_file(path, "a bone named 'root'", "another name")
     joints, columns = _tree(
@@ -95,16 +98,14 @@ def _sections(path: Path) -> dict[str, list[list[str]]]:
     return sections
 
 
-def _root(
-    path: Path, lines: list[list[str]], turn: float, unit_m: float
-) -> tuple[Joint, tuple[Column, ...]]:
+def _root(path: Path, lines: list[list[str]], turn: float) -> tuple[Joint, tuple[Column, ...]]:
     words = {line[0].lower(): line[1:] for line in lines}
     dofs = tuple(name.lower() for name in words.get("order", ()))
     if len(set(dofs)) != len(dofs) or not set(dofs) <= {"tx", "ty", "tz", "rx", "ry", "rz"}:
         raise bad_file(
             path, f"root order {' '.join(dofs)!r}", "TX TY TZ RX RY RZ, each at most once"
         )
-    position = _vector(path, words.get("position", ["0", "0", "0"]), "root position") * unit_m
+    position = _vector(path, words.get("position", ["0", "0", "0"]), "root position")
     order = words.get("axis", ["XYZ"])
     axes = _euler(path, words.get("orientation", ["0", "0", "0"]) + order, turn, "root orientation")
     # the AMC's root translation is where the root is, and position only where it starts
@@ -114,7 +115,7 @@ def _root(
             "root",
             -1,
             position,
-            _rotations(columns, 0),
+            rotations_of(columns, 0),
             tuple((c.axis, i) for i, c in enumerate(columns) if not c.rotates),
             before=axes,
             after=axes.T,
@@ -123,9 +124,7 @@ def _root(
     )
 
 
-def _bones(
-    path: Path, lines: list[list[str]], turn: float, unit_m: float
-) -> Iterator[tuple[str, _Bone]]:
+def _bones(path: Path, lines: list[list[str]], turn: float) -> Iterator[tuple[str, _Bone]]:
     seen = set()
     bone, name = _Bone(), ""
     for words in lines:
@@ -137,7 +136,7 @@ def _bones(
         elif key == "direction":
             bone.direction = _vector(path, values, f"direction of bone {name!r}")
         elif key == "length":
-            bone.length = number(path, " ".join(values), f"length of bone {name!r}") * unit_m
+            bone.length = number(path, " ".join(values), f"length of bone {name!r}")
         elif key == "axis":
             bone.axes = _euler(path, values, turn, f"axis of bone {name!r}")
         elif key == "dof":
@@ -194,7 +193,7 @@ def _tree(
                 name,
                 parent,
                 ends[joints[parent].name],
-                _rotations(own, len(columns)),
+                rotations_of(own, len(columns)),
                 before=bone.axes,
                 after=bone.axes.T,
             )
@@ -212,7 +211,7 @@ def _tree(
     return tuple(joints), columns
 
 
-def _rotations(columns: tuple[Column, ...], first: int) -> tuple[tuple[FloatArray, int], ...]:
+def rotations_of(columns: tuple[Column, ...], first: int) -> tuple[tuple[FloatArray, int], ...]:
     """Return the rotations outermost first: what an ASF names first, turns first."""
     turning = [(np.eye(3)[c.axis], first + i) for i, c in enumerate(columns) if c.rotates]
     return tuple(reversed(turning))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import tempfile
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +13,14 @@ import numpy as np
 
 from ..maths.rotations import quaternion_to_matrix
 from ..recording import FloatArray, Recording, marker_channels
+from .asf import ASFSkeleton, rotations_of
 from .files import bad_file, cmu_subject, stem
+from .findings import Findings
 from .kinematics import Joint, joint_positions, skeleton_of, with_axes
-from .skeletal import Column
-from .space import checked_markers, to_z_up
-
-CMU_UNIT_M = 0.0254 / 0.45
-"""Length of the unit of length of CMU's files [m]."""
+from .reader import Hints
+from .size import CMU_UNIT_M
+from .skeletal import Column, SkeletalMotion, angle_channels
+from .space import checked_markers, file_axes, to_z_up
 
 _CMU_DOFS = (
     "root: tx ty tz rx ry rz, lowerback: rx ry rz, upperback: rx ry rz, thorax: rx ry rz, "
@@ -35,49 +38,77 @@ CMU_COLUMNS = tuple(
 )
 """What the 62 numbers of a frame mean for every skeleton of the CMU database."""
 
+
+def _turning_joints() -> Iterator[Joint]:
+    for bone, columns in itertools.groupby(enumerate(CMU_COLUMNS), lambda item: item[1].joint):
+        indexed = list(columns)
+        rotations = rotations_of(tuple(column for _, column in indexed), indexed[0][0])
+        yield Joint(bone, -1, np.zeros(3), rotations)
+
+
+CMU_SKELETON = ASFSkeleton(CMU_COLUMNS, tuple(_turning_joints()), CMU_UNIT_M, True)
+"""What every skeleton of the database has in common: which joint turns how, but no bones."""
+
 _DM_CONTROL_AXES = to_z_up("z", "-y")  # parse_amc turns y to z and leaves x: a person faces -y
 
 
-def cmu_humanoid_positions(
-    path: Path, angles: FloatArray, rate_hz: float, unit_m: float, *, axes: bool = False
+def cmu_humanoid_recording(
+    path: Path, motion: SkeletalMotion, hints: Hints, findings: Findings, *, positions: bool
 ) -> Recording:
-    """Return the joint positions of dm_control's CMU humanoid as it performs a motion.
+    """Return a motion of the CMU database whose skeleton is not known.
 
     Args:
         path: The AMC file.
-        angles: Its values in the order of `CMU_COLUMNS`, shape (T, 62) [m] [rad].
-        rate_hz: Frames per second [1/s].
-        unit_m: Unit that the translations were converted with [m].
-        axes: Whether to show how joints are turned; see `Hints`.
+        motion: Values of `CMU_SKELETON`.
+        hints: What the caller says.
+        findings: What came to light so far.
+        positions: Whether to return where dm_control's CMU humanoid has its joints as it performs
+            the motion, instead of the angles.
 
     Raises:
         RecordingError: There are fewer than the 4 frames that ``parse_amc.convert`` needs.
     """
-    if len(angles) < 4:
-        raise bad_file(path, f"{len(angles)} frames and no ASF", "at least 4 frames, or its ASF")
-    qpos, model = _converted(angles, unit_m)
-    joints = tuple(_joint(model, body) for body in range(1, model.nbody))
-    joints = with_axes(joints) if axes else joints
-    local = joint_positions(joints, qpos)  # (T, J, 3), the root at the origin
-    turned = np.einsum("tij,tkj->tki", quaternion_to_matrix(qpos[:, 3:7]), local)
-    points = turned + qpos[:, None, :3]
-    points = points @ _DM_CONTROL_AXES.T
-    names = tuple(joint.name for joint in joints)
-    checked_markers(path, points, names)
-    channels = marker_channels(names)
-    frames = points.reshape(len(points), -1)
-    skeleton = skeleton_of(joints, qpos, _DM_CONTROL_AXES)
+    unit_m, up = hints.unit_m or motion.space.unit_m, hints.up_axis or "y"
+    findings.note("no ASF lies beside it: taken for one of the CMU database")
+    skeleton = None
+    if not positions:
+        channels, frames = angle_channels(path, motion, file_axes(up, "y", "z"), unit_m)
+    else:
+        if len(motion.values) < 4:
+            raise bad_file(
+                path, f"{len(motion.values)} frames and no ASF", "at least 4 frames, or its ASF"
+            )
+        if np.isnan(motion.values).any():
+            raise bad_file(path, "a value is nan and no ASF", "a number in each cell, or its ASF")
+        qpos, model = _converted(motion.values)
+        findings.note("the bones are those of dm_control's CMU humanoid, not the person's")
+        joints = tuple(_joint(model, body) for body in range(1, model.nbody))
+        joints = with_axes(joints) if hints.joint_axes else joints
+        local = joint_positions(joints, qpos)  # (T, J, 3), the root at the origin
+        points = (
+            np.einsum("tij,tkj->tki", quaternion_to_matrix(qpos[:, 3:7]), local) + qpos[:, None, :3]
+        ) @ _DM_CONTROL_AXES.T
+        names = tuple(joint.name for joint in joints)
+        checked_markers(path, points, names)
+        channels, frames = marker_channels(names), points.reshape(len(points), -1)
+        skeleton = skeleton_of(joints, qpos, _DM_CONTROL_AXES)
     return Recording(
-        frames, rate_hz, channels, stem(path), cmu_subject(stem(path)), skeleton=skeleton
+        frames,
+        motion.rate_hz,
+        channels,
+        stem(path),
+        cmu_subject(stem(path)),
+        skeleton=skeleton,
+        report=findings.report(motion.rate_hz, unit_m, up),
     )
 
 
-def _converted(angles: FloatArray, unit_m: float) -> tuple[FloatArray, Any]:
+def _converted(values: FloatArray) -> tuple[FloatArray, Any]:
     """Return dm_control's positions of the humanoid's joints, shape (T, 63), and its model."""
-    per_unit = [180.0 / np.pi if c.rotates else 1.0 / unit_m for c in CMU_COLUMNS]
+    per_unit = [180.0 / np.pi if column.rotates else 1.0 for column in CMU_COLUMNS]
     lines = [
         f"{number}\nroot {' '.join(map(repr, frame))}\n"
-        for number, frame in enumerate((angles * per_unit).tolist(), start=1)
+        for number, frame in enumerate((values * per_unit).tolist(), start=1)
     ]
     # dm_control warns where there is no screen, and parse_amc leaves its file to the collector
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():

@@ -74,13 +74,18 @@ def joint_positions(joints: tuple[Joint, ...], values: FloatArray) -> FloatArray
     return positions
 
 
-def with_axes(joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
+def with_axes(joints: tuple[Joint, ...], unit_m: float = 1.0) -> tuple[Joint, ...]:
     """Return joints with points on their axes, behind them: they show how each joint is turned.
 
     Each joint that turns gets three, `AXIS_M` along x, y, z of its own frame, as ``NAME>x``.
+
+    Args:
+        joints: Joints in any unit.
+        unit_m: Length of the unit [m].
     """
+    along = AXIS_M / unit_m * _IDENTITY
     return joints + tuple(
-        Joint(f"{joint.name}{AXIS_MARK}{name}", index, AXIS_M * _IDENTITY[axis], is_end=True)
+        Joint(f"{joint.name}{AXIS_MARK}{name}", index, along[axis], is_end=True)
         for index, joint in enumerate(joints)
         if not joint.is_end
         for axis, name in enumerate("xyz")
@@ -101,7 +106,9 @@ def skeleton_of(joints: tuple[Joint, ...], values: FloatArray, axes: FloatArray)
     offsets = np.array([joint.offset for joint in joints])
     for joint, offset in zip(joints, offsets, strict=True):
         for axis, column in joint.translations:
-            offset[axis] = np.nanmedian(values[:, column]) if joint.parent >= 0 else offset[axis]
+            known = values[~np.isnan(values[:, column]), column]
+            if joint.parent >= 0 and len(known):
+                offset[axis] = np.median(known)
     still = tuple(
         Joint(joint.name, joint.parent, offset, (), (), joint.before, joint.after)
         for joint, offset in zip(joints, offsets, strict=True)

@@ -7,10 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from ..maths.continuous_euler import continuous_euler
+from ..maths.rotations import matrix_to_euler
 from ..recording import FloatArray, Recording, marker_channels
 from .files import bad_file, cmu_subject, stem
-from .kinematics import Joint, joint_positions, skeleton_of
-from .space import checked_markers
+from .findings import Findings
+from .kinematics import Joint, joint_positions, skeleton_of, with_axes
+from .reader import Hints
+from .space import Space, placed
 
 
 @dataclass(frozen=True)
@@ -22,66 +26,175 @@ class Column:
         axis: 0-2, the file's x, y or z.
         rotates: Whether it is an angle [rad], not a translation [m].
         of_root: Whether it is a part of the root's pose in the world.
+        name: Name of its channel, where it is not made of the joint's and the axis'.
     """
 
     joint: str
     axis: int
     rotates: bool
     of_root: bool = False
-
-    def channel(self, axes: FloatArray) -> str:
-        """Return its name, ``lfemur.rx`` or ``root.tz``.
-
-        The root's axes are the world's: they get the name that the axis has once z points up. All
-        others are axes of a bone and keep the file's name.
-        """
-        axis = int(np.abs(axes[:, self.axis]).argmax()) if self.of_root else self.axis
-        return f"{self.joint}.{'r' if self.rotates else 't'}{'xyz'[axis]}"
+    name: str = ""
 
 
-def angle_recording(
-    path: Path,
-    columns: tuple[Column, ...],
-    joints: tuple[Joint, ...],
-    values: FloatArray,
-    axes: FloatArray,
-    rate_hz: float,
+@dataclass(frozen=True, eq=False)
+class SkeletalMotion:
+    """What a file of a skeleton holds, in its own axes and unit of length.
+
+    Attributes:
+        joints: Its joints, parents first.
+        columns: What each value means, length C.
+        values: Angles [rad] and translations [the file's unit], shape (T, C); NaN where missing.
+        rate_hz: Frames per second [1/s].
+        space: What the file says of its unit and axes.
+    """
+
+    joints: tuple[Joint, ...]
+    columns: tuple[Column, ...]
+    values: FloatArray
+    rate_hz: float
+    space: Space
+
+
+def skeletal_recording(
+    path: Path, motion: SkeletalMotion, hints: Hints, findings: Findings, *, positions: bool
 ) -> Recording:
-    """Return the columns as channels, angles free of jumps by a full turn.
+    """Return a motion as a recording in metres, z up: where its joints are, or their angles.
+
+    The unit and the vertical axis are settled by where the joints are, whichever is asked for.
 
     Args:
         path: The file.
-        columns: What each column means, length C.
-        joints: The joints that they move, parents first; empty where they are not known.
-        values: Angles [rad] and translations [m], shape (T, C).
-        axes: `to_z_up` of the file, a cyclic exchange of axes, so that angles keep their values.
-        rate_hz: Frames per second [1/s].
+        motion: What it holds.
+        hints: What the caller says.
+        findings: What came to light so far; more is added.
+        positions: Whether the joints' positions are asked for.
     """
-    skeleton = skeleton_of(joints, values, axes) if joints else None
-    values = values.copy()
-    turning = [i for i, column in enumerate(columns) if column.rotates]
-    values[:, turning] = np.unwrap(values[:, turning], axis=0)
-    channels = tuple(column.channel(axes) for column in columns)
-    if len(set(channels)) != len(channels):
-        twice = sorted({name for name in channels if channels.count(name) > 1})
-        raise bad_file(path, f"channels {twice[:5]} more than once", "each channel once")
-    return Recording(
-        values, rate_hz, channels, stem(path), cmu_subject(stem(path)), skeleton=skeleton
-    )
-
-
-def position_recording(
-    path: Path, joints: tuple[Joint, ...], values: FloatArray, axes: FloatArray, rate_hz: float
-) -> Recording:
-    """Return the joints' positions as markers; arguments as for `angle_recording`."""
-    points = joint_positions(joints, values) @ axes.T
+    joints = motion.joints
     names = tuple(joint.name for joint in joints)
-    checked_markers(path, points, names)
+    local = joint_positions(joints, motion.values)
+    place = placed(path, local, names, motion.rate_hz, motion.space, hints, findings)
+    if not positions:
+        channels, frames = angle_channels(path, motion, place.axes, place.unit_m)
+    elif hints.joint_axes:
+        joints = with_axes(joints, place.unit_m)
+        points = joint_positions(joints, motion.values) * place.unit_m @ place.axes.T
+        channels = marker_channels(tuple(joint.name for joint in joints))
+        frames = points.reshape(len(local), -1)
+    else:
+        channels, frames = marker_channels(names), place.points.reshape(len(local), -1)
     return Recording(
-        points.reshape(len(points), -1),
-        rate_hz,
-        marker_channels(names),
+        frames,
+        motion.rate_hz,
+        channels,
         stem(path),
         cmu_subject(stem(path)),
-        skeleton=skeleton_of(joints, values, axes),
+        skeleton=skeleton_of(joints, motion.values, place.unit_m * place.axes),
+        report=findings.report(motion.rate_hz, place.unit_m, place.up),
     )
+
+
+def angle_channels(
+    path: Path, motion: SkeletalMotion, axes: FloatArray, unit_m: float
+) -> tuple[tuple[str, ...], FloatArray]:
+    """Return a motion's columns by name; a joint's angles are a path, see `continuous_euler`.
+
+    The root's axes are the world's: they get the name and the sign that the axis has once z points
+    up. All others are axes of a bone and keep the file's name.
+
+    Args:
+        path: The file, for messages.
+        motion: Its joints need no offsets.
+        axes: Rotation from the file's axes to z up, shape (3, 3); it exchanges axes.
+        unit_m: Length of the file's unit [m].
+
+    Returns:
+        Names, length C: ``lfemur.rx`` or ``root.tz``; angles [rad] and translations [m], shape
+        (T, C).
+    """
+    values = motion.values.copy()
+    for joint in motion.joints:
+        order = "".join("XYZ"[int(axis.argmax())] for axis, _ in joint.rotations)
+        own = [column for _, column in joint.rotations]
+        if own:
+            values[:, own] = continuous_euler(order, values[:, own])
+    names = []
+    for index, column in enumerate(motion.columns):
+        axis, sign = column.axis, 1.0
+        if column.of_root:
+            axis = int(np.abs(axes[:, column.axis]).argmax())
+            sign = float(axes[axis, column.axis])
+        names.append(column.name or f"{column.joint}.{'r' if column.rotates else 't'}{'xyz'[axis]}")
+        values[:, index] *= sign * (1.0 if column.rotates else unit_m)
+    if len(set(names)) != len(names):
+        twice = sorted({name for name in names if names.count(name) > 1})
+        raise bad_file(path, f"channels {twice[:5]} more than once", "each channel once")
+    return tuple(names), values
+
+
+@dataclass(frozen=True, eq=False)
+class Limbs:
+    """A tree of joints whose rotations a file holds as such, without Euler angles.
+
+    Attributes:
+        names: Name of each joint, length J; parents stand before their children, the root first.
+        parents: Index of each joint's parent, -1 for the root.
+        offsets: Where each joint is in its parent's frame, shape (J, 3) [the file's unit].
+        orders: Axes of the Euler angles that each joint's channels are, as ``"YXZ"``; empty for an
+            end site. See `limb_order`.
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    offsets: FloatArray
+    orders: tuple[str, ...]
+
+    def motion(
+        self, rotations: FloatArray, places: FloatArray, rate_hz: float, space: Space
+    ) -> SkeletalMotion:
+        """Return how they move.
+
+        Args:
+            rotations: Of each joint against its parent, of the root against the world, shape
+                (T, J, 3, 3); those of end sites do not count.
+            places: Where the root is, shape (T, 3) [the file's unit].
+            rate_hz: Frames per second [1/s].
+            space: What the file says of its unit and axes.
+        """
+        root = self.names[0]
+        columns = [Column(root, axis, rotates=False, of_root=True) for axis in range(3)]
+        values = [places]
+        joints = []
+        for index, (name, order) in enumerate(zip(self.names, self.orders, strict=True)):
+            first = len(columns)
+            axes = ["XYZ".index(axis) for axis in order]
+            columns += [Column(name, axis, rotates=True, of_root=index == 0) for axis in axes]
+            if order:
+                values.append(matrix_to_euler(order, rotations[:, index]))
+            joints.append(
+                Joint(
+                    name,
+                    self.parents[index],
+                    self.offsets[index],
+                    tuple((np.eye(3)[axis], first + i) for i, axis in enumerate(axes)),
+                    ((0, 0), (1, 1), (2, 2)) if index == 0 else (),
+                    is_end=not order,
+                )
+            )
+        return SkeletalMotion(
+            tuple(joints), tuple(columns), np.concatenate(values, axis=1), rate_hz, space
+        )
+
+
+def limb_order(name: str, *, is_root: bool) -> str:
+    """Return the Euler order that keeps a joint of a person away from gimbal lock.
+
+    For joints whose frames are the world's (x forward, y left, z up) in a T pose. The middle angle
+    must not come near a right angle: the root heads, rolls and pitches; arms are lowered first;
+    legs and trunk bend forward first.
+    """
+    if is_root:
+        return "ZXY"
+    arm = any(
+        part in name.lower() for part in ("shoulder", "collar", "arm", "elbow", "wrist", "hand")
+    )
+    return "XYZ" if arm else "YXZ"

@@ -80,11 +80,13 @@ class Placed:
         points: Shape (T, M, 3) [m].
         unit_m: Length of the file's unit [m].
         up: The file's axis that points up.
+        axes: Rotation from the file's axes to ours, shape (3, 3).
     """
 
     points: FloatArray
     unit_m: float
     up: str
+    axes: FloatArray
 
 
 def placed(
@@ -117,7 +119,7 @@ def placed(
     metres = checked_markers(path, points * unit, names)
     up = hints.up_axis or _settled_up(metres, names, rate_hz, space, findings)
     turn = to_z_up(up, space.forward) if up == space.up else upright(up)
-    return Placed(metres @ turn.T, unit, up)
+    return Placed(metres @ turn.T, unit, up, turn)
 
 
 def _settled_unit(

@@ -13,7 +13,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mocap_writers import WRITERS, write, zipped
 
-from mplearn.errors import InvalidValueError, MPLearnError, RecordingError
+from mplearn.errors import (
+    InvalidValueError,
+    MPLearnError,
+    RecordingError,
+    RecordingWarning,
+)
 from mplearn.mocap import (
     Hints,
     Reader,
@@ -194,6 +199,10 @@ def test_wrong_column_count(valid: dict[str, Path], format: str, tmp_path: Path)
     separator = SEPARATORS.get(format, " ")
     for broken in (lines[-1] + f"{separator}1.5", lines[-1].rsplit(separator, 1)[0]):
         path = _beside(valid[format], tmp_path, "\n".join([*lines[:-1], broken]) + "\n")
+        if format == "BVH" and len(broken) < len(lines[-1]):  # a file that was cut off
+            with pytest.warns(RecordingWarning, match="cut off"):
+                assert len(open_recording(path)) == 11
+            continue
         with pytest.raises(RecordingError, match=f"{path.name}.*expected"):
             open_recording(path)
 
