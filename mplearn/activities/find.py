@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from ..errors import InvalidValueError
+from ..maths.resampling import bridge_gaps
 from ..recording import FloatArray, IntArray
 from .config import ActivityConfig
 from .mixing import group
@@ -66,13 +67,5 @@ def find_activities(
 
 def _complete(frames: FloatArray) -> FloatArray:
     """Return the frames with missing values interpolated; channels never measured are left out."""
-    missing = np.isnan(frames)
-    if not missing.any():
-        return frames
-    frames = frames[:, ~missing.all(axis=0)]
-    missing, times = np.isnan(frames), np.arange(len(frames))
-    complete = frames.copy()
-    for k in np.flatnonzero(missing.any(axis=0)):
-        known = ~missing[:, k]
-        complete[:, k] = np.interp(times, times[known], frames[known, k])
-    return complete
+    filled = bridge_gaps(frames)
+    return filled[:, ~np.isnan(filled).any(axis=0)]

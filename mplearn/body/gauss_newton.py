@@ -17,9 +17,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from mplearn.maths.solvers import bounded_solve, inverse_diagonal
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
-from .bounded import bounded_solve, inverse_diagonal
 from .kinematics import integrate, point_jacobian
 from .linkage import Linkage, locate
 

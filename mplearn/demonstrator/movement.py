@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mplearn.maths.easing import minimum_jerk
 from mplearn.recording import FloatArray, IntArray
 
 from .channels import CHANNELS, LEVERS
@@ -43,7 +44,7 @@ class Movement:
     def displacement(self, times_s: FloatArray) -> FloatArray:
         """Return how far the channels have moved at the given times (T,), shape (T, K)."""
         s = self._phase(times_s)
-        rise = s * s * s * (10.0 + s * (6.0 * s - 15.0))
+        rise = minimum_jerk(s)
         pulse = 64.0 * (s * (1.0 - s)) ** 3
         return np.asarray(self.step * rise + self.bump * pulse)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from mplearn.body import Body
 from mplearn.errors import BodyError
+from mplearn.maths.easing import smooth_step
 from mplearn.maths.rotations import euler_to_matrix, euler_to_quaternion
 from mplearn.recording import FloatArray
 
@@ -119,7 +120,7 @@ class Stance:
         thigh, shank = self._thigh_m, self._shank_m
         back = np.einsum("tji,tj->ti", foot, hip - ankle)  # ankle to hip, in the foot's frame
         share = np.clip(lifted / _LIFTED, 0.0, 1.0)
-        share = share * share * (3.0 - 2.0 * share)
+        share = smooth_step(share)
         reach = self.leg_m * (_STANDING_REACH + share * (_LIFTED_REACH - _STANDING_REACH))
         soft = self.leg_m * (_STANDING_SOFTNESS + share * (_LIFTED_SOFTNESS - _STANDING_SOFTNESS))
         length = np.linalg.norm(back, axis=1)

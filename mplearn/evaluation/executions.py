@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import RecordingError
+from ..maths.resampling import bridge_gaps
 from ..maths.rigid_fit import fit_upright
 from ..recording import FloatArray, LabelledSegment, Recording
 
@@ -37,18 +38,10 @@ def without_gaps(frames: FloatArray, name: str = "") -> FloatArray:
     Raises:
         RecordingError: A column holds no measurement at all.
     """
-    missing = np.isnan(frames)
-    if not missing.any():
-        return frames
-    if missing.all(axis=0).any():
-        raise RecordingError(
-            f"recording {name!r}: column {np.argmax(missing.all(axis=0))} is missing throughout"
-        )
-    filled = frames.copy()
-    at = np.arange(len(frames))
-    for i in np.flatnonzero(missing.any(axis=0)):
-        known = ~missing[:, i]
-        filled[:, i] = np.interp(at, at[known], frames[known, i])
+    filled = bridge_gaps(frames)
+    unseen = np.isnan(filled).any(axis=0)
+    if unseen.any():
+        raise RecordingError(f"recording {name!r}: column {unseen.argmax()} is missing throughout")
     return filled
 
 

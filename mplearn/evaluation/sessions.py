@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import InvalidValueError, RecordingError
+from ..maths.easing import minimum_jerk
 from ..recording import FloatArray, LabelledSegment, Recording
 from .executions import split_repetitions, stood_like, without_gaps
 
@@ -157,7 +158,7 @@ def _continue(
     needed = 1.875 * np.linalg.norm(offset) / max(float(fastest), 1e-12)
     width = round(float(np.clip(needed, rng.uniform(*widths), widths[1])))
     x = np.arange(1, width + 1) / (width + 1)
-    fade = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x**2)  # minimum jerk, 1 -> 0
+    fade = 1.0 - minimum_jerk(x)
     bent = frames.copy()
     bent[:width] += fade[:, None] * offset
     return bent

@@ -6,7 +6,6 @@ from .gaps import gaps_filled as gaps_filled
 from .generate import generate as generate
 from .retime import retime as retime
 from .schedule import GenerativePrimitive as GenerativePrimitive
-from .splines import interpolate as interpolate
 from .styles import STYLES as STYLES
 from .styles import StyleName as StyleName
 from .trajectory import Trajectory as Trajectory

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ..maths.banded import factorise, multiply
 from ..recording import FloatArray, IntArray
-from .banded import factorise, multiply
 
 _WHITE = 1e-10  # of the variance, added to it: frames may otherwise determine one another
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..maths.banded import factorise, solve
 from ..recording import FloatArray, IntArray
-from .banded import factorise, solve
 
 _PINNED = 1e8  # weight of a given start, relative to what else is known of that frame
 

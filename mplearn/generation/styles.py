@@ -10,6 +10,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from ..errors import InvalidValueError
+from ..maths.resampling import stretch
 from ..recording import FloatArray
 from .averaging import average_of_motions
 from .joins import drawn_from, joined
@@ -99,7 +100,7 @@ def nearest(request: Request) -> FloatArray:
         else:
             scale = np.sqrt(primitive.dynamics.variances[0].mean(axis=0))
             costs = [float(np.sum(((f[0] - posture) / scale) ** 2)) for f in primitive.exemplars]
-        pieces.append(_resampled(primitive.exemplars[int(np.argmin(costs))], n_frames))
+        pieces.append(stretch(primitive.exemplars[int(np.argmin(costs))], n_frames))
         posture = pieces[-1][-1]
     return joined(pieces, request.rate_hz, request.blend_s)
 
@@ -139,13 +140,4 @@ def _average_of_samples(
     stays = rng.geometric(1.0 / np.maximum(expected, 1.0), size=(request.n_samples, len(expected)))
     n_own = max(round(expected.sum()), 1)
     average = average_of_motions(hmm.means, hmm.variances, stays, n_own, rng)
-    return _resampled(average, n_frames)
-
-
-def _resampled(frames: FloatArray, n_frames: int) -> FloatArray:
-    """Return a motion in ``n_frames`` frames, by linear interpolation, both ends kept."""
-    place = np.linspace(0, len(frames) - 1, n_frames)
-    before = np.minimum(place.astype(np.int64), max(len(frames) - 2, 0))
-    share = (place - before)[:, None]
-    after = np.minimum(before + 1, len(frames) - 1)
-    return np.asarray((1 - share) * frames[before] + share * frames[after])
+    return stretch(average, n_frames)

@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 
 from ..errors import InvalidValueError
+from ..maths.splines import curvatures, fill_in, spline_values
 from ..recording import FloatArray, IntArray
-from .splines import curvatures, fill_in, spline_values
 from .trajectory import Trajectory
 
 _BLEND_S = 0.1  # half the time over which one primitive's slow-down passes into the next one's

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ModelError
-from ..generation import interpolate
 from ..maths.filters import lowpass
+from ..maths.splines import interpolate
 from ..recording import FloatArray
 
 _KNOT_RATE_HZ = 25.0

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InvalidValueError
-from ..recording import BoolArray, FloatArray, LabelledSegment, Recording
+from ..maths.resampling import bridge_gaps
+from ..recording import FloatArray, LabelledSegment, Recording
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -43,7 +44,7 @@ def resample(recording: Recording, rate_hz: float) -> Recording:
     n_new = int(np.floor((len(recording) - 1) * ratio + 1e-9)) + 1
     places = np.arange(n_new) / ratio  # in old frames
     missing = np.isnan(recording.frames)
-    filled = _bridged(recording.frames, missing)
+    filled = np.nan_to_num(bridge_gaps(recording.frames))
     pad = int(np.ceil(_ZERO_CROSSINGS / (min(1.0, ratio) * _CUTOFF))) + 1
     frames = _kernel(places + pad, len(filled) + 2 * pad, min(1.0, ratio) * _CUTOFF) @ _extended(
         filled, pad
@@ -69,18 +70,6 @@ def _kernel(places: FloatArray, n_old: int, cutoff: float) -> sparse.csr_array:
     return sparse.csr_array(
         (weights.ravel(), np.clip(taps, 0, n_old - 1).ravel(), starts), (len(places), n_old)
     )
-
-
-def _bridged(frames: FloatArray, missing: BoolArray) -> FloatArray:
-    filled = frames.copy()
-    time = np.arange(len(frames))
-    for column in np.flatnonzero(missing.any(axis=0)):
-        gone = missing[:, column]
-        if gone.all():
-            filled[:, column] = 0.0
-        else:
-            filled[gone, column] = np.interp(time[gone], time[~gone], frames[~gone, column])
-    return filled
 
 
 def _extended(frames: FloatArray, pad: int) -> FloatArray:

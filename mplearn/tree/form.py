@@ -4,22 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..maths.resampling import interpolate_linearly
 from ..recording import FloatArray
 from .config import FormConfig
-
-
-def resample(frames: FloatArray, at: FloatArray) -> FloatArray:
-    """Return frames (T, D) at fractional positions (P,), linearly; beside a gap, its edge."""
-    low = np.floor(at).astype(np.int64)
-    high = np.minimum(low + 1, len(frames) - 1)
-    share = (at - low)[:, None]
-    before, after = frames[low], frames[high]
-    points = before + share * (after - before)
-    missing = np.isnan(points)
-    if missing.any():
-        nearest = np.where(share < 0.5, before, after)
-        points = np.where(missing, nearest, points)
-    return np.asarray(points)
 
 
 def weights(config: FormConfig) -> FloatArray:
@@ -32,7 +19,8 @@ def weights(config: FormConfig) -> FloatArray:
 
 def points_of(frames: FloatArray, config: FormConfig) -> FloatArray:
     """Return the P points of a segment (T, D) that are compared, not yet centred."""
-    return resample(frames, np.linspace(config.head, 1, config.n_points) * (len(frames) - 1))
+    places = np.linspace(config.head, 1, config.n_points) * (len(frames) - 1)
+    return interpolate_linearly(frames, places)
 
 
 def centred(points: FloatArray, config: FormConfig) -> FloatArray:

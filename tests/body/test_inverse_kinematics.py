@@ -6,7 +6,6 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from mplearn.body import IKConfig, InverseKinematics, human_body, marker_set, robot_body
-from mplearn.body.bounded import bounded_solve, inverse_diagonal
 from mplearn.body.calibration import Calibration
 from mplearn.body.follower import follower
 from mplearn.body.gauss_newton import solve_frame
@@ -126,28 +125,6 @@ def test_a_frame_is_solved_to_scipys_optimum(body, outlier_m):
     # the kernel sums its base rotation's steps; the difference is of second order in them
     np.testing.assert_allclose(q, best, atol=2e-3)
     assert np.isnan(residuals[3]) and residuals[7] > (0.3 if np.isfinite(outlier_m) else 0.1)
-
-
-def test_bounded_least_squares_satisfies_the_optimality_conditions():
-    rng = np.random.default_rng(6)
-    for _ in range(300):
-        d = int(rng.integers(2, 12))
-        a = rng.normal(size=(d + 3, d))
-        normal, gradient = a.T @ a, rng.normal(size=d) * 3
-        low, high = -rng.uniform(0, 1, d), rng.uniform(0, 1, d)
-        free, step = rng.random(d) > 0.2, np.empty(d)
-        bounded_solve(np.tril(normal), gradient, low, high, free, step)
-        assert ((low <= step) & (step <= high)).all() and not step[~free].any()
-        slope = gradient - normal @ step
-        inner = free & (step > low) & (step < high)
-        np.testing.assert_allclose(slope[inner], 0, atol=1e-8)
-        assert (slope[free & (step <= low)] <= 1e-8).all()
-        assert (slope[free & (step >= high)] >= -1e-8).all()
-        out = np.empty(d)
-        inverse_diagonal(np.tril(normal), free, out)
-        np.testing.assert_allclose(
-            out[free], np.diag(np.linalg.inv(normal[np.ix_(free, free)])), rtol=1e-6
-        )
 
 
 def test_known_bodies_are_followed_exactly():

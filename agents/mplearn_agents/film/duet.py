@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mplearn.maths.easing import smooth_step
 from mplearn.maths.plane import turn_in_plane
 from mplearn.maths.quaternions import quaternion_product, vector_quaternion
+from mplearn.maths.resampling import stretch
 from mplearn.recording import FloatArray, LabelledSegment
 
 if TYPE_CHECKING:
@@ -57,11 +59,7 @@ def accompany(
 
 
 def _stretched(frames: FloatArray, n: int) -> FloatArray:
-    at = np.linspace(0, len(frames) - 1, n)
-    low = np.floor(at).astype(np.int64)
-    high = np.minimum(low + 1, len(frames) - 1)
-    share = (at - low)[:, None]
-    return _unit((1 - share) * frames[low] + share * frames[high])
+    return _unit(stretch(frames, n))
 
 
 def _centred(body: Body, frames: FloatArray) -> FloatArray:
@@ -81,7 +79,7 @@ def _centred(body: Body, frames: FloatArray) -> FloatArray:
 def _joined(last: FloatArray, frames: FloatArray) -> FloatArray:
     """Bend the first postures so that they leave from ``last``."""
     x = np.clip(np.arange(len(frames)) / max(1.0, _BLEND * len(frames)), 0.0, 1.0)
-    fade = 1.0 - x * x * (3.0 - 2.0 * x)
+    fade = 1.0 - smooth_step(x)
     return _unit(frames + fade[:, None] * (last - frames[0]))
 
 

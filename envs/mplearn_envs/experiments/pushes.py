@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mplearn.evaluation.table import Table
+from mplearn.maths.easing import minimum_jerk
 from mplearn.recording import FloatArray
 from mplearn_envs.execution.simulation import Feedback, Simulation
 from mplearn_envs.mechanics import reference_robot, rest_reference
@@ -45,8 +46,7 @@ def push_table(
     rest = rest_reference(robot)
     down = np.stack((rest.target, rest.target))
     down[1, 0] -= _SQUAT_M
-    x = np.linspace(0.0, 1.0, 101)[:, None]
-    x = x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+    x = minimum_jerk(np.linspace(0.0, 1.0, 101)[:, None])
     squat = planner.plan(rest, Motion(down[0] * (1 - x) + down[1] * x, 100.0), 0.5)
     stand = planner.hold(rest, 1.0)
     cases: list[tuple[str, Plan, int]] = [

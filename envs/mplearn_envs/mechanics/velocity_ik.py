@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from mplearn.maths.rotation_kernels import rotation_error
+from mplearn.maths.solvers import solve_damped
 from mplearn.recording import FloatArray, IntArray
 
 from .kinematics import MassTree, Pose, cross, forward, rotate_quaternion
@@ -52,40 +53,6 @@ class Stance(NamedTuple):
     reach: FloatArray
     cog: FloatArray
     carried: FloatArray
-
-
-@njit(cache=True)
-def solve_damped(jacobian: FloatArray, rows: FloatArray, damping: float) -> FloatArray:
-    """Return argmin |J x - rows|^2 + damping^2 |x|^2 (normal equations, Cholesky)."""
-    m, n = jacobian.shape
-    a = np.empty((n, n))
-    x = np.empty(n)
-    for i in range(n):
-        total = 0.0
-        for k in range(m):
-            total += jacobian[k, i] * rows[k]
-        x[i] = total
-        for j in range(i + 1):
-            total = 0.0
-            for k in range(m):
-                total += jacobian[k, i] * jacobian[k, j]
-            a[i, j] = total
-        a[i, i] += damping * damping
-    for i in range(n):
-        for j in range(i + 1):
-            total = a[i, j]
-            for k in range(j):
-                total -= a[i, k] * a[j, k]
-            a[i, j] = np.sqrt(total) if i == j else total / a[j, j]
-    for i in range(n):
-        for k in range(i):
-            x[i] -= a[i, k] * x[k]
-        x[i] /= a[i, i]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            x[i] -= a[k, i] * x[k]
-        x[i] /= a[i, i]
-    return x
 
 
 @njit(cache=True)

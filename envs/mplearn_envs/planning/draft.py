@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mplearn.maths.easing import smooth_step
+from mplearn.maths.resampling import interpolate_linearly
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.mechanics.kinematics import forward
 from mplearn_envs.mechanics.momentum import ground_reaction, momenta, velocities
@@ -150,9 +152,7 @@ class Drafter:
         timeline = lay_out(parts, 1.0 / (motion.rate_hz * speed), knot_s, wait_s, pace.patience)
         at = timeline.progress
         time = np.arange(1.0, len(at) + 1.0) * knot_s
-        low = np.minimum(at.astype(np.int64), n_frames - 2)
-        share = (at - low)[:, None]
-        path = frames[low] * (1 - share) + frames[low + 1] * share
+        path = interpolate_linearly(frames, at)
         moves = wait_s == 0 and parts[0].first < parts[0].last
         first = (frames[1] - frames[0]) * motion.rate_hz * speed if moves else 0.0
         heights = path[:, -2:].copy()
@@ -189,7 +189,7 @@ class Drafter:
         """Return the reference postures and their errors; see `balanced_path`."""
         width = len(self._reference.limits)
         carried = np.clip(targets[:, -2:] / CARRY_M, 0.0, 1.0)
-        carried = carried * carried * (3.0 - 2.0 * carried)
+        carried = smooth_step(carried)
         path: tuple[FloatArray, FloatArray] = balanced_path(
             self._reference, targets[:, :width], targets[:, width:], ground, carried, cog, start.q
         )

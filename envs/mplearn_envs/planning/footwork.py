@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from mplearn.maths.easing import smooth_step
 from mplearn.maths.plane import turn_in_plane, wrap_angle
 from mplearn.maths.yaw_roll_pitch import yaw_roll_pitch_quaternion
 from mplearn.recording import BoolArray, FloatArray, IntArray
@@ -88,7 +89,7 @@ def read_footwork(robot: Robot, frames: FloatArray, rate_hz: float) -> Footwork:
         from_ground = x if start >= 0 else np.full(len(over), np.inf)
         to_ground = len(over) - x if end < len(gap) else np.full(len(over), np.inf)
         near = np.minimum(np.minimum(from_ground, to_ground) / (0.2 * rate_hz), 1.0)
-        clear = CLEAR_M * near**2 * (3.0 - 2.0 * near)
+        clear = CLEAR_M * smooth_step(near)
         rise[inside, side] = over**2 / (over + _SOFT_M) + clear
     legs = np.ascontiguousarray(frames[:, 3 + robot.leg_joints])
     return Footwork(legs, rise, relative, tuple(lifts))

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mplearn.maths.easing import minimum_jerk, smooth_step
 from mplearn.maths.plane import turn_in_plane, wrap_angle
 from mplearn.maths.quaternions import quaternion_product, vector_quaternion
 from mplearn.recording import FloatArray, IntArray
@@ -42,7 +43,7 @@ def plan_ground(
             frame = min(part.lands, len(footwork.rise) - 1)
             place = landing(robot, here, part.up, footwork.left_from_right[frame])
             x = ((np.arange(last - first) + 1.0) / (last - first))[:, None]
-            x = x * x * (3.0 - 2.0 * x)
+            x = smooth_step(x)
             out[first:last, part.up] = here[part.up] * (1.0 - x) + place * x
             here[part.up] = place
         first = last
@@ -183,9 +184,7 @@ def plan_rise(
             out[here] = 0.0
         else:
             out[here, 1 - side] = 0.0
-            x = ((np.arange(last - first) + 1.0) / (last - first)) ** 3
-            z = ((np.arange(last - first) + 1.0) / (last - first))[:, None][:, 0]
-            ramp = x * (10.0 - 15.0 * z + 6.0 * z * z)
+            ramp = minimum_jerk((np.arange(last - first) + 1.0) / (last - first))
             if part.first == part.last and i == 0 and start.up[side] > 0:
                 out[here, side] = start.swing[side - 2] * (1.0 - ramp)
             elif part.first == part.last:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mplearn.maths.easing import smooth_step
 from mplearn.recording import FloatArray, IntArray
 
 from .footwork import Footwork
@@ -151,7 +152,7 @@ def lay_out(
             total_s = delay_s + 0.5 * RAMP_S + length_s
             time = (np.arange(max(2, round(total_s / knot_s))) + 0.5) * knot_s
             x = np.clip((time - delay_s) / RAMP_S, 0.0, 1.0)
-            rates = x * x * (3.0 - 2.0 * x)
+            rates = smooth_step(x)
             waited = False
         else:
             rates = _slowed(max(2, round(max(length_s, least_s) / knot_s)), length_s / knot_s)

@@ -12,6 +12,7 @@ from ... import hmm
 from ...generation import generate
 from ...library import Primitive
 from ...maths.filters import lowpass
+from ...maths.resampling import stretch
 from ...recording import FloatArray, Recording
 from ..executions import split_repetitions
 from ..observing import observe
@@ -112,21 +113,14 @@ def _qualities(
 
 
 def _rmse_deg(frames: FloatArray, human: Sequence[FloatArray]) -> float:
-    ours = _normalised(frames)
-    squares = [np.mean((ours - _normalised(motion)) ** 2) for motion in human]
+    ours = stretch(frames, POINTS)
+    squares = [np.mean((ours - stretch(motion, POINTS)) ** 2) for motion in human]
     return float(np.degrees(np.sqrt(np.mean(squares))))
 
 
 def _jerk(frames: FloatArray, rate_hz: float) -> float:
     """Return the mean |jerk| [rad/s^3]."""
     return float(np.abs(np.diff(frames, n=3, axis=0)).mean() * rate_hz**3)
-
-
-def _normalised(frames: FloatArray) -> FloatArray:
-    place = np.linspace(0, len(frames) - 1, POINTS)
-    before = np.minimum(place.astype(np.int64), len(frames) - 2)
-    share = (place - before)[:, None]
-    return np.asarray((1 - share) * frames[before] + share * frames[before + 1])
 
 
 def _row(way: str, found: dict[str, list[Quality]]) -> tuple[str, ...]:

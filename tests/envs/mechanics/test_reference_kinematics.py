@@ -16,7 +16,6 @@ from mplearn_envs.mechanics.velocity_ik import (
     errors,
     jacobian_rows,
     settle,
-    solve_damped,
 )
 from mplearn_envs.planning.footwork import sole_heights
 from mplearn_envs.robot import humanoid
@@ -82,14 +81,6 @@ def test_the_rows_jacobian_is_their_derivative(seed):
         there[15:18] = rotation_error(pose.rotation[0], after.rotation[0])
         # the guarded height deviates from the plain one by less than 1e-3 of its slope here
         np.testing.assert_allclose((here - there) / h, jacobian[:, column], atol=2e-3)
-
-
-def test_damped_least_squares_is_numpys():
-    rng = np.random.default_rng(0)
-    a, b = rng.normal(size=(18, 18)), rng.normal(size=18)
-    stacked = np.vstack((a, 0.1 * np.eye(18)))
-    expected = np.linalg.lstsq(stacked, np.append(b, np.zeros(18)), rcond=None)[0]
-    np.testing.assert_allclose(solve_damped(a, b, 0.1), expected, atol=1e-9)
 
 
 @settings(max_examples=40, deadline=None)

@@ -20,6 +20,12 @@ def interpolate(knots: FloatArray, places: FloatArray) -> FloatArray:
 
     Returns:
         Values, shape (T, D).
+
+    Example:
+        >>> squares = np.arange(6.0)[:, None] ** 2
+        >>> interpolate(squares, np.array([2.5, 3.5])).round(9)
+        array([[ 6.25],
+               [12.25]])
     """
     own = np.array(knots, dtype=np.float64)  # writable: one form to be compiled for
     return np.asarray(spline_values(own, curvatures(own), places))

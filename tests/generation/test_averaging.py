@@ -1,27 +1,10 @@
-"""Splines, banded matrices and averages against scipy and whole matrices."""
+"""The average of many draws against whole matrices."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import make_interp_spline
 
 from mplearn.generation.averaging import average_of_motions, stretched
-from mplearn.generation.banded import factorise, multiply, solve
-from mplearn.generation.splines import interpolate
-
-
-@pytest.mark.parametrize("n_knots", range(1, 9))
-def test_a_spline_is_scipys(n_knots):
-    rng = np.random.default_rng(n_knots)
-    knots = rng.standard_normal((n_knots, 3))
-    places = np.append(rng.uniform(0, n_knots - 1, 30), [0, n_knots - 1])
-    if n_knots == 1:
-        expected = np.repeat(knots, 32, axis=0)
-    else:
-        degree = min(3, n_knots - 1)
-        expected = make_interp_spline(np.arange(n_knots), knots, k=degree)(places)
-    np.testing.assert_allclose(interpolate(knots, places), expected, atol=1e-12)
 
 
 def whole(columns):
@@ -32,23 +15,6 @@ def whole(columns):
         for i in range(min(columns.shape[1], n - t)):
             out[:, t + i, t] = out[:, t, t + i] = columns[t, i]
     return out
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.integers(1, 30), st.integers(1, 5), st.integers(0, 2**32))
-def test_banded_matrices_are_the_whole_ones(n_rows, n_band, seed):
-    rng = np.random.default_rng(seed)
-    columns = rng.standard_normal((n_rows, n_band, 2))
-    columns[:, 0] = 2 * n_band + rng.uniform(0, 9, (n_rows, 2))
-    matrices, x = whole(columns), rng.standard_normal((n_rows, 2))
-    factor = columns.copy()
-    factorise(factor)
-    for d in range(2):
-        expected = np.linalg.cholesky(matrices[d])
-        np.testing.assert_allclose(multiply(factor, x)[:, d], expected @ x[:, d], atol=1e-10)
-    solved = x.copy()
-    solve(factor, solved)
-    np.testing.assert_allclose(np.einsum("dij,jd->id", matrices, solved), x, atol=1e-10)
 
 
 def matrix_of(n_drawn, n_frames):

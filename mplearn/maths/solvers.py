@@ -1,11 +1,46 @@
-"""Small symmetric systems: least squares between bounds, and the diagonal of an inverse."""
+"""Small least squares in compiled loops: damped, or between bounds; Cholesky for both."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from mplearn.recording import BoolArray, FloatArray
+from ..recording import BoolArray, FloatArray
+
+
+@njit(cache=True)
+def solve_damped(jacobian: FloatArray, rows: FloatArray, damping: float) -> FloatArray:
+    """Return argmin |J x - rows|^2 + damping^2 |x|^2 [Wampler1986], by the normal equations.
+
+    Args:
+        jacobian: J, shape (m, n).
+        rows: Shape (m,).
+        damping: Positive.
+
+    Returns:
+        x, shape (n,).
+
+    Example:
+        >>> solve_damped(np.eye(2), np.array([1.0, 2.0]), 1.0)
+        array([0.5, 1. ])
+    """
+    m, n = jacobian.shape
+    normal = np.empty((n, n))
+    x = np.empty(n)
+    for i in range(n):
+        total = 0.0
+        for k in range(m):
+            total += jacobian[k, i] * rows[k]
+        x[i] = total
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(m):
+                total += jacobian[k, i] * jacobian[k, j]
+            normal[i, j] = total
+        normal[i, i] += damping * damping
+    cholesky(normal)
+    cholesky_solve(normal, x)
+    return x
 
 
 @njit(cache=True)
@@ -29,6 +64,12 @@ def bounded_solve(
         high: Upper bounds, shape (d,).
         free: Unknowns that may move at all, shape (d,).
         step: The solution, shape (d,), filled.
+
+    Example:
+        >>> step, bound = np.empty(2), np.array([1.0, 1.0])
+        >>> bounded_solve(np.eye(2), np.array([0.5, 3.0]), -bound, bound, bound > 0, step)
+        >>> step
+        array([0.5, 1. ])
     """
     d = len(gradient)
     fixed = ~free
@@ -80,7 +121,15 @@ def bounded_solve(
 
 @njit(cache=True)
 def cholesky(a: FloatArray) -> None:
-    """Factor a symmetric positive definite matrix in place, lower triangle."""
+    """Factor a symmetric positive definite matrix in place, lower triangle.
+
+    Example:
+        >>> a = np.array([[4.0, 0.0], [2.0, 5.0]])
+        >>> cholesky(a)
+        >>> a
+        array([[2., 0.],
+               [1., 2.]])
+    """
     for i in range(len(a)):
         for j in range(i + 1):
             value = a[i, j]
@@ -91,7 +140,14 @@ def cholesky(a: FloatArray) -> None:
 
 @njit(cache=True)
 def cholesky_solve(factor: FloatArray, x: FloatArray) -> None:
-    """Solve L L' x = b in place."""
+    """Solve L L' x = b in place.
+
+    Example:
+        >>> x = np.array([8.0])
+        >>> cholesky_solve(np.array([[2.0]]), x)
+        >>> x
+        array([2.])
+    """
     d = len(x)
     for i in range(d):
         value = x[i]
@@ -106,7 +162,14 @@ def cholesky_solve(factor: FloatArray, x: FloatArray) -> None:
 
 @njit(cache=True)
 def inverse_diagonal(normal: FloatArray, free: BoolArray, out: FloatArray) -> None:
-    """Fill the diagonal of the inverse of the free part of a matrix, given its lower triangle."""
+    """Fill the diagonal of the inverse of the free part of a matrix, given its lower triangle.
+
+    Example:
+        >>> out = np.zeros(2)
+        >>> inverse_diagonal(np.diag([4.0, 2.0]), np.array([True, True]), out)
+        >>> out
+        array([0.25, 0.5 ])
+    """
     rows = np.flatnonzero(free)
     factor = np.empty((len(rows), len(rows)))
     for i in range(len(rows)):

@@ -14,7 +14,15 @@ from ..recording import FloatArray
 
 @njit(cache=True, error_model="numpy")
 def factorise(columns: FloatArray) -> None:
-    """Replace positive definite matrices, shape (T, B, D), by L."""
+    """Replace positive definite matrices, shape (T, B, D), by L.
+
+    Example:
+        >>> columns = np.array([[[4.0], [2.0]], [[5.0], [0.0]]])  # of [[4, 2], [2, 5]]
+        >>> factorise(columns)
+        >>> columns[..., 0]
+        array([[2., 1.],
+               [2., 0.]])
+    """
     n_rows, n_band, n_channels = columns.shape
     scale = np.empty(n_channels)
     for t in range(n_rows):
@@ -34,7 +42,12 @@ def factorise(columns: FloatArray) -> None:
 
 @njit(cache=True, error_model="numpy")
 def multiply(factor: FloatArray, x: FloatArray) -> FloatArray:
-    """Return L x, shape (T, D)."""
+    """Return L x, shape (T, D).
+
+    Example:
+        >>> multiply(np.array([[[2.0]]]), np.array([[3.0]]))
+        array([[6.]])
+    """
     product = np.zeros_like(x)
     for t in range(factor.shape[0]):
         for i in range(min(factor.shape[1], factor.shape[0] - t)):
@@ -45,7 +58,14 @@ def multiply(factor: FloatArray, x: FloatArray) -> FloatArray:
 
 @njit(cache=True, error_model="numpy")
 def solve(factor: FloatArray, x: FloatArray) -> None:
-    """Replace right-hand sides, shape (T, D), by the solutions of L L^T x = rhs."""
+    """Replace right-hand sides, shape (T, D), by the solutions of L L^T x = rhs.
+
+    Example:
+        >>> x = np.array([[8.0]])
+        >>> solve(np.array([[[2.0]]]), x)
+        >>> x
+        array([[2.]])
+    """
     n_rows, n_band, n_channels = factor.shape
     for t in range(n_rows):
         for d in range(n_channels):

@@ -1,0 +1,69 @@
+"""Motions at other times: linear interpolation, and what gaps in time are filled with."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..recording import FloatArray
+
+
+def interpolate_linearly(frames: FloatArray, places: FloatArray) -> FloatArray:
+    """Return frames at fractional places; beside a gap, its edge.
+
+    Args:
+        frames: Shape (T, D); NaN where missing.
+        places: In frames, shape (P,), in [0, T - 1].
+
+    Returns:
+        Shape (P, D).
+
+    Example:
+        >>> interpolate_linearly(np.array([[0.0], [1.0], [3.0]]), np.array([0.5, 1.5, 2.0]))
+        array([[0.5],
+               [2. ],
+               [3. ]])
+    """
+    low = np.floor(places).astype(np.int64)
+    high = np.minimum(low + 1, len(frames) - 1)
+    share = (places - low)[:, None]
+    before, after = frames[low], frames[high]
+    found = before + share * (after - before)
+    missing = np.isnan(found)
+    if missing.any():
+        found = np.where(missing, np.where(share < 0.5, before, after), found)
+    return np.asarray(found)
+
+
+def stretch(frames: FloatArray, n_frames: int) -> FloatArray:
+    """Return a motion, shape (T, D), in so many frames, both ends kept; see above.
+
+    Example:
+        >>> stretch(np.array([[0.0], [4.0]]), 3)
+        array([[0.],
+               [2.],
+               [4.]])
+    """
+    return interpolate_linearly(frames, np.linspace(0, len(frames) - 1, n_frames))
+
+
+def bridge_gaps(frames: FloatArray) -> FloatArray:
+    """Return frames without gaps, which are bridged linearly in time; ends are held.
+
+    Args:
+        frames: Shape (T, D); NaN where missing. They are returned themselves where none is.
+
+    Returns:
+        Shape (T, D); channels that are missing throughout stay so.
+
+    Example:
+        >>> bridge_gaps(np.array([[1.0], [np.nan], [3.0], [np.nan]])).ravel()
+        array([1., 2., 3., 3.])
+    """
+    missing = np.isnan(frames)
+    if not missing.any():
+        return frames
+    filled, times = frames.copy(), np.arange(len(frames))
+    for column in np.flatnonzero(missing.any(axis=0) & ~missing.all(axis=0)):
+        known = ~missing[:, column]
+        filled[~known, column] = np.interp(times[~known], times[known], frames[known, column])
+    return filled

@@ -1,0 +1,65 @@
+"""Small and banded systems against whole matrices of numpy."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mplearn.maths.banded import factorise, multiply, solve
+from mplearn.maths.solvers import bounded_solve, inverse_diagonal, solve_damped
+
+
+def test_damped_least_squares_is_numpys():
+    rng = np.random.default_rng(0)
+    a, b = rng.normal(size=(18, 18)), rng.normal(size=18)
+    stacked = np.vstack((a, 0.1 * np.eye(18)))
+    expected = np.linalg.lstsq(stacked, np.append(b, np.zeros(18)), rcond=None)[0]
+    np.testing.assert_allclose(solve_damped(a, b, 0.1), expected, atol=1e-9)
+
+
+def test_bounded_least_squares_satisfies_the_optimality_conditions():
+    rng = np.random.default_rng(6)
+    for _ in range(300):
+        d = int(rng.integers(2, 12))
+        a = rng.normal(size=(d + 3, d))
+        normal, gradient = a.T @ a, rng.normal(size=d) * 3
+        low, high = -rng.uniform(0, 1, d), rng.uniform(0, 1, d)
+        free, step = rng.random(d) > 0.2, np.empty(d)
+        bounded_solve(np.tril(normal), gradient, low, high, free, step)
+        assert ((low <= step) & (step <= high)).all() and not step[~free].any()
+        slope = gradient - normal @ step
+        inner = free & (step > low) & (step < high)
+        np.testing.assert_allclose(slope[inner], 0, atol=1e-8)
+        assert (slope[free & (step <= low)] <= 1e-8).all()
+        assert (slope[free & (step >= high)] >= -1e-8).all()
+        out = np.empty(d)
+        inverse_diagonal(np.tril(normal), free, out)
+        np.testing.assert_allclose(
+            out[free], np.diag(np.linalg.inv(normal[np.ix_(free, free)])), rtol=1e-6
+        )
+
+
+def whole(columns):
+    """Return the matrices, shape (D, T, T), of their columns from the diagonal down."""
+    n = len(columns)
+    out = np.zeros((columns.shape[2], n, n))
+    for t in range(n):
+        for i in range(min(columns.shape[1], n - t)):
+            out[:, t + i, t] = out[:, t, t + i] = columns[t, i]
+    return out
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 30), st.integers(1, 5), st.integers(0, 2**32))
+def test_banded_matrices_are_the_whole_ones(n_rows, n_band, seed):
+    rng = np.random.default_rng(seed)
+    columns = rng.standard_normal((n_rows, n_band, 2))
+    columns[:, 0] = 2 * n_band + rng.uniform(0, 9, (n_rows, 2))
+    matrices, x = whole(columns), rng.standard_normal((n_rows, 2))
+    factor = columns.copy()
+    factorise(factor)
+    for d in range(2):
+        expected = np.linalg.cholesky(matrices[d])
+        np.testing.assert_allclose(multiply(factor, x)[:, d], expected @ x[:, d], atol=1e-10)
+    solved = x.copy()
+    solve(factor, solved)
+    np.testing.assert_allclose(np.einsum("dij,jd->id", matrices, solved), x, atol=1e-10)
