@@ -27,10 +27,10 @@ from .sides import facing_votes
 SOME_FRAMES = 120  # of a recording are looked at
 STRAIGHT = 0.9  # cosine of a leg's bend at which the zero pose still stands
 FLAT = 0.8  # cosine between a foot and the vertical up to which it stands on its sole
-_TABLE = TABLES["joint_centres"]
+_TABLE = TABLES["landmarks"]
 _ARM = ("shoulder", "elbow", "wrist")
 # lengths on the human of 1.75 m [m]: what the person's are compared with
-_REFERENCE_M = {"trunk": 0.5775, "thigh": 0.42875, "shank": 0.4305, "arm": 0.581}
+_REFERENCE_M = {"trunk": 0.5775, "thigh": 0.42875, "shank": 0.4305, "shoulders": 0.35}
 _STATURE_M = 1.75
 _PEOPLE_M = (0.7, 2.3)  # statures
 _UNITS_M = (1.0, 0.1, 0.01, 0.001, 0.0254, 0.3048, 0.0254 / 0.45)
@@ -167,8 +167,7 @@ class _Builder:
         long = np.linalg.norm(up, axis=1)
         rough = float(np.median(long)) / (_REFERENCE_M["trunk"] - 0.084)
         # the base of the neck is 8 cm above the shoulders on the human of 1.75 m
-        candidates = [self.arms.root, *self.plan.head[:2]] if self.plan.head else []
-        candidates = candidates[: max(1, len(self.plan.head))] or [self.arms.root]
+        candidates = [self.arms.root, *self.plan.head[:2]]
         above = [
             float(np.median(((self._at(n) - mid_shoulders) * up).sum(axis=1) / long))
             for n in candidates
@@ -195,7 +194,12 @@ class _Builder:
                 f"the person would be {self.stature_m:.3g} m tall: all lengths are multiplied by "
                 f"{self.factor:.4g} (--unit settles it)"
             )
-        self.size = float(measured / expected)  # relative to the reference, in the recording's unit
+        # relative to the reference, in the recording's unit
+        self.size = float(measured / expected)
+        wide = float(np.median(np.linalg.norm(self._between(self.arms), axis=1)))
+        self.trunk_sizes = np.array(
+            [self.size, wide / _REFERENCE_M["shoulders"], trunk / _REFERENCE_M["trunk"]]
+        )
 
     # ---- what upright is
 
@@ -279,10 +283,16 @@ class _Builder:
         self.used[place] = (node,)
 
     def _on(
-        self, place: str, node: int, joint: int, axes: FloatArray, at: tuple[float, float, float]
+        self,
+        place: str,
+        node: int,
+        joint: int,
+        axes: FloatArray,
+        at: FloatArray,
+        sizes: float | FloatArray,
     ) -> None:
         """Put a place on a bone: from a node, so far along the upright body's axes there."""
-        vector = axes @ (self.size * np.array(at))
+        vector = axes @ (sizes * at)
         share = np.linalg.solve(self._shown(joint).T, vector)
         row = {self.tree.joints[node][0]: 1.0}
         row[joint] = row.get(joint, 0.0) - float(share.sum())
@@ -324,11 +334,11 @@ class _Builder:
         if axes is not None:
             for place in ("sternum", "back", "chest_l", "chest_r"):
                 at = np.array(_TABLE[place][1]) - _TABLE["neck"][1]
-                self._on(place, self.neck, chest, axes, tuple(at))
+                self._on(place, self.neck, chest, axes, at, self.trunk_sizes)
 
     def _on_middle_of_hips(self, place: str, joint: int, axes: FloatArray) -> None:
         left, right = (side[0] for side in self.legs.nodes)
-        self._on(place, left, joint, axes, _TABLE[place][1])
+        self._on(place, left, joint, axes, np.array(_TABLE[place][1]), self.trunk_sizes)
         row = self.rows[place]
         for node in (left, right):
             first = self.tree.joints[node][0]
@@ -351,7 +361,7 @@ class _Builder:
     def _head(self) -> None:
         way = (self.arms.root, *self.plan.head)
         after = way[way.index(self.neck) + 1 :]
-        if not after:
+        if not after and self.neck == self.arms.root:
             return
         far = [self.tree.length(self.neck, node) for node in after]
         rise = _TABLE["skull"][1][2]
@@ -366,7 +376,7 @@ class _Builder:
         if axes is not None:
             for place in ("face", "ear_l", "ear_r", "crown"):
                 at = np.array(_TABLE[place][1]) - origin
-                self._on(place, skull, joint, axes, tuple(at))
+                self._on(place, skull, joint, axes, at, self.size)
         elif beyond and self._is_crown(skull, beyond[-1]):
             self._towards("crown", skull, beyond[-1:], _TABLE["crown"][1][2] - origin[2])
 
@@ -379,6 +389,7 @@ class _Builder:
         toward = self.tree.way(elbow, wrist)[-2]
         fingers = [node for node in self.tree.edges[wrist] if node != toward]
         if not fingers:
+            self._stiff_hand(side, elbow, wrist)
             return
         thumb = self._thumb(wrist, fingers)
         knuckles = tuple(node for node in fingers if node != thumb)
@@ -398,6 +409,14 @@ class _Builder:
             self.rows[f"thumb_side_{side}"] = row
             self.used[f"thumb_side_{side}"] = (near, far, thumb)
 
+    def _stiff_hand(self, side: str, elbow: int, wrist: int) -> None:
+        """Where the hand has no end: it goes on from the forearm in the zero pose."""
+        joint = self.tree.joints[wrist][-1]
+        if joint in self.axes:
+            way = _unit(self.tree.rest[wrist] - self.tree.rest[elbow])
+            length = -_TABLE["hand_l"][1][2]
+            self._on(f"hand_{side}", wrist, joint, np.eye(3), length * way, self.size)
+
     def _thumb(self, wrist: int, fingers: list[int]) -> int | None:
         """Return the finger that is the thumb: named so, or the one that stands off most."""
         if len(fingers) < 2:
@@ -413,16 +432,16 @@ class _Builder:
         return fingers[int(np.argmin(off))]
 
     def _foot(self, side: str) -> None:
-        at = "lr".index(side)
-        ankle = self.legs.nodes[at][2]
-        outer = self.legs.outer[at]
-        if not outer:
-            return
-        joint = self._turner(outer[0])
-        axes = self._foot_axes(joint, ankle, outer[-1])
+        leg = "lr".index(side)
+        ankle, outer = self.legs.nodes[leg][2], self.legs.outer[leg]
+        joint = self._turner(outer[0]) if outer else self.tree.joints[ankle][-1]
+        axes = self._foot_axes(joint, ankle, outer[-1]) if outer else self._neutral(joint)
         if axes is not None:
             for place in ("ball", "heel"):
-                self._on(f"{place}_{side}", ankle, joint, axes, _TABLE[f"{place}_l"][1])
+                at = np.array(_TABLE[f"{place}_l"][1])
+                self._on(f"{place}_{side}", ankle, joint, axes, at, self.size)
+            return
+        if not outer:
             return
         ball = float(np.linalg.norm(_TABLE["ball_l"][1]))
         self._towards(f"ball_{side}", ankle, outer[:1], ball)

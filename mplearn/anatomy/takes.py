@@ -12,6 +12,7 @@ from ..body import find_marker_set
 from ..errors import BodyError, MPLearnError
 from ..recording import Recording, marker_channels
 from .body_map import BodyMap
+from .markers import recognise_markers
 from .skeletons import recognise_skeleton
 
 
@@ -22,26 +23,29 @@ class Bodies:
     Attributes:
         recordings: Those in which a body was recognised, all with the same channels: a point that a
             take lacks is NaN there.
-        maps: How each was recognised, by its name; None where its names are those of a known
-            marker set.
+        maps: How each was recognised, by its name.
         refused: Why not, by name, for the others.
     """
 
     recordings: tuple[Recording, ...]
-    maps: Mapping[str, BodyMap | None]
+    maps: Mapping[str, BodyMap]
     refused: Mapping[str, MPLearnError]
 
 
-def recognise(recording: Recording) -> BodyMap | None:
-    """Find the body in a recording; None where its names are those of a known marker set.
+def recognise(recording: Recording, *, names: Mapping[str, str] | None = None) -> BodyMap:
+    """Find the body in a recording of markers, or of joint positions with their skeleton.
+
+    Args:
+        recording: Markers [m], or joint positions, best with the joints' axes
+            (`Hints.joint_axes`).
+        names: Place of the body by point, for what is known better; "" leaves a point out.
 
     Raises:
         BodyError: There is no body in it, with the reason, and the option that would settle it.
     """
     if recording.skeleton is not None and recording.is_markers:
         return recognise_skeleton(recording)
-    find_marker_set(recording.marker_names)
-    return None
+    return recognise_markers(recording, names)
 
 
 def as_bodies(recordings: Sequence[Recording], *, strict: bool = False) -> Bodies:
@@ -57,13 +61,13 @@ def as_bodies(recordings: Sequence[Recording], *, strict: bool = False) -> Bodie
     Raises:
         BodyError: No take holds a body, or one does not and ``strict`` is set.
     """
-    maps: dict[str, BodyMap | None] = {}
+    maps: dict[str, BodyMap] = {}
     refused: dict[str, MPLearnError] = {}
     found: list[Recording] = []
     for recording in recordings:
         try:
             body = recognise(recording)
-            found.append(recording if body is None else body.apply(recording))
+            found.append(body.apply(recording))
         except MPLearnError as error:
             if strict or len(recordings) == 1:
                 raise
@@ -78,7 +82,7 @@ def as_bodies(recordings: Sequence[Recording], *, strict: bool = False) -> Bodie
 
 
 def _of_one_kind(
-    found: list[Recording], maps: dict[str, BodyMap | None], refused: dict[str, MPLearnError]
+    found: list[Recording], maps: dict[str, BodyMap], refused: dict[str, MPLearnError]
 ) -> list[Recording]:
     """Return the takes of the marker set that most have."""
     kinds = [find_marker_set(recording.marker_names).name for recording in found]

@@ -31,6 +31,11 @@ from .tree import KinematicTree
 # they can before the places may take up the rest, or a bent knee passes for misplaced markers
 PLACE_SIGMAS_M = (*[0.001] * 6, 0.003, 0.01, 0.02)
 SIZE_SIGMA, FIXED_SIGMA = 0.08, 1e-4  # of a segment's length, relative to the overall size
+JOINT_SIGMA_M = 0.002  # the same for a point that lies at a joint: no skin is between
+# points at so many joints measure most segments: sizes need little assumed, and many rounds until
+# they and the postures agree
+MANY_JOINTS, MEASURED_SIGMA = 8, 0.3
+JOINT_PLACE_SIGMAS_M = (*[0.001] * 24, 0.003, 0.01)
 FRAMES = 12  # postures that the fit takes from the stretch it is given
 WORST_FIT_M = 0.06  # root mean square distance above which the markers are not this body's
 
@@ -89,7 +94,13 @@ def fit(follower: Follower, markers: MarkerSet, frames: FloatArray) -> Calibrati
     bodies, template = markers.attach(person.tree)
     size, start = place_trunk(person, bodies, template, chosen[0])
     sizes = np.full_like(person.tree.offset, size)
-    found = _alternate(person, sizes, SIZE_SIGMA, bodies, template, start, chosen)
+    joints = markers.at_joints()
+    firm = np.where(joints, JOINT_SIGMA_M, np.inf)
+    measured_all = joints.sum() >= MANY_JOINTS
+    sigma = MEASURED_SIGMA if measured_all else SIZE_SIGMA
+    rounds = JOINT_PLACE_SIGMAS_M if measured_all else PLACE_SIGMAS_M
+    places_m = [np.minimum(place_sigma_m, firm) for place_sigma_m in rounds]
+    found = _alternate(person, sizes, sigma, bodies, template, places_m, start, chosen)
     if person is not follower:
         measured = person.tree.scaled(found.factors)
         sizes = match_sizes(follower.tree, measured)
@@ -98,7 +109,8 @@ def fit(follower: Follower, markers: MarkerSet, frames: FloatArray) -> Calibrati
         start = follower.tree.rest
         start[:7] = found.postures[0, :7]
         template = template / sizes[bodies]
-        found = _alternate(follower, sizes, FIXED_SIGMA, bodies, template, start, chosen)
+        places_m = [np.full(len(bodies), place_sigma_m) for place_sigma_m in PLACE_SIGMAS_M]
+        found = _alternate(follower, sizes, FIXED_SIGMA, bodies, template, places_m, start, chosen)
     rms = float(np.sqrt(np.nanmean(found.residuals**2)))
     if rms > WORST_FIT_M:
         mean = np.nan_to_num(np.nanmean(found.residuals, axis=0))
@@ -134,6 +146,7 @@ def _alternate(
     size_sigma: float,
     bodies: IntArray,
     template: FloatArray,
+    places_m: Sequence[FloatArray],
     start: FloatArray,
     frames: FloatArray,
 ) -> _Fit:
@@ -147,7 +160,7 @@ def _alternate(
         postures[k] = last
         settle(follower, tree, bodies, offsets, postures[k : k + 1], frames[k : k + 1])
         last = postures[k]
-    for place_sigma_m in PLACE_SIGMAS_M:
+    for place_sigma_m in places_m:
         factors, offsets = fit_sizes(
             follower.tree, sizes, size_sigma, bodies, template, postures, frames, place_sigma_m
         )

@@ -98,8 +98,9 @@ _CMU41 = (
     | _sides(_ARM)
 )
 
-# joints, and points that show how the trunk, the head, the hands and the feet are turned: what
-# `mplearn.anatomy` makes of skeletons and of markers at joints
+# what `mplearn.anatomy` makes of skeletons and of markers with any labels: joints, points that show
+# how trunk, head, hands and feet are turned, and landmarks of the skin
+_ORIGIN: Offset = (0.0, 0.0, 0.0)
 _JOINT_SIDE: Table = {
     "hip": ("pelvis", (0.0, 0.0875, 0.0)),
     "knee": ("thigh_l", (0.0, 0.0, -0.42875)),
@@ -115,6 +116,7 @@ _JOINT_SIDE: Table = {
     "ear": ("head", (0.0, 0.075, 0.120)),
 }
 _JOINTS = {
+    "pelvis": ("pelvis", _ORIGIN),
     "pelvis_front": ("pelvis", (0.100, 0.0, 0.0)),
     "pelvis_back": ("pelvis", (-0.100, 0.0, 0.0)),
     "lumbar": ("pelvis", (0.0, 0.0, 0.07875)),
@@ -126,10 +128,68 @@ _JOINTS = {
     "crown": ("head", (0.0, 0.0, 0.235)),
     **_sides(_JOINT_SIDE, "{}_l", "{}_r"),
 }
+_SKIN = {
+    "head_top": ("head", (0.010, 0.0, 0.235)),
+    "head_front": ("head", (0.110, 0.0, 0.165)),
+    "head_rear": ("head", (-0.085, 0.0, 0.170)),
+    "nose": ("head", (0.125, 0.0, 0.100)),
+    "c7": _TRUNK["C7"],
+    "t2": ("chest", (-0.085, 0.0, 0.290)),
+    "t8": ("chest", (-0.130, 0.0, 0.170)),
+    "t10": _TRUNK["T10"],
+    "l1": ("abdomen", (-0.120, 0.0, 0.120)),
+    "l3": ("abdomen", (-0.110, 0.0, 0.050)),
+    "l5": ("pelvis", (-0.110, 0.0, 0.105)),
+    "jugular_notch": _TRUNK["CLAV"],
+    "xiphoid": _TRUNK["STRN"],
+    "sacrum": ("pelvis", (-0.112, 0.0, 0.092)),
+    **_sides(
+        {
+            "head_front": _HEAD["FHD"],
+            "head_rear": _HEAD["BHD"],
+            "head_side": ("head", (0.010, 0.085, 0.165)),
+            "eye": ("head", (0.110, 0.032, 0.130)),
+            "scapula": ("chest", (-0.125, 0.085, 0.225)),
+            "acromion": _ARM["SHO"],
+            "shoulder_back": ("clavicle_l", (-0.075, 0.115, 0.000)),
+            "upper_arm": _ARM["UPA"],
+            "elbow_outer": _ARM["ELB"],
+            "elbow_inner": ("upper_arm_l", (-0.005, -0.046, -0.325)),
+            "forearm": _ARM["FRM"],
+            "wrist_thumb": _ARM["WRA"],
+            "wrist_little": _ARM["WRB"],
+            "wrist_back": ("forearm_l", (0.0, 0.032, -0.245)),
+            "knuckle": _ARM["FIN"],
+            "knuckle_index": ("hand_l", (0.035, 0.014, -0.085)),
+            "knuckle_little": ("hand_l", (-0.035, 0.012, -0.080)),
+            "iliac_front": _HIP["ASI"],
+            "iliac_back": _HIP["PSI"],
+            "iliac_crest": ("pelvis", (0.015, 0.155, 0.125)),
+            "trochanter": ("pelvis", (0.0, 0.170, -0.010)),
+            "thigh_outer": _LEG["THI"],
+            "thigh_front": ("thigh_l", (0.095, 0.010, -0.250)),
+            "knee_outer": _LEG["KNE"],
+            "knee_inner": ("thigh_l", (0.0, -0.058, -0.420)),
+            "fibula_head": ("shank_l", (-0.010, 0.058, -0.040)),
+            "tibia_top": ("shank_l", (0.058, 0.0, -0.060)),
+            "shank_outer": _LEG["TIB"],
+            "shank_front": ("shank_l", (0.055, 0.0, -0.200)),
+            "ankle_outer": _LEG["ANK"],
+            "ankle_inner": ("shank_l", (0.005, -0.045, -0.418)),
+            "heel_back": _LEG["HEE"],
+            "metatarsal1": ("foot_l", (0.120, -0.038, -0.035)),
+            "metatarsal2": _LEG["TOE"],
+            "metatarsal5": _LEG["MT5"],
+            "toe_tip": ("toes_l", (0.075, -0.012, 0.010)),
+        },
+        "{}_l",
+        "{}_r",
+    ),
+}
 
 TABLES: dict[str, Table] = {
     "paper34": _PAPER34,
     "plug_in_gait39": _PLUG_IN_GAIT,
     "cmu41": _CMU41,
-    "joint_centres": _JOINTS,
+    "landmarks": _JOINTS | _SKIN,
 }

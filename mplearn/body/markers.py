@@ -15,14 +15,15 @@ from functools import cache
 import numpy as np
 
 from mplearn.errors import BodyError
-from mplearn.recording import FloatArray, IntArray
+from mplearn.recording import BoolArray, FloatArray, IntArray
 
 from .human import human_body
 from .marker_tables import TABLES
 from .tree import KinematicTree
 
 CARRIER = {"abdomen": "pelvis", "clavicle_l": "chest", "clavicle_r": "chest"}
-LEAST_SHARE = 0.6  # of a recording's markers that a set must know to be taken for it
+LEAST_SHARE = 0.6  # of a recording's markers that a set must know to be taken for it,
+LEAST_OF_SET = 0.75  # or of the set's own that must be among them
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +66,20 @@ class MarkerSet:
         """Return, for each name of a recording, whether it is in this set."""
         known = {plain_name(name) for name in self.names}
         return tuple(plain_name(name) in known for name in marker_names)
+
+    def at_joints(self) -> BoolArray:
+        """Return which markers lie at the joint of two segments of a limb, shape (M,)."""
+        tree = human_body().tree
+        joints = {
+            (tree.body_names[tree.parent[child]], *np.round(tree.offset[child], 6))
+            for child, name in enumerate(tree.body_names)
+            if tree.parent[child] >= 0 and name != "head"  # necks begin at many places
+        }
+        at = [
+            (body, *np.round(offset, 6)) in joints
+            for body, offset in zip(self.bodies, self.offsets, strict=True)
+        ]
+        return np.array(at, dtype=np.bool_)
 
     def attach(
         self, tree: KinematicTree, reference: KinematicTree | None = None
@@ -152,7 +167,8 @@ def find_marker_set(marker_names: Sequence[str]) -> MarkerSet:
         raise BodyError(f"the markers {twice} occur more than once")
     known = {name: sum(marker_set(name).knows(plain)) for name in TABLES}
     best = max(TABLES, key=lambda name: (known[name], -len(TABLES[name])))
-    if known[best] < max(LEAST_SHARE * len(plain), 6):
+    enough = min(LEAST_SHARE * len(plain), LEAST_OF_SET * len(TABLES[best]))
+    if known[best] < max(enough, 6):
         raise BodyError(
             f"no marker set knows the markers {list(marker_names)[:6]}...: {best!r} comes closest "
             f"with {known[best]} of {len(plain)}; there are {', '.join(TABLES)}"

@@ -23,7 +23,7 @@ def fit_sizes(
     template: FloatArray,
     postures: FloatArray,
     frames: FloatArray,
-    place_sigma_m: float,
+    place_sigma_m: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Fit the sizes and places that explain the markers best, near what people are like.
 
@@ -40,7 +40,7 @@ def fit_sizes(
         template: Expected place of each marker on the body, shape (M, 3) [m].
         postures: Posture in each frame, shape (K, 7 + n).
         frames: Measured positions, shape (K, M, 3) [m]; NaN where missing.
-        place_sigma_m: Standard deviation of a marker's place on its segment [m].
+        place_sigma_m: Standard deviation of each marker's place on its segment, shape (M,) [m].
 
     Returns:
         Factors on the body's sizes, shape (B, 3), and the markers' places, shape (M, 3) [m].
@@ -53,7 +53,7 @@ def fit_sizes(
     normal, gradient = np.zeros((n_unknowns, n_unknowns)), np.zeros(n_unknowns)
     normal[range(n_groups), range(n_groups)] = (size_sigma / MARKER_SIGMA_M) ** -2.0
     shifted = range(n_groups, n_groups + 3 * n_markers)
-    normal[shifted, shifted] = (place_sigma_m / MARKER_SIGMA_M) ** -2.0
+    normal[shifted, shifted] = np.repeat(place_sigma_m / MARKER_SIGMA_M, 3) ** -2.0
     mats = np.array([tree.forward(q)[1] for q in postures])
     _add_markers(
         mats, tree.parent, tree.offset, size, groups, bodies, template, frames, normal, gradient

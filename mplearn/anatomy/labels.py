@@ -1,0 +1,105 @@
+"""Labels of markers: a side and a stem, whatever the spelling.
+
+``R.Knee.Medial``, ``RKNM`` and ``R_FME`` are all the inner side of the right knee.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from .synonyms import JOINTS_MIDDLE, JOINTS_SIDED, SKIN_MIDDLE, SKIN_SIDED
+
+CUT = 4  # letters that some files keep of a label
+
+
+class Label(NamedTuple):
+    """What a label says.
+
+    Attributes:
+        stem: The label without its side, in small letters and digits.
+        side: ``"l"``, ``"r"`` or empty.
+    """
+
+    stem: str
+    side: str
+
+
+def read_label(label: str) -> list[Label]:
+    """Return the ways to read a label, the likeliest first."""
+    plain = label.rsplit(":", 1)[-1].strip()
+    spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", plain)
+    words = [word for word in re.split(r"[^a-z0-9]+", spaced.lower()) if word]
+    ways: list[Label] = []
+    ends = (0, len(words) - 1) if len(words) > 1 else ()
+    for at in dict.fromkeys((*ends, *range(len(words)))):
+        side = {"l": "l", "left": "l", "r": "r", "right": "r"}.get(words[at], "")
+        if side and len(words) > 1:
+            ways.append(Label("".join(words[:at] + words[at + 1 :]), side))
+    joined = "".join(words)
+    for word, side in (("left", "l"), ("right", "r")):
+        if joined.startswith(word):
+            ways.append(Label(joined[len(word) :], side))
+        elif joined.endswith(word):
+            ways.append(Label(joined[: -len(word)], side))
+        elif word in joined:
+            ways.append(Label(joined.replace(word, "", 1), side))
+    if joined[:1] in ("l", "r") and len(joined) > 1:
+        ways.append(Label(joined[1:], joined[0]))
+    if joined[-1:] in ("l", "r") and len(joined) > 1:
+        ways.append(Label(joined[:-1], joined[-1]))
+    ways.append(Label(joined, ""))
+    return list(dict.fromkeys(ways))
+
+
+def landmarks_of(labels: tuple[str, ...], *, centres: bool) -> dict[str, tuple[str, ...]]:
+    """Return the landmarks that each label may name, mostly one; labels of none are left out.
+
+    Where labels were cut to four letters, a label may begin the names of several landmarks.
+
+    Args:
+        labels: Names of markers.
+        centres: Whether ``LKnee`` is the joint, as pose estimators have it, not a marker beside it.
+    """
+    sided = _lookup(JOINTS_SIDED if centres else SKIN_SIDED)
+    middle = _lookup(JOINTS_MIDDLE if centres else SKIN_MIDDLE)
+    cut = max(map(len, labels), default=0) <= CUT
+    found: dict[str, tuple[str, ...]] = {}
+    for label in labels:
+        ways = [(stem, side, sided if side else middle) for stem, side in read_label(label)]
+        ways.sort(key=lambda way: bool(way[1]))  # "Rear" is no right ear
+        exact = [_sided(table[stem], side) for stem, side, table in ways if stem in table]
+        if exact and not (cut and len(label) == CUT and not label.isalnum()):
+            found[label] = (exact[0],)
+        elif cut:
+            begun = [
+                (len(known), _sided(name, side))
+                for stem, side, table in ways
+                if len(stem) >= 2
+                for known, name in table.items()
+                if known.startswith(stem)
+            ]
+            if begun:  # the shortest name first: "To" is a toe rather than "ToeTip"
+                begun.sort(key=lambda found: found[0])
+                found[label] = tuple(dict.fromkeys(name for _, name in begun))
+    return found
+
+
+def _sided(name: str, side: str) -> str:
+    return f"{name}_{side}" if side else name
+
+
+def names_joints(labels: tuple[str, ...]) -> bool:
+    """Whether labels are those of joints: hips are named, and no point of the pelvis' skin is."""
+    ways = [way for label in labels for way in read_label(label)]
+    hips = any(stem in ("hip", "hjc", "upleg") and side for stem, side in ways)
+    skin = _lookup(SKIN_SIDED)
+    pelvis = any(
+        skin.get(stem) in ("iliac_front", "iliac_back", "trochanter") and side
+        for stem, side in ways
+    )
+    return hips and not pelvis
+
+
+def _lookup(table: dict[str, str]) -> dict[str, str]:
+    return {stem: name for name, stems in table.items() for stem in stems.split()}

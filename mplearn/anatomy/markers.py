@@ -1,0 +1,222 @@
+"""From markers with any labels to landmarks of one body: labels say which, geometry whether.
+
+Markers of a known set keep their names. Other labels are looked up in a table of synonyms
+(`labels`); of those that may be several landmarks, the one that is as high as the marker is taken.
+What lies where its landmark cannot be is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..body import MarkerSet, find_marker_set, human_body, marker_set
+from ..body.markers import plain_name
+from ..errors import BodyError
+from ..recording import FloatArray, Recording
+from .body_map import BodyMap
+from .labels import landmarks_of, names_joints
+
+SOME_FRAMES = 120  # of a recording are looked at
+FEWEST = 6  # landmarks; fewer are no person
+ODD = 1.6  # how many times farther apart than on a person two markers of a segment may be
+ODD_BY_JOINT = 1.25  # the same for markers of two segments that a joint joins
+ODD_M = 0.06  # and how much
+LEVEL = 0.15  # of the stature: as high as its landmark, at most so far off
+FLAT_NECK = 0.03  # of the stature: a neck no higher above the shoulders is their middle
+
+
+def recognise_markers(recording: Recording, names: Mapping[str, str] | None = None) -> BodyMap:
+    """Find the body in a recording of markers.
+
+    Args:
+        recording: Markers [m], z up.
+        names: Place of the body (of the set ``"landmarks"``) by marker, for what is known better;
+            "" leaves a marker out.
+
+    Raises:
+        BodyError: Too few of the labels are known, with the option that settles it.
+    """
+    names = names or {}
+    labels = recording.marker_names
+    some = recording.markers[:: max(1, len(recording) // SOME_FRAMES)]
+    ever = np.isfinite(some).all(axis=2).sum(axis=0)
+    seen = {label for label, times in zip(labels, ever, strict=True) if times}
+    rest = tuple(label for label in labels if label not in names)
+    if not names:
+        known = _of_known_set(labels)
+        if known is not None:
+            return _map(labels, known, known_set=True)
+    heights = _heights(labels, some)
+    candidates = landmarks_of(rest, centres=names_joints(rest))
+    found = {label: place for label, place in names.items() if place and label in labels}
+    taken = set(found.values())
+    for label in sorted(candidates, key=lambda label: (label not in seen, len(candidates[label]))):
+        free = [place for place in candidates[label] if place not in taken]
+        if len(candidates[label]) > 1:
+            free = [p for p in free if abs(_level(p) - heights.get(label, 0.5)) < LEVEL]
+        if free:
+            found[label] = free[0]
+            taken.add(free[0])
+    warnings: list[str] = []
+    _drop_middle_of_shoulders(found, labels, some)
+    _drop_odd(found, labels, some, names, warnings)
+    if sum(label in seen for label in found) < FEWEST:
+        raise BodyError(
+            f"the markers of {recording.name!r} belong to no known set, and of their labels "
+            f"({', '.join(labels[:6])}, ...) {len(found)} are known; a map file says which marker "
+            "sits where (--map)"
+        )
+    return _map(labels, found, warnings=tuple(warnings))
+
+
+def _of_known_set(labels: tuple[str, ...]) -> dict[str, str] | None:
+    """Return the names that a known set has for its markers, or None if they are of none."""
+    try:
+        markers = find_marker_set(labels)
+    except BodyError:
+        return None
+    names = {plain_name(name): name for name in markers.names}
+    return {
+        label: names[plain_name(label)]
+        for label, knows in zip(labels, markers.knows(labels), strict=True)
+        if knows
+    }
+
+
+def _map(
+    labels: tuple[str, ...],
+    found: Mapping[str, str],
+    *,
+    known_set: bool = False,
+    warnings: tuple[str, ...] = (),
+) -> BodyMap:
+    points = tuple(label for label in labels if label in found)
+    share = len(points) / max(1, len(labels))
+    return BodyMap(
+        points=points,
+        places=tuple(found[label] for label in points),
+        weights=np.eye(len(points)),
+        turn=np.eye(3),
+        factor=1.0,
+        parts=tuple((found[label], (label,)) for label in points),
+        left_out=tuple(label for label in labels if label not in found),
+        stature_m=float("nan"),
+        confidence=1.0 if known_set else 0.5 + 0.5 * share,
+        warnings=warnings,
+    )
+
+
+def _places() -> tuple[MarkerSet, FloatArray]:
+    """Return the landmarks, and where they are on the upright human of 1.75 m, (M, 3) [m]."""
+    landmarks, body = marker_set("landmarks"), human_body()
+    places = body.tree.points(body.rest, *landmarks.attach(body.tree))
+    return landmarks, places
+
+
+def _level(place: str) -> float:
+    """Return how high a landmark is on a person who stands, as a share of the stature."""
+    landmarks, places = _places()
+    return float(places[landmarks.names.index(place), 2] / human_body().height_m)
+
+
+def _heights(labels: tuple[str, ...], some: FloatArray) -> dict[str, float]:
+    """Return how high each marker is, as a share of the highest ones' height over the lowest."""
+    with np.errstate(all="ignore"):
+        usual = np.nanmedian(some[..., 2], axis=0)
+    known = usual[np.isfinite(usual)]
+    if not len(known):
+        return {}
+    low, high = known.min(), known.max()
+    shares = (usual - low) / max(high - low, 1e-6)
+    return {label: float(s) for label, s in zip(labels, shares, strict=True) if np.isfinite(s)}
+
+
+def _drop_middle_of_shoulders(
+    found: dict[str, str], labels: tuple[str, ...], some: FloatArray
+) -> None:
+    """Leave out a neck that lies between the shoulders: pose estimators call their middle so."""
+    at = {place: some[:, labels.index(label)] for label, place in found.items()}
+    if not {"neck", "shoulder_l", "shoulder_r"} <= at.keys():
+        return
+    middle = 0.5 * (at["shoulder_l"] + at["shoulder_r"])
+    off = np.linalg.norm(at["neck"] - middle, axis=1)
+    if np.nanmedian(off) < FLAT_NECK * 1.75:
+        del found[next(label for label, place in found.items() if place == "neck")]
+
+
+def _drop_odd(
+    found: dict[str, str],
+    labels: tuple[str, ...],
+    some: FloatArray,
+    sure: Mapping[str, str],
+    warnings: list[str],
+) -> None:
+    """Leave out markers that lie too far from others of their segment to be what they are called.
+
+    The one with most contradictions goes first, until there are none.
+    """
+    landmarks, places = _places()
+    body_of = dict(zip(landmarks.names, landmarks.bodies, strict=True))
+    place_of = dict(zip(landmarks.names, places, strict=True))
+    at = {label: some[:, labels.index(label)] for label in found}
+    size, near = _size(found, at, body_of, place_of), _joints()
+    while True:
+        odd: dict[str, int] = {}
+        of = list(found)
+        for i, a in enumerate(of):
+            for b in of[:i]:
+                one, other = body_of[found[a]], body_of[found[b]]
+                if one != other and other not in near[one]:
+                    continue
+                apart = float(np.nanmedian(np.linalg.norm(at[a] - at[b], axis=1)))
+                if one == other:
+                    usual = size * float(np.linalg.norm(place_of[found[a]] - place_of[found[b]]))
+                    wrong = apart > ODD * usual + ODD_M or apart < usual / ODD - ODD_M
+                else:  # on segments that a joint joins: not farther apart than by way of the joint
+                    joint = near[one][other]
+                    bones = place_of[found[a]] - joint, place_of[found[b]] - joint
+                    usual = size * float(sum(np.linalg.norm(bone) for bone in bones))
+                    wrong = apart > ODD_BY_JOINT * usual + ODD_M
+                if wrong:
+                    odd[a], odd[b] = odd.get(a, 0) + 1, odd.get(b, 0) + 1
+        odd = {label: n for label, n in odd.items() if label not in sure}
+        if not odd:
+            return
+        worst = max(odd, key=lambda label: odd[label])
+        warnings.append(
+            f"{worst!r} is left out: it does not lie where {found[worst]!r} does (--map settles it)"
+        )
+        del found[worst]
+
+
+def _joints() -> dict[str, dict[str, FloatArray]]:
+    """Return, for each segment, where a joint joins it to others on the human of 1.75 m [m]."""
+    body = human_body()
+    origins, _ = body.tree.forward(body.rest)
+    near: dict[str, dict[str, FloatArray]] = {name: {} for name in body.tree.body_names}
+    for child, parent in enumerate(body.tree.parent):
+        if parent >= 0:
+            one, other = body.tree.body_names[child], body.tree.body_names[parent]
+            near[one][other] = near[other][one] = origins[child]
+    return near
+
+
+def _size(
+    found: Mapping[str, str],
+    at: Mapping[str, FloatArray],
+    body_of: Mapping[str, str],
+    place_of: Mapping[str, FloatArray],
+) -> float:
+    """Return the person's size relative to the human of 1.75 m: median over pairs on segments."""
+    of = list(found)
+    ratios = [
+        float(np.nanmedian(np.linalg.norm(at[a] - at[b], axis=1)))
+        / float(np.linalg.norm(place_of[found[a]] - place_of[found[b]]))
+        for i, a in enumerate(of)
+        for b in of[:i]
+        if body_of[found[a]] == body_of[found[b]]
+    ]
+    ratios = [ratio for ratio in ratios if np.isfinite(ratio)]
+    return float(np.median(ratios)) if ratios else 1.0

@@ -1,0 +1,53 @@
+"""Markers with the labels of other systems are the same person."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from label_sets import SETS, labelled
+
+from mplearn.anatomy import recognise
+from mplearn.errors import BodyError
+from mplearn.recording import marker_channels
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_labels_of_any_system_are_the_same_person(truth, name):
+    recording = labelled(name, truth.body, truth.postures, 25.0)
+    body = recognise(recording)
+    for place, (label,) in body.parts:
+        if name != "plug_in_gait_virtual":
+            assert SETS[name][label] == place
+    assert len(body.places) >= 20
+    angles, points = truth.errors(body.apply(recording))
+    assert np.median(angles) < 3.0
+    assert np.median(points) < 15.0
+
+
+@pytest.mark.parametrize("name", ["helen_hayes", "cast", "sports", "opencap", "mediapipe"])
+def test_a_label_on_the_wrong_segment_is_left_out_and_said(truth, name):
+    recording = labelled(name, truth.body, truth.postures, 25.0)
+    names = list(recording.marker_names)
+    knee = next(label for label, place in SETS[name].items() if place.startswith("knee"))
+    head = next(label for label, place in SETS[name].items() if place in HEAD)
+    i, j = names.index(knee), names.index(head)
+    markers = recording.markers.copy()
+    markers[:, i] = markers[:, j] + 0.02
+    body = recognise(replace(recording, frames=markers.reshape(len(markers), -1)))
+    assert knee not in dict(body.parts).values()
+    assert knee in body.left_out and any(knee in warning for warning in body.warnings)
+
+
+HEAD = ("head_top", "head_side_l", "nose", "c7", "head_side_r", "jugular_notch")
+
+
+def test_labels_that_nobody_knows_are_refused_with_the_option(truth):
+    recording = labelled("cast", truth.body, truth.postures, 25.0)
+    unknown = replace(
+        recording, channels=marker_channels(tuple(f"M{i:03d}" for i in range(len(SETS["cast"]))))
+    )
+    with pytest.raises(BodyError, match="--map"):
+        recognise(unknown)
+    told = dict(zip(unknown.marker_names, SETS["cast"].values(), strict=True))
+    body = recognise(unknown, names=told)
+    assert body.places == tuple(SETS["cast"].values())

@@ -1,0 +1,106 @@
+"""Any skeleton of one person is the same body: written in many dialects, read, recognised."""
+
+import numpy as np
+import pytest
+from rigs import NAMES, RIGS, Rig, write_rig
+
+from mplearn.anatomy import recognise
+from mplearn.body import human_body
+from mplearn.demonstrator import Person, demonstrate
+from mplearn.errors import BodyError
+from mplearn.mocap import Hints, open_recording
+
+SEGMENTS = {
+    "knee": ("shank", "hip"),
+    "ankle": ("foot", "knee"),
+    "elbow": ("forearm", "shoulder"),
+    "wrist": ("hand", "elbow"),
+}
+
+
+def opened(tmp_path, truth, rig):
+    hints = {"unit_m": rig.unit_m, "up_axis": rig.up}
+    path = write_rig(tmp_path / "rig.bvh", truth.body, truth.postures, 25.0, rig)
+    return open_recording(path, positions=True, hints=Hints(joint_axes=True, **hints))
+
+
+# the human body has no such spine, or no such shoulder, so its truth is not the file's
+OTHER_BODY = [rig for rig in RIGS if rig.bends or rig.spine == 1 or "clavicle" in rig.without]
+
+
+@pytest.mark.parametrize("rig", RIGS, ids=str)
+def test_a_person_in_any_dialect_is_the_same_person(tmp_path, truth, rig, record_property):
+    recording = opened(tmp_path, truth, rig)
+    body = recognise(recording)
+    places = body.apply(recording)
+    # joints are where they are, sides included
+    tree = truth.body.tree
+    where = np.array([tree.forward(q)[0] for q in truth.postures[::20]])
+    found = places.markers[::20]
+    if rig not in OTHER_BODY and not rig.yaw:
+        for name, (segment, _) in SEGMENTS.items():
+            for side in "lr":
+                at = found[:, body.places.index(f"{name}_{side}")]
+                error = np.linalg.norm(at - where[:, tree.body(f"{segment}_{side}")], axis=1)
+                assert error.max() < 1e-3
+    angles, points = truth.errors(places)
+    record_property("angles_deg", float(np.median(angles)))
+    record_property("points_mm", float(np.median(points)))
+    assert np.median(angles) < 1.5
+    assert np.median(points, axis=0).max() < 15.0
+    assert np.percentile(points, 95) < (40.0 if rig in OTHER_BODY else 15.0)
+    assert body.stature_m == pytest.approx(truth.body.height_m, rel=0.05)
+
+
+def test_left_and_right_are_told_by_facing_not_by_names(tmp_path, truth):
+    """The numbers of `numbers` say nothing; sides are those of the person."""
+    body = recognise(opened(tmp_path, truth, Rig(names="numbers", reverse=True)))
+    names = NAMES["numbers"]
+    for place, part in (("knee", "shank"), ("wrist", "hand")):
+        stem = names[part].split("{")[0]
+        assert dict(body.parts)[f"{place}_l"] == (f"{stem}a",)
+        assert dict(body.parts)[f"{place}_r"] == (f"{stem}b",)
+
+
+def test_a_mirrored_recording_is_refused_with_the_option(tmp_path, truth):
+    recording = opened(tmp_path, truth, Rig())
+    flipped = recording.frames.reshape(len(recording), -1, 3) * (1, -1, 1)
+    from dataclasses import replace
+
+    mirrored = replace(
+        recording,
+        frames=flipped.reshape(len(recording), -1),
+        skeleton=replace(recording.skeleton, offsets=recording.skeleton.offsets * (1, -1, 1)),
+    )
+    with pytest.raises(BodyError, match=r"mirrored.*--map"):
+        recognise(mirrored)
+
+
+def test_what_is_no_body_is_refused(tmp_path, truth):
+    path = tmp_path / "hand.bvh"
+    path.write_text(
+        "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Xrotation Yrotation Zrotation\n"
+        "JOINT b\n{\nOFFSET 0 60 0\nCHANNELS 3 Xrotation Yrotation Zrotation\n"
+        "End Site\n{\nOFFSET 0 60 0\n}\n}\n}\nMOTION\nFrames: 2\nFrame Time: 0.04\n"
+        "0 0 0 0 0 0\n1 0 0 0 0 0\n"
+    )
+    recording = open_recording(path, positions=True, hints=Hints(joint_axes=True))
+    with pytest.raises(BodyError, match="no body in the skeleton"):
+        recognise(recording)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_people_of_other_proportions(tmp_path, seed):
+    rng = np.random.default_rng(seed)
+    person = Person.random(rng)
+    shown = demonstrate(("BAR", "BAL", "SQD", "SQR"), seed=seed, person=person, rate_hz=25.0)
+    longer = {name: float(rng.uniform(0.85, 1.18)) for name in person.proportions}
+    body = human_body(float(rng.uniform(1.0, 2.0)), longer)
+    path = write_rig(tmp_path / "rig.bvh", body, shown.posture.frames, 25.0, Rig(fingers=True))
+    recording = open_recording(path, positions=True, hints=Hints(joint_axes=True))
+    from conftest import Truth
+
+    angles, points = Truth(body, shown.posture.frames, shown.recording).errors(
+        recognise(recording).apply(recording)
+    )
+    assert np.median(angles) < 3.0 and np.median(points, axis=0).max() < 15.0
