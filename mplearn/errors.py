@@ -12,6 +12,25 @@ class InvalidValueError(MPLearnError, ValueError):
     """An argument or a configuration value lies outside what is allowed."""
 
 
+class StateError(InvalidValueError):
+    """A stored state is damaged, or belongs to something else.
+
+    Attributes:
+        problem: What is wrong, the wrong value and the allowed ones.
+        place: Where, as in ``tree.nodes[3].matrix``; empty for the state itself.
+    """
+
+    def __init__(self, problem: str, place: str = "") -> None:
+        super().__init__(f"{place}: {problem}" if place else problem)
+        self.problem = problem
+        self.place = place
+
+    def below(self, step: str) -> "StateError":
+        """Return the same error, its place seen from above: ``step`` is a field or ``[index]``."""
+        dot = "." if self.place and not self.place.startswith("[") else ""
+        return StateError(self.problem, f"{step}{dot}{self.place}")
+
+
 class RecordingError(MPLearnError):
     """A recording cannot be read, or does not hold what its format promises."""
 

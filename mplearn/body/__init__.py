@@ -18,6 +18,7 @@ from .markers import MarkerSet as MarkerSet
 from .markers import find_marker_set as find_marker_set
 from .markers import marker_set as marker_set
 from .observer import MotionObserver as MotionObserver
+from .observer import ObserverState as ObserverState
 from .observer import Watched as Watched
 from .robot import robot_body as robot_body
 from .tree import KinematicTree as KinematicTree

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from mplearn.recording import FloatArray
+from mplearn.state import Array, Range
 
 NEAR_M = 0.015  # median distance of markers from where they were, at which nobody has moved
 SMALLEST, LARGEST = 1e-4, 1e4  # ratio of units
@@ -30,9 +32,11 @@ class Axes:
         shift: Of the origin, shape (3,) [m].
     """
 
-    size: float = 1.0
-    turn: FloatArray = field(default_factory=lambda: np.eye(3))
-    shift: FloatArray = field(default_factory=lambda: np.zeros(3))
+    size: Annotated[float, Range(1e-9, 1e9)] = 1.0
+    turn: Annotated[FloatArray, Array(3, 3, low=-1.001, high=1.001)] = field(
+        default_factory=lambda: np.eye(3)
+    )
+    shift: Annotated[FloatArray, Array(3)] = field(default_factory=lambda: np.zeros(3))
 
     def undo(self, frames: FloatArray) -> FloatArray:
         """Return markers, shape (..., 3), in the axes in which the stream began."""

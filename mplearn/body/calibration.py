@@ -12,12 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from mplearn.errors import BodyError
 from mplearn.recording import FloatArray, IntArray
+from mplearn.state import Array, Range
 
 from .first_posture import TooFewMarkersError, first_posture, place_trunk, settle
 from .follower import Follower
@@ -54,25 +55,13 @@ class Calibration:
         posture: Posture in the first frame, in the person's size, shape (7 + n,).
     """
 
-    factors: FloatArray
-    offsets: FloatArray
-    scale: float
-    floor_m: float
-    height_m: float
-    residual_m: float
-    posture: FloatArray
-
-    def state(self) -> dict[str, Any]:
-        """Return the fit as plain values and arrays."""
-        return {
-            name: value.copy() if isinstance(value, np.ndarray) else value
-            for name, value in vars(self).items()
-        }
-
-    @classmethod
-    def from_state(cls, state: dict[str, Any]) -> Calibration:
-        """Return the fit that `state` described."""
-        return cls(**state)
+    factors: Annotated[FloatArray, Array("b", 3, low=1e-3, high=1e3)]
+    offsets: Annotated[FloatArray, Array("m", 3, low=-1e3, high=1e3)]
+    scale: Annotated[float, Range(1e-3, 1e3)]
+    floor_m: Annotated[float, Range(-1e6, 1e6)]
+    height_m: Annotated[float, Range(0.0, 1e3)]
+    residual_m: Annotated[float, Range(0.0, 1e3)]
+    posture: Annotated[FloatArray, Array("q", low=-1e6, high=1e6)]
 
 
 def fit(follower: Follower, markers: MarkerSet, frames: FloatArray) -> Calibration:

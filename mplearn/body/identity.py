@@ -12,16 +12,18 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from mplearn.errors import InvalidValueError
 from mplearn.recording import BoolArray, FloatArray
+from mplearn.state import Count, Range, State, require, within
 
 from .first_posture import LARGEST, SMALLEST
+from .known_bodies import BodiesState, KnownBodies
 from .known_bodies import IdentityConfig as IdentityConfig
-from .known_bodies import KnownBodies
 from .rigid import (
     ABSENT,
     FULL,
@@ -37,6 +39,28 @@ from .rigid import (
     rigid_pairs,
     usual_distances,
 )
+
+
+@dataclass(frozen=True, eq=False)
+class IdentityState(State):
+    """Who stands there, and who is known.
+
+    Attributes:
+        person: Number of the person, -1 before anybody came.
+        strikes: Blocks in a row that fitted somebody else better.
+        memory: What was seen lately.
+        bodies: What is known of people.
+    """
+
+    person: Annotated[int, Range(-1)]
+    strikes: Count
+    memory: Memory
+    bodies: BodiesState
+
+    def check(self) -> None:
+        """Check that the person is known."""
+        n = self.bodies.n_people
+        require(self.person < n or self.person < 0, "person", f"must be below {n}")
 
 
 class BodyIdentity:
@@ -277,17 +301,23 @@ class BodyIdentity:
         self.bodies.learn(self.person, mean)
         return False
 
-    def state(self) -> dict[str, Any]:
-        """Return everything as plain values and arrays."""
-        memory = {name: value.copy() for name, value in self._memory._asdict().items()}
-        plain = {"person": self.person, "strikes": self._strikes}
-        return plain | {"memory": memory, "bodies": self.bodies.state()}
+    def state(self) -> IdentityState:
+        """Return everything."""
+        memory = self._memory.copied()
+        return IdentityState(self.person, self._strikes, memory, self.bodies.state())
 
-    def load_state(self, state: dict[str, Any]) -> None:
-        """Resume from what `state` returned."""
-        self.person, self._strikes = int(state["person"]), int(state["strikes"])
-        self._memory = Memory(**{name: each.copy() for name, each in state["memory"].items()})
-        self.bodies.load_state(state["bodies"])
+    def load_state(self, state: IdentityState) -> None:
+        """Resume from what `state` returned.
+
+        Raises:
+            StateError: It is of other markers.
+        """
+        for name, own, value in zip(Memory._fields, self._memory, state.memory, strict=True):
+            require(value.shape == own.shape, f"memory.{name}", f"must have shape {own.shape}")
+        with within("bodies"):
+            self.bodies.load_state(state.bodies)
+        self.person, self._strikes = state.person, state.strikes
+        self._memory = state.memory.copied()
 
 
 NOBODY = -2

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
 from mplearn.errors import BodyError, FrameError, InvalidValueError
 from mplearn.recording import FloatArray
+from mplearn.state import Array, SharedState, require, validated
 
 from .body import Body
 from .calibration import Calibration, fit
@@ -59,6 +60,32 @@ class IKConfig:
         for name, value in vars(self).items():
             if not value > 0:
                 raise InvalidValueError(f"{name} must be positive, not {value}")
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedState(SharedState):
+    """A person who is followed.
+
+    Attributes:
+        calibration: The fit to the person.
+        posture: Last posture, in the person's size, shape (7 + n,).
+        variance: Its uncertainty, squared, shape (6 + n,).
+        fresh: Whether no frame was solved since the fit.
+    """
+
+    calibration: Calibration
+    posture: Annotated[FloatArray, Array("q", low=-1e6, high=1e6)]
+    variance: Annotated[FloatArray, Array("v", low=0.0)]
+    fresh: bool
+
+    def check(self) -> None:
+        """Check that postures have an orientation."""
+        for place, posture in (
+            ("posture", self.posture),
+            ("calibration.posture", self.calibration.posture),
+        ):
+            turn = float(np.linalg.norm(posture[3:7]))
+            require(abs(turn - 1.0) < 1e-3, place, f"must hold a unit quaternion, not of {turn:g}")
 
 
 class InverseKinematics:
@@ -230,27 +257,45 @@ class InverseKinematics:
         sigma: FloatArray = np.sqrt(self._variance[np.concatenate((np.arange(6), own[7:] - 1))])
         return sigma
 
-    def state(self) -> dict[str, Any]:
-        """Return what `load_state` needs to resume bit for bit."""
+    def state(self) -> FollowedState | None:
+        """Return what `load_state` needs to resume bit for bit; None before `calibrate`."""
         if self.calibration is None:
-            return {"calibration": None}
-        return {
-            "calibration": self.calibration.state(),
-            "posture": self._posture.copy(),
-            "variance": self._variance.copy(),
-            "fresh": self._fresh,
-        }
+            return None
+        return FollowedState(
+            self.calibration, self._posture.copy(), self._variance.copy(), self._fresh
+        )
 
-    def load_state(self, state: dict[str, Any]) -> None:
-        """Resume from what `state` returned."""
-        if state["calibration"] is None:
+    def load_state(self, state: FollowedState | None) -> None:
+        """Resume from what `state` returned.
+
+        Raises:
+            StateError: The state is damaged, or of another body or other markers.
+        """
+        if state is None:
             self.calibration = None
             return
-        self._start(Calibration.from_state(state["calibration"]))
-        self._posture = np.array(state["posture"], dtype=np.float64)
-        self._variance = np.array(state["variance"], dtype=np.float64)
-        self._fresh = bool(state["fresh"])
+        self.check_fits(state)
+        self._start(state.calibration)
+        self._posture, self._variance = state.posture.copy(), state.variance.copy()
+        self._fresh = state.fresh
         self.q = self._on_body()
+
+    def check_fits(self, state: FollowedState) -> None:
+        """Check that a state is of this body and of these markers.
+
+        Raises:
+            StateError: It is not, or is damaged.
+        """
+        validated(state)
+        tree = self._follower.tree
+        for place, array, wanted in (
+            ("calibration.factors", state.calibration.factors, tree.offset.shape),
+            ("calibration.offsets", state.calibration.offsets, (len(self._used), 3)),
+            ("calibration.posture", state.calibration.posture, tree.rest.shape),
+            ("posture", state.posture, tree.rest.shape),
+            ("variance", state.variance, self._drift.shape),
+        ):
+            require(array.shape == wanted, place, f"must have shape {wanted}, not {array.shape}")
 
 
 def _of_one_person(frame: FloatArray) -> FloatArray:

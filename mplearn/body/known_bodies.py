@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
 from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray
+from mplearn.state import Array, Count, State, require
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,30 @@ class IdentityConfig:
                 raise InvalidValueError(f"{name} must be positive, not {value}")
 
 
+@dataclass(frozen=True, eq=False)
+class BodiesState(State):
+    """Known bodies.
+
+    Attributes:
+        n_people: How many people are known.
+        means: Mean of each distance within each person's body, shape (max_people, K) [m].
+        blocks: Blocks of time learned of each person, shape (max_people,).
+        squares: Squares of the deviations of blocks from their person's mean, shape (K,) [m^2].
+        counts: How many blocks those are, shape (K,).
+    """
+
+    n_people: Count
+    means: Annotated[FloatArray, Array("p", "k", low=0.0, high=1e3, nan=True)]
+    blocks: Annotated[FloatArray, Array("p", low=0.0)]
+    squares: Annotated[FloatArray, Array("k", low=1e-30)]
+    counts: Annotated[FloatArray, Array("k", low=1e-30)]
+
+    def check(self) -> None:
+        """Check that there is room for all people."""
+        most = len(self.means)
+        require(self.n_people <= most, "n_people", f"must be at most {most}, not {self.n_people}")
+
+
 class KnownBodies:
     """Means of the distances within each known person's body, and how much they vary with posture.
 
@@ -71,6 +96,7 @@ class KnownBodies:
     Attributes:
         n_people: How many people are known.
         blocks: Blocks of time learned of each person, shape (max_people,).
+        given: Squares and counts that are assumed before anything was seen, shape (K,) each.
     """
 
     def __init__(self, give: FloatArray, config: IdentityConfig) -> None:
@@ -81,7 +107,7 @@ class KnownBodies:
         given = config.given_s / config.block_s
         self._squares = given * give**2  # deviations of blocks from their person's mean
         self._counts = np.full(len(give), given)
-        self._given = self._squares.copy(), self._counts.copy()
+        self.given = self._squares.copy(), self._counts.copy()
 
     def learn(self, person: int, mean: FloatArray) -> None:
         """Take a block into the person's means, and into how much all vary with posture."""
@@ -107,7 +133,7 @@ class KnownBodies:
             )
         people = self._means[: self.n_people]
         usual = np.nanmean(people, axis=0) if self.n_people else mean
-        scores[-1] = self.fit(mean, usual, self._anybody(usual) + variance, 0.5)
+        scores[-1] = self.fit(mean, usual, self.anybody(usual) + variance, 0.5)
         return scores
 
     def fit(
@@ -129,78 +155,23 @@ class KnownBodies:
             )
         )
 
-    def unite(self, other: KnownBodies) -> dict[int, int]:
-        """Take over the people whom another has known; return their numbers here.
-
-        Who is the same is found one to one, the surest first; all others are new here, as long as
-        there is room, and then the nearest.
-        """
-        pairs = [
-            (self._likeness(other, i, j), i, j)
-            for i in range(self.n_people)
-            for j in range(other.n_people)
-        ]
-        numbers: dict[int, int] = {}
-        for likeness, i, j in sorted(pairs, reverse=True):
-            if likeness > self.config.caution and j not in numbers and i not in numbers.values():
-                numbers[j] = i
-        for j in range(other.n_people):
-            if j in numbers:
-                continue
-            if self.n_people < self.config.max_people:
-                numbers[j] = self.n_people
-                self.n_people += 1
-            else:
-                numbers[j] = max(pair for pair in pairs if pair[2] == j)[1]
-        self._squares += other._squares - other._given[0]
-        self._counts += other._counts - other._given[1]
-        for j, i in numbers.items():
-            self._add(i, other._means[j], float(other.blocks[j]))
-        return numbers
-
-    def _likeness(self, other: KnownBodies, i: int, j: int) -> float:
-        """Return how much better one body than two explains what was seen here and there [nat]."""
-        mine, theirs = self._means[i], other._means[j]
-        squares = self._squares + other._squares - other._given[0]
-        variance = squares / (self._counts + other._counts - other._given[1])
-        doubt = 1.0 + 4.0 / max(self.blocks[i], 1.0) + 4.0 / max(other.blocks[j], 1.0)
-        people = np.concatenate((self._means[: self.n_people], other._means[: other.n_people]))
-        usual = np.nanmean(people, axis=0)
-        anybody = self._anybody(usual) + variance
-        same = [
-            self.fit(one, two, doubt * variance, self.config.slips)
-            for one, two in ((mine, theirs), (theirs, mine))
-        ]
-        new = [self.fit(one, usual, anybody, 0.5) for one in (mine, theirs)]
-        return 0.5 * (sum(same) - sum(new))
-
-    def _add(self, person: int, mean: FloatArray, blocks: float) -> None:
-        """Take over another's mean of the same person."""
-        own, before = self._means[person], self.blocks[person]
-        both = (own == own) & (mean == mean) & (before > 0) & (blocks > 0)
-        share = blocks / max(before + blocks, 1.0)
-        step = np.where(both, mean - own, 0.0)
-        self._squares += step**2 * before * share
-        self._means[person] = np.where(np.isnan(own), mean, own + share * step)
-        self.blocks[person] = before + blocks
-
-    def _anybody(self, usual: FloatArray) -> FloatArray:
+    def anybody(self, usual: FloatArray) -> FloatArray:
+        """Return how much a distance varies from person to person, squared, shape (K,) [m^2]."""
         return np.asarray((self.config.people_differ * usual) ** 2)
 
-    def state(self) -> dict[str, Any]:
-        """Return everything as plain values and arrays."""
-        return {
-            "n_people": self.n_people,
-            "means": self._means.copy(),
-            "blocks": self.blocks.copy(),
-            "squares": self._squares.copy(),
-            "counts": self._counts.copy(),
-        }
+    def state(self) -> BodiesState:
+        """Return all that is known."""
+        arrays = self._means, self.blocks, self._squares, self._counts
+        return BodiesState(self.n_people, *(array.copy() for array in arrays))
 
-    def load_state(self, state: dict[str, Any]) -> None:
-        """Resume from what `state` returned."""
-        self.n_people = int(state["n_people"])
-        self._means, self.blocks, self._squares, self._counts = (
-            np.array(state[name], dtype=np.float64)
-            for name in ("means", "blocks", "squares", "counts")
-        )
+    def load_state(self, state: BodiesState) -> None:
+        """Resume from what `state` returned.
+
+        Raises:
+            StateError: It is of other markers, or of more people than are told apart.
+        """
+        shape = self._means.shape
+        require(state.means.shape == shape, "means", f"must have shape {shape}")
+        self.n_people = state.n_people
+        self._means, self.blocks = state.means.copy(), state.blocks.copy()
+        self._squares, self._counts = state.squares.copy(), state.counts.copy()

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from mplearn.errors import BodyError, FrameError, InvalidValueError
+from mplearn.mocap.gaps import GapsState, GapTracker
 from mplearn.recording import BoolArray, FloatArray
+from mplearn.state import Array, Count, State, require, validated, within
 
 from .axes import Axes, axes_changed
 from .body import Body
 from .features import feature_channels, features_of
-from .identity import NOBODY, BodyIdentity, IdentityConfig
-from .inverse_kinematics import FEWEST_MARKERS, IKConfig
+from .identity import NOBODY, BodyIdentity, IdentityConfig, IdentityState
+from .inverse_kinematics import FEWEST_MARKERS, FollowedState, IKConfig
 from .resuming import ResumingKinematics
 from .robot import robot_body
-
-if TYPE_CHECKING:
-    from mplearn.mocap.gaps import GapTracker
 
 PATIENCE = 5  # times the calibration's length that a stream may take to show its markers
 FARTHEST = 1e9  # no marker is, in any unit
@@ -53,6 +52,56 @@ class Watched(NamedTuple):
     joins: bool = True
     moved: Axes | None = None
     taken: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class KnownState(State):
+    """A person's body, as last seen."""
+
+    person: Count
+    body: FollowedState
+
+
+@dataclass(frozen=True, eq=False)
+class ObserverState(State):
+    """Who is watched, and who was.
+
+    Attributes:
+        ik: The person who is followed; None before the first.
+        gaps: The markers' tracks; None where gaps are not filled.
+        held: Frames that are held back, shape (n, M, 3) [m].
+        sound: Which of the held frames show a body, while somebody is measured, shape (n,).
+        measuring: Whether somebody is measured.
+        axes: What of a stream's changes of axes is undone.
+        last_pitch: Pitch of the last features [rad].
+        arrivals: How often somebody came, or came back.
+        identity: Who is there.
+        known: The bodies of all who were seen.
+    """
+
+    ik: FollowedState | None
+    gaps: GapsState | None
+    held: Annotated[FloatArray, Array(None, "m", 3, nan=True)]
+    sound: tuple[bool, ...]
+    measuring: bool
+    axes: Axes | None
+    last_pitch: float
+    arrivals: Count
+    identity: IdentityState
+    known: tuple[KnownState, ...]
+
+    def check(self) -> None:
+        """Check that who is known is somebody."""
+        n, people = self.identity.bodies.n_people, [each.person for each in self.known]
+        require(len(set(people)) == len(people), "known", "must be different people")
+        for k, person in enumerate(people):
+            require(person < n, f"known[{k}].person", f"must be below {n}")
+        there = self.identity.person
+        require(there < 0 or there in people, "identity.person", f"must be known, not {there}")
+        require(there < 0 or self.ik is not None, "ik", f"must be person {there}")
+        require(self.measuring or there >= 0, "measuring", "must be true before anybody came")
+        held = len(self.held) if self.measuring else 0
+        require(len(self.sound) == held, "sound", f"must be {held}, not {len(self.sound)}")
 
 
 class MotionObserver:
@@ -109,7 +158,7 @@ class MotionObserver:
         self.channels = feature_channels(self.body)
         self.fill_gaps = fill_gaps
         self.identity = BodyIdentity(self.marker_names, self.rate_hz, identity)
-        self._known: dict[int, dict[str, Any]] = {}  # each person's body, as last seen
+        self._known: dict[int, FollowedState] = {}  # each person's body, as last seen
         self._gaps: GapTracker | None = None
         self.axes: Axes | None = None
         self._held: list[FloatArray] = []
@@ -127,7 +176,7 @@ class MotionObserver:
     def restart(self) -> None:
         """Begin another stream: whoever comes is measured again, and recognised."""
         if self.identity.person >= 0:
-            self._known[self.identity.person] = self.ik.state()
+            self._known[self.identity.person] = self._body_now()
         self.identity.leave()
         self.axes = None
         self._measuring = True
@@ -228,8 +277,6 @@ class MotionObserver:
         """Begin with another body."""
         self._last_pitch = 0.0
         if self.fill_gaps:
-            from mplearn.mocap.gaps import GapTracker
-
             self._gaps = GapTracker(len(self.marker_names), self.rate_hz)
 
     def _release(self) -> None:
@@ -276,7 +323,7 @@ class MotionObserver:
         joins = self.identity.joins(held[~wrong])
         if not joins:
             self._begin()
-            self.ik.resume(self.ik.state(), _fullest(held[~wrong]))
+            self.ik.resume(self._body_now(), _fullest(held[~wrong]))
         self.identity.stay(held[~wrong])
         self._measuring = False
         self._release()
@@ -284,7 +331,7 @@ class MotionObserver:
 
     def _change(self, person: int, held: FloatArray, wrong: BoolArray) -> Watched:
         """Go on with somebody else who is known."""
-        self._known[self.identity.person] = self.ik.state()
+        self._known[self.identity.person] = self._body_now()
         self._begin()
         self.ik.resume(self._known[person], _fullest(held[~wrong]))
         self._measuring = False
@@ -343,7 +390,7 @@ class MotionObserver:
         if wrong.all():
             raise BodyError("the markers are in no frame as far apart as in most of the others")
         if self.identity.person >= 0:
-            self._known[self.identity.person] = self.ik.state()
+            self._known[self.identity.person] = self._body_now()
         self.ik.calibrate(held[~wrong][-PATIENCE * self._needed :])
         self._begin()
         self.identity.leave()
@@ -359,7 +406,7 @@ class MotionObserver:
         self.identity.meet(person)
         for markers in held:
             self.identity.follow(markers[None])
-        self._known.setdefault(person, self.ik.state())
+        self._known.setdefault(person, self._body_now())
         self.arrivals += 1
 
     def _follow(self, frames: FloatArray, wrong: BoolArray | None = None, why: str = "") -> Watched:
@@ -377,42 +424,52 @@ class MotionObserver:
         unseen = np.isfinite(frames).all(axis=2).sum(axis=1) < FEWEST_MARKERS
         return Watched(features, unseen, why=why if wrong.any() else UNSEEN)
 
-    def unite(self, other: MotionObserver) -> dict[int, int]:
-        """Take over the people whom another has seen; return their numbers here."""
-        numbers = self.identity.bodies.unite(other.identity.bodies)
-        for person, body in other._known.items():
-            if person in numbers:
-                self._known.setdefault(numbers[person], body)
-        return numbers
+    def _body_now(self) -> FollowedState:
+        """Return the body of the person who is followed."""
+        body = self.ik.state()
+        assert body is not None
+        return body
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> ObserverState:
         """Return what `load_state` needs to resume bit for bit."""
-        return {
-            "ik": self.ik.state(),
-            "gaps": None if self._gaps is None else self._gaps.state(),
-            "held": np.array(self._held).reshape(-1, len(self.marker_names), 3),
-            "sound": list(self._sound),
-            "measuring": self._measuring,
-            "axes": None if self.axes is None else asdict(self.axes),
-            "last_pitch": self._last_pitch,
-            "arrivals": self.arrivals,
-            "identity": self.identity.state(),
-            "known": [[person, state] for person, state in self._known.items()],
-        }
+        return ObserverState(
+            ik=self.ik.state(),
+            gaps=None if self._gaps is None else self._gaps.state(),
+            held=np.array(self._held).reshape(-1, len(self.marker_names), 3),
+            sound=tuple(self._sound),
+            measuring=self._measuring,
+            axes=self.axes,
+            last_pitch=self._last_pitch,
+            arrivals=self.arrivals,
+            identity=self.identity.state(),
+            known=tuple(KnownState(person, body) for person, body in self._known.items()),
+        )
 
-    def load_state(self, state: dict[str, Any]) -> None:
-        """Resume from what `state` returned."""
-        self.ik.load_state(state["ik"])
-        if self._gaps is not None:
-            self._gaps.load_state(state["gaps"])
-        self._held = list(np.array(state["held"], dtype=np.float64))
-        self._sound = [bool(each) for each in state["sound"]]
-        self._measuring = bool(state["measuring"])
-        self.axes = None if state["axes"] is None else Axes(**state["axes"])
-        self._last_pitch = float(state["last_pitch"])
-        self.arrivals = int(state["arrivals"])
-        self.identity.load_state(state["identity"])
-        self._known = {int(person): kept for person, kept in state["known"]}
+    def load_state(self, state: ObserverState) -> None:
+        """Resume from what `state` returned.
+
+        Raises:
+            StateError: It is damaged, or of other markers.
+        """
+        state = validated(state)
+        m = len(self.marker_names)
+        require(state.held.shape[1] == m, "held", f"must be of {m} markers")
+        fills = (state.gaps is None) == (self._gaps is None)
+        require(fills, "gaps", f"must be there if gaps are filled: {self.fill_gaps}")
+        for k, each in enumerate(state.known):
+            with within(f"known[{k}].body"):
+                self.ik.check_fits(each.body)
+        with within("ik"):
+            self.ik.load_state(state.ik)
+        if self._gaps is not None and state.gaps is not None:
+            with within("gaps"):
+                self._gaps.load_state(state.gaps)
+        with within("identity"):
+            self.identity.load_state(state.identity)
+        self._held, self._sound = list(state.held.copy()), list(state.sound)
+        self._measuring, self.axes = state.measuring, state.axes
+        self._last_pitch, self.arrivals = state.last_pitch, state.arrivals
+        self._known = {each.person: each.body for each in state.known}
 
 
 def _possible(frames: FloatArray) -> FloatArray:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from mplearn.errors import BodyError
@@ -13,7 +11,7 @@ from mplearn.maths.rotations import matrix_to_quaternion
 from mplearn.recording import FloatArray
 
 from .first_posture import first_posture, place_trunk, settle
-from .inverse_kinematics import InverseKinematics
+from .inverse_kinematics import FollowedState, InverseKinematics
 
 NEAR_M = 0.03  # root mean square distance of the markers at which a posture is right
 
@@ -24,7 +22,7 @@ class ResumingKinematics(InverseKinematics):
     Arguments and attributes are those of `InverseKinematics`.
     """
 
-    def resume(self, state: dict[str, Any], markers: FloatArray) -> None:
+    def resume(self, state: FollowedState, markers: FloatArray) -> None:
         """Go on with the person whose state this was, wherever he or she is now.
 
         The posture is found from where the person was last, moved rigidly onto the markers; where

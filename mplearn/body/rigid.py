@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from mplearn.recording import FloatArray, IntArray
+from mplearn.state import Array
 
 from .markers import find_marker_set
 
@@ -75,15 +76,15 @@ class Memory(NamedTuple):
         counts: Frames without a body in sight; frames of the block; shape (2,).
     """
 
-    near: FloatArray
-    last: FloatArray
-    steps: FloatArray
-    spread: FloatArray
-    places: FloatArray
-    unseen: IntArray
-    total: FloatArray
-    seen: IntArray
-    counts: IntArray
+    near: Annotated[FloatArray, Array("k", low=0.0, nan=True)]
+    last: Annotated[FloatArray, Array("k", low=0.0, nan=True)]
+    steps: Annotated[FloatArray, Array("k", low=0.0)]
+    spread: Annotated[FloatArray, Array("k", low=0.0)]
+    places: Annotated[FloatArray, Array("m", 3, nan=True)]
+    unseen: Annotated[IntArray, Array("m", low=0)]
+    total: Annotated[FloatArray, Array("k", low=0.0)]
+    seen: Annotated[IntArray, Array("k", low=0)]
+    counts: Annotated[IntArray, Array(2, low=0)]
 
     @classmethod
     def empty(cls, n_markers: int, n_pairs: int) -> Memory:
@@ -99,6 +100,10 @@ class Memory(NamedTuple):
             seen=np.zeros(n_pairs, dtype=np.int64),
             counts=np.zeros(2, dtype=np.int64),
         )
+
+    def copied(self) -> Memory:
+        """Return a copy."""
+        return self._replace(**{name: each.copy() for name, each in self._asdict().items()})
 
     def forget_distances(self) -> None:
         """Let the next frame's distances be what they are."""

@@ -3,6 +3,7 @@
 from .chains import MergedGraph as MergedGraph
 from .constraints import Asked as Asked
 from .extension import Extension as Extension
+from .graph_state import GraphState as GraphState
 from .levels import LevelledGraph as LevelledGraph
 from .levels import tree_levels as tree_levels
 from .plan import Criterion as Criterion

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
 from ..errors import InvalidValueError, UnknownPrimitiveError
 from ..recording import FloatArray, IntArray
+from ..state import validated
 from .edges import EdgeTable
+from .graph_state import GraphState
 from .history import HistoryTable
-from .validation import checked_arrays
 
 
 class TransitionCounts:
@@ -43,6 +44,7 @@ class TransitionCounts:
         self._edges = EdgeTable()
         self._histories = HistoryTable(order, history_capacity)
         self._frozen = False
+        self._snapshot: Self | None = None
         self._before_change()
 
     # ---- growing
@@ -90,10 +92,10 @@ class TransitionCounts:
         if keep != merged:
             self._rename({merged: keep})
 
-    def absorb(self, other: TransitionCounts, new_id: Mapping[int, int] | None = None) -> None:
+    def add(self, other: TransitionCounts, new_id: Mapping[int, int] | None = None) -> None:
         """Add the nodes and counts of another graph, its ids replaced where ``new_id`` names them.
 
-        Counts do not depend on the order in which graphs are absorbed.
+        Counts do not depend on the order in which graphs are added.
         """
         self._before_change()
         added = other.copy()
@@ -161,51 +163,57 @@ class TransitionCounts:
 
     # ---- keeping
 
-    def state(self) -> dict[str, Any]:
-        """Return the whole state as plain values and arrays of whole numbers."""
-        return {
-            "order": self.order,
-            "concentration": self.concentration,
-            "history_capacity": self.history_capacity,
-            "ids": np.array(self.ids, dtype=np.int64),
-            "edges": self._edges.rows,
-            "histories": self._histories.to_array(),
-        }
-
-    def load_state(self, state: Mapping[str, Any]) -> None:
-        """Resume from what `state` returned.
-
-        Raises:
-            InvalidValueError: The arrays do not describe a graph.
-        """
-        self._before_change()
-        fresh = type(self)(
-            order=int(state["order"]),
-            concentration=float(state["concentration"]),
-            history_capacity=int(state["history_capacity"]),
+    def state(self) -> GraphState:
+        """Return all that was counted."""
+        return GraphState(
+            order=self.order,
+            concentration=self.concentration,
+            history_capacity=self.history_capacity,
+            ids=np.array(self.ids, dtype=np.int64),
+            edges=self._edges.rows,
+            histories=self._histories.to_array(),
         )
-        ids, edges, histories = checked_arrays(state, fresh.order)
-        fresh._index = {id: k for k, id in enumerate(ids.tolist())}
-        fresh._edges.add(edges)
-        fresh._histories = HistoryTable.from_array(fresh.order, fresh.history_capacity, histories)
-        vars(self).update(vars(fresh))
 
     @classmethod
-    def from_state(cls, state: Mapping[str, Any]) -> Self:
-        """Build the graph whose `state` this is."""
-        graph = cls()
-        graph.load_state(state)
+    def from_state(cls, state: GraphState) -> Self:
+        """Return the graph whose `state` this is.
+
+        Raises:
+            StateError: The arrays do not describe a graph.
+        """
+        state = validated(state)
+        graph = cls(
+            order=state.order,
+            concentration=state.concentration,
+            history_capacity=state.history_capacity,
+        )
+        graph._index = {id: k for k, id in enumerate(state.ids.tolist())}
+        graph._edges.add(state.edges)
+        graph._histories = HistoryTable.from_array(
+            graph.order, graph.history_capacity, state.histories
+        )
         return graph
 
     def snapshot(self) -> Self:
-        """Return an independent copy that refuses to be changed."""
-        frozen = self.copy()
-        frozen._frozen = True
-        return frozen
+        """Return a copy that refuses to be changed: the same one, as long as this one stays so."""
+        if self._frozen:
+            return self
+        if self._snapshot is None:
+            self._snapshot = self.copy()
+            self._snapshot._frozen = True
+        return self._snapshot
 
     def copy(self) -> Self:
         """Return an independent copy."""
-        return type(self).from_state(self.state())
+        twin = type(self)(
+            order=self.order,
+            concentration=self.concentration,
+            history_capacity=self.history_capacity,
+        )
+        twin._index = dict(self._index)
+        twin._edges = self._edges.copy()
+        twin._histories = self._histories.copy()
+        return twin
 
     # ---- inside
 
@@ -213,6 +221,7 @@ class TransitionCounts:
         """Refuse a change to a snapshot; forget what was derived from the counts."""
         if self._frozen:
             raise InvalidValueError("this graph is a snapshot; its copy() can grow")
+        self._snapshot = None
 
     def _require(self, *ids: int) -> None:
         for id in ids:

@@ -102,6 +102,12 @@ class EdgeTable:
         for row in rows:
             self._add((int(row[_SOURCE]), int(row[_TARGET])), row[_COUNT:])
 
+    def copy(self) -> EdgeTable:
+        """Return an independent copy."""
+        twin = EdgeTable()
+        twin._rows, twin._row_of = self._rows.copy(), dict(self._row_of)
+        return twin
+
     def without(self, gone: BoolArray) -> EdgeTable:
         """Return the table less the edges marked in ``gone``, shape (E,)."""
         rest = EdgeTable()

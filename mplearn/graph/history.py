@@ -53,6 +53,13 @@ class HistoryTable:
         if self._size > self.capacity:
             self._forget()
 
+    def copy(self) -> HistoryTable:
+        """Return an independent copy."""
+        twin = HistoryTable(self.order, self.capacity)
+        twin._followers = {context: dict(after) for context, after in self._followers.items()}
+        twin._size = self._size
+        return twin
+
     def without(self, gone: int) -> HistoryTable:
         """Return the table less every entry that names ``gone``."""
         rest = HistoryTable(self.order, self.capacity)

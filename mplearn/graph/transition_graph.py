@@ -44,5 +44,5 @@ class TransitionGraph(Plan):
             concentration=self.concentration,
             history_capacity=self.history_capacity,
         )
-        above.absorb(self, group_of)
+        above.add(self, group_of)
         return above

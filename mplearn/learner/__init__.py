@@ -15,4 +15,4 @@ from .events import SegmentClosed as SegmentClosed
 from .events import TransitionSeen as TransitionSeen
 from .foresight import NextMotion as NextMotion
 from .learner import MotionLearner as MotionLearner
-from .merge import merge as merge
+from .learner_state import LearnerState as LearnerState

@@ -2,15 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numba import njit
 
 from ..recording import BoolArray, FloatArray, IntArray
+from ..state import Array, Count, Range, State, require
 
 FACTOR = 1000.0  # times the largest value so far that a value can be, or times one
 PATIENCE_S = 0.5  # after so long it is believed
+
+
+@dataclass(frozen=True, eq=False)
+class AbsurdState(State):
+    """What frames are held against.
+
+    Attributes:
+        last: The last frame that could be, shape (D,); NaN before the first.
+        largest: The largest value so far, or one.
+        in_a_row: Absurd frames since.
+    """
+
+    last: Annotated[FloatArray, Array("d", nan=True)]
+    largest: Annotated[float, Range(1.0)]
+    in_a_row: Count
 
 
 class AbsurdFrames:
@@ -36,18 +53,20 @@ class AbsurdFrames:
         _hold(held, absurd, self._last, self._largest, self._in_a_row, self._patience)
         return held, absurd
 
-    def state(self) -> dict[str, Any]:
-        """Return everything as plain values and arrays."""
-        return {
-            "last": self._last.copy(),
-            "largest": float(self._largest[0]),
-            "in_a_row": int(self._in_a_row[0]),
-        }
+    def state(self) -> AbsurdState:
+        """Return everything."""
+        return AbsurdState(self._last.copy(), float(self._largest[0]), int(self._in_a_row[0]))
 
-    def load_state(self, state: dict[str, Any]) -> None:
-        """Resume from what `state` returned."""
-        self._last = np.array(state["last"], dtype=np.float64)
-        self._largest[0], self._in_a_row[0] = state["largest"], state["in_a_row"]
+    def load_state(self, state: AbsurdState) -> None:
+        """Resume from what `state` returned.
+
+        Raises:
+            StateError: It is of another number of channels.
+        """
+        shape = self._last.shape
+        require(state.last.shape == shape, "last", f"must have shape {shape}")
+        self._last = state.last.copy()
+        self._largest[0], self._in_a_row[0] = state.largest, state.in_a_row
 
 
 @njit(cache=True)

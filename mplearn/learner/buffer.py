@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from ..errors import InvalidValueError
 from ..recording import FloatArray
+from ..state import Array, Count, State, require
+
+
+@dataclass(frozen=True, eq=False)
+class BufferState(State):
+    """The newest frames, shape (n, D), from frame ``first`` on."""
+
+    first: Count
+    frames: Annotated[FloatArray, Array(None, None)]
 
 
 class FrameBuffer:
@@ -56,15 +66,21 @@ class FrameBuffer:
         self._offset += dropped
         self._count -= dropped
 
-    def state(self) -> dict[str, Any]:
-        """Return the content as plain values and arrays."""
-        return {"first": self.first, "frames": self.take(self.first, self.end) if self else None}
+    def state(self) -> BufferState:
+        """Return what the buffer holds."""
+        held = self._frames[self._offset : self._offset + self._count]
+        return BufferState(self.first, held.copy())
 
-    def load_state(self, state: dict[str, Any]) -> None:
-        """Resume from what `state` returned."""
-        frames = state["frames"]
-        self.first, self._offset, self._count = int(state["first"]), 0, 0
-        for frame in () if frames is None else frames:
+    def load_state(self, state: BufferState) -> None:
+        """Resume from what `state` returned.
+
+        Raises:
+            StateError: The frames have another width.
+        """
+        width = state.frames.shape[1]
+        require(width == self.n_channels, "frames", f"must be {self.n_channels} wide, not {width}")
+        self.first, self._offset, self._count = state.first, 0, 0
+        for frame in state.frames:
             self.append(frame)
 
     def _make_room(self) -> None:

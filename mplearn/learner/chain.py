@@ -3,18 +3,103 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
-from dataclasses import astuple
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from itertools import pairwise
+from typing import Annotated, Any
+
+import numpy as np
 
 from ..graph import TransitionGraph
-from ..recording import Segment
+from ..recording import BoolArray, FloatArray, IntArray, Segment
+from ..state import Array, Count, SharedState, State, require
 from ..tree import ROOT, Change, Placement
 from .events import Anomaly, Event, TransitionSeen
 from .foresight import NextMotion, foresee
 from .links import Link, run_before, step_s
 
 REMEMBERED = 2048  # segments; older ones cannot be counted again
+
+
+BLOCK = 64  # segments that are kept together
+
+
+@dataclass(frozen=True, eq=False)
+class LinksState(SharedState):
+    """Segments of a chain, shape (n,) each, as `Link` and `Segment` say; -1 stands for None."""
+
+    number: Annotated[IntArray, Array("n", low=0)]
+    primitive: Annotated[IntArray, Array("n", low=-1)]
+    follows: Annotated[BoolArray, Array("n")]
+    start: Annotated[IntArray, Array("n", low=0)]
+    end: Annotated[IntArray, Array("n", low=1)]
+    confidence: Annotated[FloatArray, Array("n", low=-1.0, high=1.0)]
+    decided_at: Annotated[IntArray, Array("n", low=-1)]
+    still: Annotated[BoolArray, Array("n")]
+    nearest: Annotated[IntArray, Array("n", low=-1)]
+    like: Annotated[IntArray, Array("n", low=-1)]
+
+    def check(self) -> None:
+        """Check that segments follow each other, and are like earlier ones."""
+        require(bool((np.diff(self.number) > 0).all()), "number", "must rise")
+        require(bool((self.start < self.end).all()), "end", "must exceed start")
+        require(bool((self.start[1:] >= self.end[:-1]).all()), "start", "must follow the last end")
+        require(bool((self.like < self.number).all()), "like", "must be an earlier segment")
+
+    @classmethod
+    def of(cls, rows: Sequence[tuple[Any, ...]]) -> LinksState:
+        """Return the state of some links, a row of plain values each."""
+        columns = zip(*rows, strict=True)
+        return cls(*(np.array(each, kind) for each, kind in zip(columns, _DTYPES, strict=True)))
+
+    def links(self) -> list[Link]:
+        """Return the links."""
+        columns = (getattr(self, each.name).tolist() for each in fields(self))
+        return [
+            Link(
+                number,
+                None if primitive < 0 else primitive,
+                follows,
+                Segment(*segment),
+                None if nearest < 0 else nearest,
+                None if like < 0 else like,
+            )
+            for number, primitive, follows, *segment, nearest, like in zip(*columns, strict=True)
+        ]
+
+
+_DTYPES = ("i8", "i8", "?", "i8", "i8", "f8", "i8", "?", "i8", "i8")
+
+
+def _plain(link: Link) -> tuple[Any, ...]:
+    """Return a link as a row of plain values."""
+    ids = (-1 if id is None else id for id in (link.primitive, link.nearest, link.like))
+    primitive, nearest, like = ids
+    segment = link.segment
+    ends = segment.start, segment.end, segment.confidence, segment.decided_at, segment.still
+    return (link.number, primitive, link.follows, *ends, nearest, like)
+
+
+@dataclass(frozen=True, eq=False)
+class ChainState(State):
+    """The latest segments of a stream.
+
+    Attributes:
+        links: The segments, some at a time.
+        paused_frames: Frames of the pause that goes on.
+        broken: Whether what comes next does not follow what came.
+    """
+
+    links: tuple[LinksState, ...]
+    paused_frames: Count
+    broken: bool
+
+    def check(self) -> None:
+        """Check that the parts follow each other."""
+        for k, (one, two) in enumerate(pairwise(self.links), start=1):
+            rises = len(one.number) and len(two.number) and one.number[-1] < two.number[0]
+            require(bool(rises), f"links[{k}].number", "must rise")
+            require(bool(one.end[-1] <= two.start[0]), f"links[{k}].start", "must rise")
 
 
 class Chain:
@@ -37,6 +122,7 @@ class Chain:
         self._links: list[Link] = []
         self._paused_frames = 0
         self._broken = True
+        self._kept: dict[int, tuple[tuple[tuple[Any, ...], ...], LinksState]] = {}
 
     def paused(self, segment: Segment) -> None:
         """Take note of a segment in which nothing moved."""
@@ -142,19 +228,67 @@ class Chain:
         p_value = float(self.graph.p_values(sequence)[-1])
         return [Anomaly(link.segment, "order", score, p_value)] if p_value <= false_alarms else []
 
-    def state(self) -> dict[str, Any]:
-        """Return everything as plain values."""
-        return {
-            "links": [astuple(link) for link in self._links],
-            "paused_frames": self._paused_frames,
-            "broken": self._broken,
-        }
+    # ---- learners that are merged
 
-    def load_state(self, state: dict[str, Any]) -> None:
+    def append(self, other: Chain, n_segments: int, n_frames: int) -> None:
+        """Take over the segments of another stream, as if it had come after this one.
+
+        Args:
+            other: The chain of that stream; its primitives go by the names that they have here.
+            n_segments: Segments that were seen here before.
+            n_frames: Frames that were seen here before.
+        """
+        for link in other._links:
+            segment = replace(
+                link.segment,
+                start=link.segment.start + n_frames,
+                end=link.segment.end + n_frames,
+                decided_at=link.segment.decided_at + n_frames,
+            )
+            like = None if link.like is None else link.like + n_segments
+            new = replace(link, number=link.number + n_segments, segment=segment, like=like)
+            self._links.append(new)
+
+    def rename(self, new_id: Mapping[int, int]) -> None:
+        """Let primitives have other names; those without a name are none any more."""
+        for link in self._links:
+            link.primitive = None if link.primitive is None else new_id.get(link.primitive)
+            link.nearest = None if link.nearest is None else new_id.get(link.nearest)
+
+    def correct(self, moved: Mapping[int, int]) -> None:
+        """Let segments, by number, be what they turned out to be: transitions were counted."""
+        for link in self._links:
+            primitive = moved.get(link.number, link.primitive)
+            link.primitive = None if primitive == ROOT else primitive
+
+    def count_late(self, placed: Mapping[int, int]) -> None:
+        """Count the transitions of segments, by number, that are known only now."""
+        late = {i for i, link in enumerate(self._links) if link.number in placed}
+        late = {i for i in late if self._links[i].primitive is None}
+        for i in late:
+            self._links[i].primitive = placed[self._links[i].number]
+        for i in range(1, len(self._links)):
+            if late & {i - 1, i}:
+                self._count(i)
+
+    # ---- keeping
+
+    def state(self) -> ChainState:
+        """Return everything but the graph."""
+        blocks: dict[int, list[Link]] = {}
+        for link in self._links:
+            blocks.setdefault(link.number // BLOCK, []).append(link)
+        kept = {}
+        for at, links in blocks.items():
+            now = tuple(map(_plain, links))
+            known = self._kept.get(at)
+            kept[at] = known if known and known[0] == now else (now, LinksState.of(now))
+        self._kept = kept
+        links_states = tuple(state for _, state in kept.values())
+        return ChainState(links_states, self._paused_frames, self._broken)
+
+    def load_state(self, state: ChainState) -> None:
         """Resume from what `state` returned."""
-        self._links = [
-            Link(number, primitive, follows, Segment(*segment), nearest, like)
-            for number, primitive, follows, segment, nearest, like in state["links"]
-        ]
-        self._paused_frames = int(state["paused_frames"])
-        self._broken = bool(state["broken"])
+        self._links = [link for block in state.links for link in block.links()]
+        self._paused_frames, self._broken = state.paused_frames, state.broken
+        self._kept = {}

@@ -9,7 +9,8 @@ from typing import Any, Literal
 
 from ..errors import InvalidValueError
 from ..people import PeopleConfig
-from ..tree import FormConfig, TreeConfig
+from ..state import fields_of, from_plain
+from ..tree import TreeConfig
 
 LOWEST_HZ, HIGHEST_HZ = 20.0, 250.0
 """Rates at which a learner can watch [1/s]."""
@@ -72,6 +73,15 @@ class LearnerConfig:
 
     @classmethod
     def from_dict(cls, settings: Mapping[str, Any]) -> LearnerConfig:
-        """Return the configuration that `dataclasses.asdict` turned into plain values."""
-        tree = TreeConfig(**settings["tree"] | {"form": FormConfig(**settings["tree"]["form"])})
-        return cls(**dict(settings) | {"tree": tree, "people": PeopleConfig(**settings["people"])})
+        """Return the configuration that `to_dict` turned into plain values.
+
+        What is not named takes its default.
+
+        Raises:
+            StateError: A setting is not known, or has no such value; its place says which.
+        """
+        return from_plain(cls, dict(settings))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the configuration as plain values, which JSON can hold."""
+        return fields_of(self)

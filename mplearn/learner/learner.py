@@ -6,17 +6,19 @@ frame of markers -> gap tracking -> inverse kinematics -> segmentation -> tree -
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, replace
-from typing import Any
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from ..body import BodyView, MotionObserver, Watched, view_of
+from ..errors import StateError
 from ..graph import TransitionGraph
 from ..library import MotionNovelty, PrimitiveLibrary
 from ..people import PeopleTree
 from ..recording import BoolArray, FloatArray, Recording, Segment, are_markers
 from ..segmentation import make_segmenter
+from ..state import FileFormat, from_plain, require, to_plain, validated, within
 from ..tree import Change, MirrorMap, Placement
 from .absurd import AbsurdFrames
 from .buffer import FrameBuffer
@@ -36,13 +38,16 @@ from .events import (
     SegmentClosed,
 )
 from .foresight import NextMotion
-from .snapshot import library_of
+from .learner_state import LearnerState
+from .snapshot import Snapshots
 
 STILL_M = (
     0.02  # a segment in which no part of the body, and no joint's lever, goes farther: a pause
 )
 BRIDGED_S = 0.3  # a motion goes on through what is lost, if it is no longer
 ABSURD = "a value is not finite, or far beyond all that was seen"
+
+FILES = FileFormat("mplearn-learner", "learner", StateError, compression=1)
 
 
 class MotionLearner:
@@ -60,14 +65,16 @@ class MotionLearner:
         tree: The tree of primitives, of all people.
         graph: The transitions between them.
         n_frames: Frames seen, of all streams.
+        observer: What turns markers into features; None where channels are learned as they come.
+        chain: The latest segments, and which followed which.
     """
 
     def __init__(self, config: LearnerConfig) -> None:
         self.config = config
         self._watches = config.observe == "robot" and are_markers(config.channels)
         self._checks = StreamChecks(config.channels, config.rate_hz, gaps=self._watches)
-        self._observer = self._new_observer()
-        self.channels = config.channels if self._observer is None else self._observer.channels
+        self.observer = self._new_observer()
+        self.channels = config.channels if self.observer is None else self.observer.channels
         self._view = view_of(self.channels)
         width = len(self._view.channels)
         self._segmenter = make_segmenter(config.segmenter, width, config.rate_hz)
@@ -77,7 +84,8 @@ class MotionLearner:
             config.tree, width, config.rate_hz, people=config.people, mirror=mirror
         )
         self.graph = TransitionGraph()
-        self._chain = Chain(self.graph, config.rate_hz, config.longest_pause_s)
+        self.chain = Chain(self.graph, config.rate_hz, config.longest_pause_s)
+        self._snapshots = Snapshots(self._view, self.channels, config.rate_hz, self._body)
         self.n_frames = 0
         self._stream_start = 0
         self._clock_s: float | None = None
@@ -143,9 +151,9 @@ class MotionLearner:
     def end_stream(self) -> list[Event]:
         """Close what is open: what comes next is another stream, perhaps of another person."""
         events: list[Event] = []
-        if self._observer is not None:
-            events = self._take(self._observer.finish())
-            self._observer.restart()
+        if self.observer is not None:
+            events = self._take(self.observer.finish())
+            self.observer.restart()
         events += self._found()
         events += self._cut()
         self._absurd = AbsurdFrames(len(self.config.channels), self.config.rate_hz)
@@ -159,7 +167,10 @@ class MotionLearner:
         return self._edited(self.tree.split(id, groups))
 
     def merge(self, first: int, second: int) -> Change:
-        """Merge two primitives as a person sees fit; see `PeopleTree.merge`."""
+        """Merge two primitives as a person sees fit; see `PeopleTree.merge`.
+
+        Learners are merged by `mplearn.merging.merge_learners`.
+        """
         return self._edited(self.tree.merge(first, second))
 
     def reparent(self, id: int, parent: int) -> Change:
@@ -171,7 +182,7 @@ class MotionLearner:
         return self._edited(self.tree.remove(id, forget=forget))
 
     def _edited(self, change: Change) -> Change:
-        self._chain.revise(change)
+        self.chain.revise(change)
         return change
 
     # ---- what was learned
@@ -185,47 +196,89 @@ class MotionLearner:
         Raises:
             InvalidValueError: ``k`` is not positive.
         """
-        return self._chain.foresee(k)
+        return self.chain.foresee(k)
 
     def snapshot(self) -> PrimitiveLibrary:
         """Return what is known now, frozen."""
-        return library_of(
-            self.tree, self.graph, self._view, self.channels, self.config.rate_hz, self._body
+        return self._snapshots.take(self.tree, self.graph)
+
+    def state(self) -> LearnerState:
+        """Return all that the learner knows: `from_state` resumes bit for bit.
+
+        What has not changed since the last call is the same object (`mplearn.state`), so it costs
+        what has changed.
+        """
+        return LearnerState(
+            config=self.config,
+            observer=None if self.observer is None else self.observer.state(),
+            segmenter=self._segmenter.state(),
+            buffer=self._buffer.state(),
+            tree=self.tree.state(),
+            graph=self.graph.state(),
+            chain=self.chain.state(),
+            clock_s=self._clock_s,
+            n_frames=self.n_frames,
+            stream_start=self._stream_start,
+            person=self._person,
+            n_people=self._n_people,
+            lost_from=self._lost_from,
+            lost_why=self._lost_why,
+            absurd=self._absurd.state(),
         )
 
-    def state(self) -> dict[str, Any]:
-        """Return everything as plain values and arrays: `from_state` resumes bit for bit."""
-        return {
-            "config": asdict(self.config),
-            "observer": None if self._observer is None else self._observer.state(),
-            "segmenter": self._segmenter.state(),
-            "buffer": self._buffer.state(),
-            "tree": self.tree.state(),
-            "graph": self.graph.state(),
-            "chain": self._chain.state(),
-            "clock_s": self._clock_s,
-            "lost_why": self._lost_why,
-            "absurd": self._absurd.state(),
-            **{name.lstrip("_"): getattr(self, name) for name in _COUNTS},
-        }
+    @classmethod
+    def from_state(cls, state: LearnerState) -> MotionLearner:
+        """Return the learner that `state` described.
+
+        Raises:
+            StateError: The state is damaged; its place says where.
+        """
+        state = validated(state)
+        with within("config"):
+            learner = cls(state.config)
+        observer = learner.observer
+        watches = observer is not None
+        require((state.observer is not None) == watches, "observer", f"is needed: {watches}")
+        if observer is not None and state.observer is not None:
+            with within("observer"):
+                observer.load_state(state.observer)
+        with within("segmenter"):
+            learner._segmenter.load_state(state.segmenter)
+        with within("absurd"):
+            learner._absurd.load_state(state.absurd)
+        with within("buffer"):
+            learner._buffer.load_state(state.buffer)
+        with within("tree"):
+            learner.tree.load_state(state.tree)
+        with within("graph"):
+            learner.graph = TransitionGraph.from_state(state.graph)
+        learner.chain = Chain(learner.graph, state.config.rate_hz, state.config.longest_pause_s)
+        learner.chain.load_state(state.chain)
+        learner._clock_s, learner.n_frames = state.clock_s, state.n_frames
+        learner._stream_start, learner._lost_from = state.stream_start, state.lost_from
+        learner._lost_why = state.lost_why
+        learner._person, learner._n_people = state.person, state.n_people
+        return learner
+
+    def save(self, path: str | Path) -> Path:
+        """Write the learner to a file, all of it or nothing, and return its path.
+
+        Raises:
+            StateError: The file cannot be written.
+        """
+        FILES.write(Path(path), to_plain(self.state()))
+        return Path(path)
 
     @classmethod
-    def from_state(cls, state: dict[str, Any]) -> MotionLearner:
-        """Return the learner that `state` described."""
-        learner = cls(LearnerConfig.from_dict(state["config"]))
-        if learner._observer is not None:
-            learner._observer.load_state(state["observer"])
-        learner._segmenter.load_state(state["segmenter"])
-        learner._buffer.load_state(state["buffer"])
-        learner.tree.load_state(state["tree"])
-        learner.graph.load_state(state["graph"])
-        learner._chain.load_state(state["chain"])
-        learner._clock_s = state["clock_s"]
-        learner._lost_why = str(state["lost_why"])
-        learner._absurd.load_state(state["absurd"])
-        for name in _COUNTS:
-            setattr(learner, name, int(state[name.lstrip("_")]))
-        return learner
+    def load(cls, path: str | Path) -> MotionLearner:
+        """Read a learner that `save` wrote, which goes on bit for bit.
+
+        Raises:
+            StateError: The file is missing, damaged, foreign, or of a newer version.
+        """
+        content = FILES.read(Path(path))
+        with within(str(path)):
+            return cls.from_state(from_plain(LearnerState, content))
 
     # ---- inside
 
@@ -241,12 +294,12 @@ class MotionLearner:
 
     def _watch(self, frames: FloatArray) -> list[Event]:
         """Take frames of the stream, shape (T, D)."""
-        if self._observer is None:
+        if self.observer is None:
             held, absurd = self._absurd.hold(frames)
             return self._pass_on(held, absurd, ABSURD)
         events: list[Event] = []
         while len(frames):
-            watched = self._observer.watch(frames)
+            watched = self.observer.watch(frames)
             events += self._take(watched)
             frames = frames[watched.taken :]
         return events
@@ -258,7 +311,7 @@ class MotionLearner:
             events += self._cut()
             self._begin_loss(watched.why)
             self._skip(watched.dropped)
-        observer = self._observer
+        observer = self.observer
         if not watched.joins and observer is not None:
             events += self._cut() if self.n_frames > self._stream_start else []
             before, self._person = self._person, observer.person
@@ -334,7 +387,7 @@ class MotionLearner:
     def _begin_stream(self) -> None:
         self._stream_start = self.n_frames
         self._buffer = FrameBuffer(self._buffer.n_channels)
-        self._chain.broken()
+        self.chain.broken()
 
     def _learn(self, features: FloatArray) -> list[Event]:
         """Take features that are ready, shape (k, D)."""
@@ -359,7 +412,7 @@ class MotionLearner:
         )
         if segment.still or (self._body and np.ptp(frames, axis=0).max() < STILL_M):
             segment = replace(segment, still=True)
-            self._chain.paused(segment)
+            self.chain.paused(segment)
             return [SegmentClosed(segment)]
         return self._place(segment, frames)
 
@@ -375,7 +428,7 @@ class MotionLearner:
         events += [PrimitiveMerged(segment, *each) for each in placement.merges]
         for id in placement.born:
             events += [PrimitiveBorn(segment, id, len(self.tree.node(id).members))]
-        events.extend(self._chain.follow(segment, placement, self.config.false_alarms))
+        events.extend(self.chain.follow(segment, placement, self.config.false_alarms))
         return events
 
     def _unlike(self, segment: Segment, placement: Placement) -> list[Event]:
@@ -387,6 +440,3 @@ class MotionLearner:
         novelty = MotionNovelty(matrices, rules.n_nearest)
         found = novelty.score([(placement.nearest, placement.distance**rules.power)])
         return [Anomaly(segment, "motion", *found)] if found.p_value <= allowed else []
-
-
-_COUNTS = ("n_frames", "_stream_start", "_person", "_n_people", "_lost_from")

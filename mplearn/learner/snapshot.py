@@ -7,51 +7,66 @@ from ..graph import TransitionGraph
 from ..hmm import LeftRightHMM
 from ..library import Primitive, PrimitiveLibrary, TreeNode
 from ..people import PeopleTree
+from ..tree import Node
 
 
-def library_of(
-    tree: PeopleTree,
-    graph: TransitionGraph,
-    view: View,
-    channels: tuple[str, ...],
-    rate_hz: float,
-    body: str,
-) -> PrimitiveLibrary:
-    """Return the primitives and transitions that are known now.
-
-    What several people do is one primitive, with a node of the tree for each person below it.
+class Snapshots:
+    """Takes libraries of a learner; a primitive that has not changed is made once.
 
     Args:
-        tree: Its leaves become primitives.
-        graph: Their transitions.
         view: How the tree sees the channels.
         channels: What the primitives are made of.
         rate_hz: Frames per second [1/s].
         body: Name of the body whose features the channels are; empty for none.
     """
-    primitives = []
-    for id in tree.leaves:
-        node, seen = tree.node(id), tree.model(id)
-        model = LeftRightHMM(
+
+    def __init__(self, view: View, channels: tuple[str, ...], rate_hz: float, body: str) -> None:
+        self._view = view
+        self._channels = channels
+        self._rate_hz = rate_hz
+        self._body = body
+        self._made: dict[int, tuple[LeftRightHMM, Primitive]] = {}
+
+    def take(self, tree: PeopleTree, graph: TransitionGraph) -> PrimitiveLibrary:
+        """Return the primitives and transitions that are known now.
+
+        What several people do is one primitive, with a node of the tree for each person below it.
+
+        Args:
+            tree: Its leaves become primitives.
+            graph: Their transitions.
+        """
+        nodes = {node.id: node for node in tree.nodes}
+        self._made = {id: self._primitive(tree, nodes[id]) for id in tree.leaves}
+        return PrimitiveLibrary(
+            primitives=tuple(primitive for _, primitive in self._made.values()),
+            graph=graph,
+            channels=self._channels,
+            rate_hz=self._rate_hz,
+            body=self._body,
+            tree=tuple(TreeNode(node.id, node.parent, node.n_placed) for node in nodes.values()),
+            recogniser=tree.recogniser(),
+        )
+
+    def _primitive(self, tree: PeopleTree, node: Node) -> tuple[LeftRightHMM, Primitive]:
+        """Return a primitive, with the model in the tree that it was made of."""
+        seen = tree.model(node.id)  # the same one, as long as the exemplars are
+        mean_duration_s = node.n_frames / node.n_placed / self._rate_hz
+        model, made = self._made.get(node.id, (None, None))
+        if made is not None and model is seen:
+            now = (node.n_placed, mean_duration_s, node.parent)
+            if (made.n_exemplars, made.mean_duration_s, made.parent) == now:
+                return seen, made
+        view = self._view
+        hmm = LeftRightHMM(
             view.read(seen.means), view.read_variances(seen.variances), seen.log_stay
         )
-        primitives.append(
-            Primitive.from_exemplars(
-                id,
-                model,
-                [view.read(frames) for frames in tree.exemplars(id)],
-                rate_hz,
-                n_exemplars=node.n_placed,
-                mean_duration_s=node.n_frames / node.n_placed / rate_hz,
-                parent=node.parent,
-            )
+        return seen, Primitive.from_exemplars(
+            node.id,
+            hmm,
+            [view.read(frames) for frames in tree.exemplars(node.id)],
+            self._rate_hz,
+            n_exemplars=node.n_placed,
+            mean_duration_s=mean_duration_s,
+            parent=node.parent,
         )
-    return PrimitiveLibrary(
-        primitives=tuple(primitives),
-        graph=graph,
-        channels=channels,
-        rate_hz=rate_hz,
-        body=body,
-        tree=tuple(TreeNode(node.id, node.parent, node.n_placed) for node in tree.nodes),
-        recogniser=tree.recogniser(),
-    )

@@ -1,61 +1,81 @@
-"""A library as plain values and arrays, and back."""
+"""What a library's file holds."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
 from ..errors import LibraryError, MPLearnError
-from ..graph import TransitionGraph
-from ..hmm import LeftRightHMM
-from .compact import CompactMotion
+from ..graph import GraphState, TransitionGraph
+from ..state import FileFormat, Range, State, from_plain, require, require_no_cycle, to_plain
+from ..tree.recogniser import Recogniser, RecogniserState
+from .holdings import TreeNode
 from .primitive import Primitive
 
 if TYPE_CHECKING:
     from .library import PrimitiveLibrary
 
+FILES = FileFormat("mplearn-library", "library", LibraryError)
 
-def to_content(library: PrimitiveLibrary) -> dict[str, Any]:
+
+@dataclass(frozen=True, eq=False)
+class LibraryState(State):
+    """All that a library holds; attributes are those of `PrimitiveLibrary`."""
+
+    primitives: tuple[Primitive, ...]
+    graph: GraphState
+    channels: tuple[str, ...]
+    rate_hz: Annotated[float, Range(1e-3, 1e6)]
+    body: str
+    tree: tuple[TreeNode, ...]
+    recogniser: RecogniserState | None
+
+    def check(self) -> None:
+        """Check that the nodes make one tree, in which each primitive has its place."""
+        parents = {node.id: node.parent for node in self.tree}
+        require(len(parents) == len(self.tree), "tree", "must have different ids")
+        for k, node in enumerate(self.tree):
+            require(
+                node.parent is None or node.parent in parents,
+                f"tree[{k}].parent",
+                f"must be a node, not {node.parent}",
+            )
+        require_no_cycle(parents, lambda id: f"tree[{list(parents).index(id)}].parent")
+
+
+def to_content(library: PrimitiveLibrary) -> Any:
     """Return all that a library holds as plain values and arrays."""
-    return {
-        "primitives": [asdict(primitive) for primitive in library.primitives],
-        "graph": library.graph.state(),
-        "channels": list(library.channels),
-        "rate_hz": float(library.rate_hz),
-        "body": library.body,
-        "tree": [list(node) for node in library.tree],
-        "recogniser": None if library.recogniser is None else library.recogniser.state(),
-    }
+    recogniser = library.recogniser
+    return to_plain(
+        LibraryState(
+            primitives=library.primitives,
+            graph=library.graph.state(),
+            channels=library.channels,
+            rate_hz=float(library.rate_hz),
+            body=library.body,
+            tree=library.tree,
+            recogniser=None if recogniser is None else recogniser.state(),
+        )
+    )
 
 
-def from_content(
-    kind: type[PrimitiveLibrary], content: dict[str, Any], source: str
-) -> PrimitiveLibrary:
+def from_content(kind: type[PrimitiveLibrary], content: Any, source: str) -> PrimitiveLibrary:
     """Build the library that `to_content` described.
 
     Raises:
         LibraryError: The content, which came from ``source``, describes none.
     """
     try:
-        recogniser = None
-        if content["recogniser"] is not None:
-            from ..tree import Recogniser
-
-            recogniser = Recogniser.from_state(content["recogniser"])
+        state = from_plain(LibraryState, content)
+        recogniser = state.recogniser
         return kind(
-            primitives=tuple(_primitive(item) for item in content["primitives"]),
-            graph=TransitionGraph.from_state(content["graph"]),
-            channels=tuple(content["channels"]),
-            rate_hz=content["rate_hz"],
-            body=content["body"],
-            tree=tuple(content["tree"]),
-            recogniser=recogniser,
+            primitives=state.primitives,
+            graph=TransitionGraph.from_state(state.graph),
+            channels=state.channels,
+            rate_hz=state.rate_hz,
+            body=state.body,
+            tree=state.tree,
+            recogniser=None if recogniser is None else Recogniser.from_state(recogniser),
         )
-    except (MPLearnError, ValueError, TypeError, LookupError, AttributeError) as error:
-        raise LibraryError(f"{source} does not describe a library: {error!r}") from error
-
-
-def _primitive(item: dict[str, Any]) -> Primitive:
-    parts = {"hmm": LeftRightHMM(**item["hmm"])}
-    kept = tuple(CompactMotion(**motion) for motion in item["kept"])
-    return Primitive(**(item | parts | {"kept": kept}))
+    except MPLearnError as error:
+        raise LibraryError(f"{source} does not describe a library: {error}") from error

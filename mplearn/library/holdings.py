@@ -75,9 +75,11 @@ class Holdings:
         strangers = set(self.graph.ids) - set(ids)
         if strangers:
             raise InvalidValueError(f"the graph names {sorted(strangers)}, which are no primitives")
-        graph = self.graph.copy()
-        for id in ids:
-            graph.add_node(id)
+        graph, missing = self.graph, [id for id in ids if id not in self.graph]
+        if missing:
+            graph = graph.copy()
+            for id in missing:
+                graph.add_node(id)
         object.__setattr__(self, "graph", graph.snapshot())
 
     def __len__(self) -> int:

@@ -14,8 +14,7 @@ from ..errors import InvalidValueError
 from ..generation import StyleName, Trajectory, generate, retime
 from ..graph import Asked, Criterion, LevelledGraph, tree_levels
 from ..recording import FloatArray
-from . import storage
-from .content import from_content, to_content
+from .content import FILES, from_content, to_content
 from .holdings import Key
 from .knowledge import Knowledge
 
@@ -31,7 +30,7 @@ class PrimitiveLibrary(Knowledge):
     @cached_property
     def version(self) -> str:
         """Hash of all that the library holds, names included: 16 hexadecimal digits."""
-        return storage.digest(to_content(self))[:16]
+        return FILES.digest(to_content(self))[:16]
 
     # ---- planning
 
@@ -143,7 +142,7 @@ class PrimitiveLibrary(Knowledge):
         Raises:
             LibraryError: The file cannot be written.
         """
-        storage.write(Path(path), to_content(self))
+        FILES.write(Path(path), to_content(self))
         return Path(path)
 
     @classmethod
@@ -153,4 +152,4 @@ class PrimitiveLibrary(Knowledge):
         Raises:
             LibraryError: The file is missing, damaged, foreign, or of a newer version.
         """
-        return from_content(cls, storage.read(Path(path)), str(path))
+        return from_content(cls, FILES.read(Path(path)), str(path))

@@ -71,14 +71,7 @@ class MotionNovelty:
 
 def novelty_of(recogniser: Recogniser) -> MotionNovelty:
     """Return what the motions that a recogniser knows are held against."""
-    from ..tree.bank import ExemplarBank
-
-    state, config = recogniser.state(), recogniser.config
-    bank, index = ExemplarBank.from_points(config, state["bank"]), state["index"]
-    known = zip(index["ids"].tolist(), index["leaves"].tolist(), index["members"], strict=True)
-    return MotionNovelty(
-        {id: bank.matrix(members) for id, is_leaf, members in known if is_leaf}, config.n_nearest
-    )
+    return MotionNovelty(recogniser.matrices(), recogniser.config.n_nearest)
 
 
 def _left_out(matrix: FloatArray, n_nearest: int) -> FloatArray:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..errors import FrameError, InvalidValueError
 from ..recording import BoolArray, FloatArray, IntArray
-from .rigidity import RigidNeighbours
+from ..state import Array, State, require, validated, within
+from .rigidity import RigidityState, RigidNeighbours
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,25 @@ class GapConfig:
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
                 raise InvalidValueError(f"{name} must be positive and finite, not {value}")
+
+
+@dataclass(frozen=True, eq=False)
+class GapsState(State):
+    """Tracks of M markers.
+
+    Attributes:
+        position: Of each marker, filtered, shape (M, 3) [m].
+        velocity: Shape (M, 3) [m/s].
+        last: The last believed measurement, shape (M, 3) [m]; NaN where there is no track.
+        unseen_frames: Since when each marker is unseen [frame], shape (M,).
+        neighbours: What markers say about each other.
+    """
+
+    position: Annotated[FloatArray, Array("m", 3, nan=True)]
+    velocity: Annotated[FloatArray, Array("m", 3)]
+    last: Annotated[FloatArray, Array("m", 3, nan=True)]
+    unseen_frames: Annotated[IntArray, Array("m", low=0)]
+    neighbours: RigidityState
 
 
 class GapTracker:
@@ -117,29 +137,29 @@ class GapTracker:
             self._last[lost], filled[lost] = np.nan, np.nan
         return filled
 
-    def state(self) -> dict[str, Any]:
-        """Return the whole state, plain values and arrays; `load_state` resumes bit for bit."""
-        return {
-            "position": self._filter.x.copy(),
-            "velocity": self._filter.dx.copy(),
-            "last": self._last.copy(),
-            "unseen_frames": self._unseen_frames.copy(),
-            "neighbours": self._neighbours.state(),
-        }
+    def state(self) -> GapsState:
+        """Return the whole state; `load_state` resumes bit for bit."""
+        return GapsState(
+            position=self._filter.x.copy(),
+            velocity=self._filter.dx.copy(),
+            last=self._last.copy(),
+            unseen_frames=self._unseen_frames.copy(),
+            neighbours=self._neighbours.state(),
+        )
 
-    def load_state(self, state: dict[str, Any]) -> None:
+    def load_state(self, state: GapsState) -> None:
         """Resume from what `state` returned.
 
         Raises:
-            InvalidValueError: The state is that of another number of markers.
+            StateError: The state is damaged, or that of another number of markers.
         """
-        if state["last"].shape != (self.n_markers, 3):
-            raise InvalidValueError(
-                f"the state is of {len(state['last'])} markers, not of {self.n_markers}"
-            )
-        self._filter.x, self._filter.dx = state["position"].copy(), state["velocity"].copy()
-        self._last, self._unseen_frames = state["last"].copy(), state["unseen_frames"].copy()
-        self._neighbours.load_state(state["neighbours"])
+        state = validated(state)
+        n = len(state.last)
+        require(n == self.n_markers, "last", f"is of {n} markers, not of {self.n_markers}")
+        with within("neighbours"):
+            self._neighbours.load_state(state.neighbours)
+        self._filter.x, self._filter.dx = state.position.copy(), state.velocity.copy()
+        self._last, self._unseen_frames = state.last.copy(), state.unseen_frames.copy()
 
     def _within_reach(self, positions: FloatArray) -> BoolArray:
         """Whether a person can have moved each marker here since it was last seen, shape (M,)."""

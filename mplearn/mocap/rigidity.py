@@ -8,17 +8,40 @@ motion [Kabsch1976], and the marker with them.
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from ..maths.rigid_fit import fit_rigid
 from ..recording import BoolArray, FloatArray, IntArray
+from ..state import Array, Count, State, require
 
 _STEP_S = 0.1  # time between two looks at the distances
 _MEMORY_S = 2.0  # over which their variances forget
 _NOISE_M = 0.005  # variation of a distance that means nothing
 _UNKNOWN_M = 0.05  # variation of a distance that was seen once
+
+
+@dataclass(frozen=True, eq=False)
+class RigidityState(State):
+    """Distances between M markers, and how they vary.
+
+    Attributes:
+        mean: Mean of each distance, shape (M, M) [m].
+        variance: Its variance, shape (M, M) [m^2].
+        looks: How often it was seen, shape (M, M).
+        frames: Frames seen.
+        before: The last frame, shape (M, 3) [m].
+        as_last_seen: All markers when each was last seen, shape (M, M, 3) [m].
+    """
+
+    mean: Annotated[FloatArray, Array("m", "m", low=0.0)]
+    variance: Annotated[FloatArray, Array("m", "m", low=0.0)]
+    looks: Annotated[IntArray, Array("m", "m", low=0)]
+    frames: Count
+    before: Annotated[FloatArray, Array("m", 3, nan=True)]
+    as_last_seen: Annotated[FloatArray, Array("m", "m", 3, nan=True)]
 
 
 class RigidNeighbours:
@@ -61,22 +84,28 @@ class RigidNeighbours:
         self._as_last_seen[lost & ~np.isnan(before[:, 0])] = before
         return self._predict(np.flatnonzero(lost), positions)
 
-    def state(self) -> dict[str, Any]:
-        """Return the whole state as plain values and arrays."""
-        return {
-            "mean": self._mean.copy(),
-            "variance": self._variance.copy(),
-            "looks": self._looks.copy(),
-            "frames": self._frames,
-            "before": self._before.copy(),
-            "as_last_seen": self._as_last_seen.copy(),
-        }
+    def state(self) -> RigidityState:
+        """Return the whole state."""
+        return RigidityState(
+            mean=self._mean.copy(),
+            variance=self._variance.copy(),
+            looks=self._looks.copy(),
+            frames=self._frames,
+            before=self._before.copy(),
+            as_last_seen=self._as_last_seen.copy(),
+        )
 
-    def load_state(self, state: dict[str, Any]) -> None:
-        """Resume from what `state` returned."""
-        self._mean, self._variance = state["mean"].copy(), state["variance"].copy()
-        self._looks, self._frames = state["looks"].copy(), int(state["frames"])
-        self._before, self._as_last_seen = state["before"].copy(), state["as_last_seen"].copy()
+    def load_state(self, state: RigidityState) -> None:
+        """Resume from what `state` returned.
+
+        Raises:
+            StateError: It is of another number of markers.
+        """
+        m = self.n_markers
+        require(len(state.mean) == m, "mean", f"must be of {m} markers, not {len(state.mean)}")
+        self._mean, self._variance = state.mean.copy(), state.variance.copy()
+        self._looks, self._frames = state.looks.copy(), state.frames
+        self._before, self._as_last_seen = state.before.copy(), state.as_last_seen.copy()
 
     def _look(self, positions: FloatArray) -> None:
         """Follow mean and variance of all distances, in exponential memory."""

@@ -1,4 +1,5 @@
 """Several people in one stream: one primitive is one node, with a leaf for each person below it."""
 
 from .config import PeopleConfig as PeopleConfig
+from .people_tree import PeopleState as PeopleState
 from .people_tree import PeopleTree as PeopleTree

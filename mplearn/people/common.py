@@ -8,7 +8,9 @@ import numpy as np
 
 from ..hmm import LeftRightHMM, fit
 from ..recording import FloatArray
-from ..tree import ROOT, PrimitiveTree, Recogniser
+from ..tree import ROOT, PrimitiveTree, Recogniser, TreeConfig
+from ..tree.bank import ExemplarBank
+from ..tree.search import NodeIndex
 
 
 def common_model(models: Sequence[LeftRightHMM], exemplars: Sequence[FloatArray]) -> LeftRightHMM:
@@ -23,56 +25,64 @@ def common_model(models: Sequence[LeftRightHMM], exemplars: Sequence[FloatArray]
     return fit(exemplars, n_states, variance_floor=floor)
 
 
-def common_recogniser(
-    trees: Mapping[int, PrimitiveTree], leaves: Mapping[int, Sequence[tuple[int, int]]]
-) -> Recogniser:
-    """Return one recogniser for all people.
+class CommonRecogniser:
+    """One recogniser for all people; what has not changed since it was last asked for is kept.
 
     A primitive's exemplars are those of all its leaves, its width that of the widest of them.
+    Distances are counted in units of the variance floor, which differs from person to person: here
+    it is the mean of theirs.
 
     Args:
-        trees: Each person's tree.
-        leaves: Person and id in that person's tree of the leaves of each primitive.
+        config: Rules of the trees.
     """
-    states = {person: tree.recogniser().state() for person, tree in trees.items()}
-    banks = {person: state["bank"] for person, state in states.items()}
-    floor = np.mean([bank["floor"] for bank in banks.values()], axis=0)
-    scales = {  # distances are counted in units of the variance floor
-        person: float(np.sqrt(bank["floor"].mean() / floor.mean()))
-        for person, bank in banks.items()
-    }
-    first, begins = 0, {}
-    for person, bank in banks.items():
-        begins[person] = first
-        first += 1 + int(max(bank["numbers"], default=0))
-    members, diameters = [], []
-    for group in leaves.values():
-        widths, numbers = [0.0], []
-        for person, leaf in group:
-            index = states[person]["index"]
-            at = list(index["ids"]).index(leaf)
-            widths.append(scales[person] * float(index["diameters"][at]))
-            numbers += [begins[person] + number for number in index["members"][at]]
-        members.append(numbers)
-        diameters.append(max(widths))
-    order = np.argsort(list(leaves))
-    common = next(iter(states.values())) | {
-        "bank": {
-            "floor": floor,
-            "numbers": np.concatenate([begins[p] + bank["numbers"] for p, bank in banks.items()]),
-            "columns": np.concatenate([bank["columns"] for bank in banks.values()]),
-            "duration": np.concatenate([bank["duration"] for bank in banks.values()]),
-        },
-        "index": next(iter(states.values()))["index"]
-        | {
-            "limit": max(scales[p] * float(state["index"]["limit"]) for p, state in states.items()),
-            "ids": np.array(list(leaves), dtype=np.int64)[order],
-            "parents": np.full(len(leaves), ROOT, dtype=np.int64),
-            "leaves": np.ones(len(leaves), dtype=np.bool_),
-            "members": [members[i] for i in order],
-            "diameters": np.array(diameters)[order],
-            "caps": None,
-        },
-    }
-    recogniser = Recogniser.from_state(common)
-    return recogniser.calibrated(recogniser.config.false_acceptance)
+
+    def __init__(self, config: TreeConfig) -> None:
+        self._config = config
+        self._bank = ExemplarBank(config, 1, np.ones(1))
+        self._index = NodeIndex(config, self._bank)
+
+    def of(
+        self,
+        trees: Mapping[int, PrimitiveTree],
+        leaves: Mapping[int, Sequence[tuple[int, int]]],
+        numbers: Mapping[int, Mapping[int, int]],
+    ) -> Recogniser:
+        """Return what would be recognised now, frozen.
+
+        Args:
+            trees: Each person's tree.
+            leaves: Person and id in that person's tree of the leaves of each primitive.
+            numbers: Number here of each segment of a person's tree, by person.
+        """
+        floor = np.mean([tree.bank.floor for tree in trees.values()], axis=0)
+        if not np.array_equal(floor, self._bank.floor):
+            self._bank = ExemplarBank(self._config, len(floor), floor)
+            self._index = NodeIndex(self._config, self._bank)
+        bank, index = self._bank, self._index
+        scales = {
+            person: float(np.sqrt(tree.bank.floor.mean() / floor.mean()))
+            for person, tree in trees.items()
+        }
+        index.limit = max(scales[person] * tree.limit for person, tree in trees.items())
+        for id in set(index.ids.tolist()) - set(leaves):
+            index.drop(id)
+        held: set[int] = set()
+        for id, group in leaves.items():
+            members: list[int] = []
+            widths = [0.0]
+            for person, leaf in group:
+                node = trees[person].node(leaf)
+                widths.append(scales[person] * node.diameter)
+                for n in node.members:
+                    members.append(numbers[person][n])
+                    if members[-1] not in bank:
+                        seen = trees[person].bank[n]
+                        model = bank.model(seen.columns.T, float(seen.duration))
+                        bank.add(members[-1], model)
+            index.enter((id, ROOT, True, max(widths)), members, bank)
+            held.update(members)
+        for number in set(bank.numbers()) - held:
+            bank.drop(number)
+        shortest_frames = next(iter(trees.values())).shortest_frames
+        recogniser = Recogniser(self._config, bank.fork(), index.fork(), shortest_frames)
+        return recogniser.calibrated(self._config.false_acceptance)

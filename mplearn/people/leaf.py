@@ -3,9 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
-from .shapes import Shape
+from ..state import Count, Range, State
+from .shape_table import ShapeTable
+from .shapes import ShapeState
+
+
+@dataclass(frozen=True, eq=False)
+class LeafState(State):
+    """A leaf with its shape; attributes are those of `Leaf`."""
+
+    person: Count
+    local: Annotated[int, Range(1)]
+    id: Annotated[int, Range(1)]
+    primitive: Annotated[int, Range(1)]
+    founded: Count
+    shape: ShapeState
 
 
 @dataclass
@@ -33,6 +47,7 @@ class Leaf:
         """Person, and id in that person's tree."""
         return self.person, self.local
 
-    def state(self, shape: Shape) -> list[Any]:
-        """Return everything as plain values and arrays."""
-        return [self.person, self.local, self.id, self.primitive, self.founded, *shape]
+    def state(self, table: ShapeTable) -> LeafState:
+        """Return everything, with the shape from the table."""
+        ids = self.person, self.local, self.id, self.primitive, self.founded
+        return LeafState(*ids, table.state(self.slot))

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
+from operator import is_not
+from typing import Annotated
 
 from ..errors import InvalidValueError, UnknownPrimitiveError
 from ..hmm import LeftRightHMM
 from ..recording import FloatArray
+from ..state import Count, Range, State, require, validated, within
 from ..tree import (
     ROOT,
     Change,
@@ -18,10 +21,79 @@ from ..tree import (
     Recogniser,
     TreeConfig,
 )
+from ..tree.tree import TreeState
 from . import editing
-from .common import common_model, common_recogniser
+from .common import CommonRecogniser, common_model
 from .config import PeopleConfig
+from .pins import Key
+from .shared_primitives import SharingState
 from .sharing import Sharing
+
+
+@dataclass(frozen=True, eq=False)
+class PersonState(State):
+    """A person's own tree."""
+
+    person: Count
+    tree: TreeState
+
+
+@dataclass(frozen=True, eq=False)
+class PeopleState(State):
+    """The trees of several people.
+
+    Attributes:
+        n_seen: Segments seen, of all people.
+        next_id: First id that was never used, as long as there is one person.
+        trees: Each person's tree, in the order of their coming.
+        sharing: What they share; None as long as there is one person.
+    """
+
+    n_seen: Count
+    next_id: Annotated[int, Range(1)]
+    trees: tuple[PersonState, ...]
+    sharing: SharingState | None
+
+    @property
+    def primitives(self) -> set[int]:
+        """Ids of the primitives."""
+        if self.sharing is not None:
+            return {leaf.primitive for leaf in self.sharing.leaves}
+        nodes = self.trees[0].tree.nodes
+        return {node.id for node in nodes if node.id != ROOT and not node.children}
+
+    def check(self) -> None:
+        """Check that what is shared is what the trees hold."""
+        trees = {each.person: each.tree for each in self.trees}
+        require(len(trees) == len(self.trees) > 0, "trees", "must be of different people")
+        n_seen = sum(tree.n_seen for tree in trees.values())
+        require(self.n_seen == n_seen, "n_seen", f"must be {n_seen} as in the trees")
+        sharing = self.sharing
+        if sharing is None:
+            require(len(trees) == 1, "sharing", f"is needed for {len(trees)} people")
+            largest = max(node.id for node in self.trees[0].tree.nodes)
+            require(self.next_id > largest, "next_id", f"must exceed {largest}")
+            return
+        require(sharing.n_seen == n_seen, "sharing.n_seen", f"must be {n_seen} as in the trees")
+        leaves = {
+            (person, node.id)
+            for person, tree in trees.items()
+            for node in tree.nodes
+            if node.id != ROOT and not node.children
+        }
+        named = {(leaf.person, leaf.local) for leaf in sharing.leaves}
+        require(leaves == named, "sharing.leaves", f"must be those of the trees, {sorted(leaves)}")
+        numbers = {own.person: set(own.there.tolist()) for own in sharing.numbers}
+        for person, tree in trees.items():
+            held = {n for node in tree.nodes for n in node.members.tolist()}
+            require(
+                numbers.get(person, set()) >= held,
+                "sharing.numbers",
+                f"must name the segments of person {person}",
+            )
+        for name in ("numbers", "offsets", "waiting"):
+            for k, each in enumerate(getattr(sharing, name)):
+                require(each.person in trees, f"sharing.{name}[{k}].person", f"is {each.person}")
 
 
 class PeopleTree:
@@ -63,6 +135,8 @@ class PeopleTree:
         self._trees: dict[int, PrimitiveTree] = {0: self._new_tree()}
         self._next_id = ROOT + 1
         self._sharing: Sharing | None = None
+        self._common = CommonRecogniser(config)
+        self._models: dict[int, tuple[tuple[LeftRightHMM, ...], LeftRightHMM]] = {}
 
     def _new_tree(self) -> PrimitiveTree:
         return PrimitiveTree(self.config, self.n_channels, self.rate_hz, self.groups)
@@ -131,7 +205,11 @@ class PeopleTree:
         if len(leaves) == 1:
             person, leaf = leaves[0]
             return self._trees[person].model(leaf)
-        return common_model([self._trees[p].model(leaf) for p, leaf in leaves], self.exemplars(id))
+        models = tuple(self._trees[p].model(leaf) for p, leaf in leaves)
+        known = self._models.get(id)
+        if known is None or len(known[0]) != len(models) or any(map(is_not, known[0], models)):
+            known = self._models[id] = models, common_model(models, self.exemplars(id))
+        return known[1]
 
     def matrices(self, person: int) -> dict[int, FloatArray]:
         """Return the distances among a person's own exemplars of each primitive, shape (k, k).
@@ -156,9 +234,10 @@ class PeopleTree:
         """Return what would be recognised now, whoever moves, frozen."""
         if self._sharing is None:
             return self._only.recogniser()
-        return common_recogniser(
-            self._trees, {id: self._leaves_of(id) for id in self._sharing.primitives}
-        )
+        leaves: dict[int, list[Key]] = {}
+        for leaf in self._sharing.leaves:
+            leaves.setdefault(leaf.primitive, []).append(leaf.key)
+        return self._common.of(self._trees, leaves, self._sharing.numbers)
 
     # ---- learning
 
@@ -253,7 +332,7 @@ class PeopleTree:
         self._next_id = max((self._next_id, *(id + 1 for id in change.born)))
         return change
 
-    # ---- being joined, see `union`
+    # ---- being merged, see `mplearn.merging`
 
     def sharing(self) -> Sharing:
         """Return what people share; where there is one person, as if others were to come."""
@@ -268,28 +347,61 @@ class PeopleTree:
         self._trees, self.n_seen = trees, n_seen
         self._next_id = 1 + max(node.id for node in self.nodes)
 
+    def copy(self) -> PeopleTree:
+        """Return a tree that knows the same, and goes on apart; exemplars are shared."""
+        rules = self.config, self.n_channels, self.rate_hz, self.groups
+        twin = PeopleTree(*rules, self.people_config, self.mirror)
+        twin.load_state(self.state())
+        return twin
+
     # ---- keeping
 
-    def state(self) -> dict[str, Any]:
-        """Return all of the state, plain values and arrays: `load_state` resumes bit for bit."""
-        return {
-            "n_seen": self.n_seen,
-            "next_id": self._next_id,
-            "trees": [[person, tree.state()] for person, tree in self._trees.items()],
-            "sharing": None if self._sharing is None else self._sharing.state(),
-        }
+    def state(self) -> PeopleState:
+        """Return all that is known: `load_state` resumes bit for bit."""
+        return PeopleState(
+            n_seen=self.n_seen,
+            next_id=self._next_id,
+            trees=tuple(PersonState(person, tree.state()) for person, tree in self._trees.items()),
+            sharing=None if self._sharing is None else self._sharing.state(),
+        )
 
-    def load_state(self, state: dict[str, Any]) -> None:
-        """Resume from what `state` returned, under the same configuration."""
-        self.n_seen = int(state["n_seen"])
-        self._next_id = int(state["next_id"])
-        self._trees = {}
-        for person, kept in state["trees"]:
-            self._trees[int(person)] = self._new_tree()
-            self._trees[int(person)].load_state(kept)
+    def load_state(self, state: PeopleState) -> None:
+        """Resume from what `state` returned, under the same configuration.
+
+        Raises:
+            StateError: Something in it is wrong, or does not fit this tree; nothing has changed.
+        """
+        state = validated(state)
+        if state.sharing is not None:
+            with within("sharing"):
+                self._check_widths(state.sharing)
+        trees = {}
+        for k, each in enumerate(state.trees):
+            trees[each.person] = self._new_tree()
+            with within(f"trees[{k}].tree"):
+                trees[each.person].load_state(each.tree)
+        self.n_seen, self._next_id, self._trees = state.n_seen, state.next_id, trees
         self._sharing = None
-        if state["sharing"] is not None:
-            self.sharing().load_state(state["sharing"])
+        self._common = CommonRecogniser(self.config)
+        if state.sharing is not None:
+            rules = self.config, self.people_config
+            self._sharing = Sharing(*rules, {}, self._next_id, self.mirror)
+            self._sharing.trees = trees
+            self._sharing.load_state(state.sharing)
+
+    def _check_widths(self, state: SharingState) -> None:
+        """Check that shapes are such as this tree takes."""
+        posture, movement = self.n_channels, self.n_channels * self.config.form.n_points
+        for k, leaf in enumerate(state.leaves):
+            fits = (len(leaf.shape.posture), len(leaf.shape.movement)) == (posture, movement)
+            require(fits, f"leaves[{k}].shape", f"must have shapes ({posture},) and ({movement},)")
+        for k, each in enumerate(state.waiting):
+            fits = (each.postures.shape[1], each.movements.shape[1]) == (posture, movement)
+            require(fits, f"waiting[{k}].postures", f"must be {posture} wide, movements {movement}")
+        for k, offset in enumerate(state.offsets):
+            require(
+                len(offset.offset) == posture, f"offsets[{k}].offset", f"must be {posture} wide"
+            )
 
     # ---- inside
 

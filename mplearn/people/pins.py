@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..recording import BoolArray
+from ..state import Count, State
 
 Key = tuple[int, int]  # person, and id of the leaf in that person's tree
 Pair = tuple[Key, Key]
+
+
+@dataclass(frozen=True, eq=False)
+class PinsState(State):
+    """Pairs of leaves that a person said are one motion, and pairs that are not."""
+
+    together: tuple[tuple[tuple[Count, Count], tuple[Count, Count]], ...]
+    apart: tuple[tuple[tuple[Count, Count], tuple[Count, Count]], ...]
 
 
 class Pins:
@@ -66,28 +75,21 @@ class Pins:
             setattr(pins, name, {pair for pair in pairs if pair[0] != pair[1]})
         return pins
 
-    def united(self, other: Pins) -> Pins:
+    def merged(self, other: Pins) -> Pins:
         """Return what was said here and there; where that differs, leaves are together."""
         pins = Pins()
         pins._together = self._together | other._together
         pins._apart = (self._apart | other._apart) - pins._together
         return pins
 
-    def state(self) -> dict[str, Any]:
-        """Return everything as plain values."""
-        return {
-            "together": [[*one, *two] for one, two in sorted(self._together)],
-            "apart": [[*one, *two] for one, two in sorted(self._apart)],
-        }
+    def state(self) -> PinsState:
+        """Return everything that was said."""
+        return PinsState(tuple(sorted(self._together)), tuple(sorted(self._apart)))
 
-    @classmethod
-    def from_state(cls, state: Mapping[str, Any]) -> Pins:
-        """Return what `state` described."""
-        pins = cls()
-        for name in ("together", "apart"):
-            pairs = {_pair((int(a), int(b)), (int(c), int(d))) for a, b, c, d in state[name]}
-            setattr(pins, f"_{name}", pairs)
-        return pins
+    def load_state(self, state: PinsState) -> None:
+        """Resume from what `state` returned."""
+        self._together = {_pair(*pair) for pair in state.together}
+        self._apart = {_pair(*pair) for pair in state.apart}
 
 
 def _pair(one: Key, two: Key) -> Pair:

@@ -9,7 +9,7 @@ from numba import njit
 
 from ..recording import FloatArray, IntArray
 from ..tree import MirrorMap
-from .shapes import Shape, mirrored, squares
+from .shapes import Shape, ShapeState, mirrored, squares
 
 
 class ShapeTable:
@@ -24,6 +24,7 @@ class ShapeTable:
     def __init__(self, mirror: MirrorMap | None = None) -> None:
         self.mirror = mirror
         self._free: list[int] = []
+        self._states: dict[int, ShapeState] = {}  # as long as a shape does not change
         self._postures = self._movements = self._images = np.zeros((0, 0))
         self._direct = self._mirrored = np.zeros((0, 0))
 
@@ -37,6 +38,7 @@ class ShapeTable:
 
     def put(self, slot: int, shape: Shape) -> None:
         """Replace a shape."""
+        self._states.pop(slot, None)
         self._postures[slot], self._movements[slot] = shape
         image = shape if self.mirror is None else mirrored(shape, self.mirror)
         self._images[slot] = image.movement
@@ -52,6 +54,12 @@ class ShapeTable:
     def __getitem__(self, slot: int) -> Shape:
         """Return a shape."""
         return Shape(self._postures[slot], self._movements[slot])
+
+    def state(self, slot: int) -> ShapeState:
+        """Return a shape as a part that is kept once, by its content."""
+        if slot not in self._states:
+            self._states[slot] = ShapeState(*(part.copy() for part in self[slot]))
+        return self._states[slot]
 
     def postures(self, slots: IntArray) -> FloatArray:
         """Return the postures of some, shape (n, D)."""

@@ -8,11 +8,13 @@ its joint angles, so a person's size and place have fallen away already.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from ..recording import FloatArray
+from ..state import Array, SharedState
 from ..tree import FormConfig, MirrorMap, form
 
 
@@ -26,6 +28,14 @@ class Shape(NamedTuple):
 
     posture: FloatArray
     movement: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeState(SharedState):
+    """A shape; attributes are those of `Shape`."""
+
+    posture: Annotated[FloatArray, Array("d")]
+    movement: Annotated[FloatArray, Array("pd")]
 
 
 def shape_of(exemplars: Iterable[FloatArray], config: FormConfig) -> Shape:

@@ -2,29 +2,117 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from ..recording import FloatArray, IntArray
+from ..state import Array, Count, Range, State, require, require_no_cycle
 from ..tree import ROOT, MirrorMap, Node, PrimitiveTree, TreeConfig
+from ..tree.node import Happening
 from .config import PeopleConfig
-from .leaf import Leaf
+from .leaf import Leaf, LeafState
 from .links import Known, solve
 from .nodes import nodes_of
 from .offsets import offsets_of
-from .pins import Pins
+from .pins import Pins, PinsState
 from .shape_table import ShapeTable
 from .shapes import Shape, shape_of
-from .waiting import Waiting, WaitingRoom
+from .waiting import Waiting, WaitingRoom, WaitingState
+
+
+@dataclass(frozen=True, eq=False)
+class NumbersState(State):
+    """Numbers of segments in a person's tree, and in the tree of all people, shape (n,) each."""
+
+    person: Count
+    there: Annotated[IntArray, Array("n", low=0)]
+    here: Annotated[IntArray, Array("n", low=0)]
+
+
+@dataclass(frozen=True, eq=False)
+class AboveState(State):
+    """A node above primitives; attributes are those of `Node`."""
+
+    id: Annotated[int, Range(1)]
+    born_at: Count
+    history: tuple[tuple[Happening, Count], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class OffsetState(State):
+    """A person's usual deviation in posture, shape (D,)."""
+
+    person: Count
+    offset: Annotated[FloatArray, Array(None)]
+
+
+@dataclass(frozen=True, eq=False)
+class SharingState(State):
+    """What people share; attributes are those of `SharedPrimitives`."""
+
+    next_id: Annotated[int, Range(1)]
+    n_seen: Count
+    unit: Annotated[float, Range(0.0, math.inf)]
+    leaves: tuple[LeafState, ...]
+    waiting: tuple[WaitingState, ...]
+    numbers: tuple[NumbersState, ...]
+    above: tuple[AboveState, ...]
+    parents: tuple[tuple[Count, Count], ...]
+    pins: PinsState
+    offsets: tuple[OffsetState, ...]
+
+    def check(self) -> None:
+        """Check that ids name what is there."""
+        keys = {(leaf.person, leaf.local) for leaf in self.leaves}
+        require(len(keys) == len(self.leaves), "leaves", "must differ")
+        primitives = {leaf.primitive for leaf in self.leaves}
+        above = {node.id for node in self.above}
+        named = {leaf.id for leaf in self.leaves} | primitives | above
+        founded = {leaf.founded for leaf in self.leaves}
+        require(max(named | founded, default=0) < self.next_id, "next_id", "must exceed all ids")
+        require(len(above) == len(self.above), "above", "must differ")
+        require(not above & primitives, "above", "must be no primitives")
+        parents: dict[int, int | None] = dict(self.parents)
+        require(
+            len(parents) == len(self.parents) and parents.keys() == above | primitives,
+            "parents",
+            f"must be of {sorted(above | primitives)}, each once, not {sorted(parents)}",
+        )
+        for k, (id, parent) in enumerate(self.parents):
+            require(
+                parent == ROOT or parent in above,
+                f"parents[{k}]",
+                f"node {id} must lie below one of {sorted({ROOT, *above})}, not {parent}",
+            )
+        require_no_cycle(parents, lambda id: f"parents[{list(parents).index(id)}]")
+        for k, each in enumerate(self.waiting):
+            require(each.primitive in primitives, f"waiting[{k}].primitive", "must be a primitive")
+        waiting = {(each.person, each.primitive) for each in self.waiting}
+        require(len(waiting) == len(self.waiting), "waiting", "must differ")
+        for name in ("together", "apart"):
+            for k, pair in enumerate(getattr(self.pins, name)):
+                require(keys.issuperset(pair), f"pins.{name}[{k}]", "must name leaves")
+        seen: set[int] = set()
+        for k, own in enumerate(self.numbers):
+            here = set(own.here.tolist())
+            fine = len(here) == len(own.here) == len(set(own.there.tolist()))
+            require(
+                fine and not here & seen and max(here, default=-1) < self.n_seen,
+                f"numbers[{k}]",
+                f"must differ from all others, and be below {self.n_seen}",
+            )
+            seen |= here
 
 
 class SharedPrimitives:
     """Keeps the primitives that the leaves of several people's trees make up.
 
-    Nothing here decides when what changes: see `sharing`, `editing` and `union`.
+    Nothing here decides when what changes: see `sharing`, `editing` and `mplearn.merging`.
 
     Args:
         config: Rules of the trees.
@@ -198,44 +286,53 @@ class SharedPrimitives:
 
     # ---- keeping
 
-    def state(self) -> dict[str, Any]:
-        """Return everything as plain values and arrays."""
-        return {
-            "next_id": self.next_id,
-            "n_seen": self.n_seen,
-            "unit": self.unit,
-            "leaves": [leaf.state(self.table[leaf.slot]) for leaf in self.leaves],
-            "waiting": self.waiting.state(),
-            "numbers": [
-                [person, [list(pair) for pair in numbers.items()]]
-                for person, numbers in self.numbers.items()
-            ],
-            "above": [node.state() for node in self.above.values()],
-            "parents": [list(pair) for pair in self.parents.items()],
-            "pins": self.pins.state(),
-            "offsets": [[person, offset] for person, offset in self._offsets.items()],
-        }
+    def state(self) -> SharingState:
+        """Return everything but the trees."""
+        return SharingState(
+            next_id=self.next_id,
+            n_seen=self.n_seen,
+            unit=self.unit,
+            leaves=tuple(leaf.state(self.table) for leaf in self.leaves),
+            waiting=self.waiting.state(),
+            numbers=tuple(
+                NumbersState(
+                    person, np.array(list(own), np.int64), np.array(list(own.values()), np.int64)
+                )
+                for person, own in self.numbers.items()
+            ),
+            above=tuple(
+                AboveState(node.id, node.born_at, tuple(node.history))
+                for node in self.above.values()
+            ),
+            parents=tuple(self.parents.items()),
+            pins=self.pins.state(),
+            offsets=tuple(
+                OffsetState(person, offset.copy()) for person, offset in self._offsets.items()
+            ),
+        )
 
-    def load_state(self, state: dict[str, Any]) -> None:
+    def load_state(self, state: SharingState) -> None:
         """Resume from what `state` returned, with the same trees."""
-        self.next_id, self.n_seen = int(state["next_id"]), int(state["n_seen"])
-        self.unit = float(state["unit"])
+        self.next_id, self.n_seen, self.unit = state.next_id, state.n_seen, state.unit
         self.table = ShapeTable(self.table.mirror)
         self.leaves = []
-        for *ids, posture, movement in state["leaves"]:
-            slot = self.table.add(Shape(np.array(posture), np.array(movement)))
-            person, local, id, primitive, founded = map(int, ids)
-            self.leaves.append(Leaf(person, local, id, primitive, founded, slot))
+        for leaf in state.leaves:
+            slot = self.table.add(Shape(leaf.shape.posture, leaf.shape.movement))
+            ids = leaf.person, leaf.local, leaf.id, leaf.primitive, leaf.founded
+            self.leaves.append(Leaf(*ids, slot))
         self.waiting = WaitingRoom(self.table)
-        self.waiting.load_state(state["waiting"])
+        self.waiting.load_state(state.waiting)
         self.numbers = {
-            int(person): {int(there): int(here) for there, here in pairs}
-            for person, pairs in state["numbers"]
+            own.person: dict(zip(own.there.tolist(), own.here.tolist(), strict=True))
+            for own in state.numbers
         }
-        self.above = {node.id: node for node in map(Node.from_state, state["above"])}
-        self.parents = {int(id): int(parent) for id, parent in state["parents"]}
-        self.pins = Pins.from_state(state["pins"])
-        self._offsets = {int(person): np.array(offset) for person, offset in state["offsets"]}
+        self.above = {
+            node.id: Node(node.id, None, node.born_at, history=list(node.history))
+            for node in state.above
+        }
+        self.parents = dict(state.parents)
+        self.pins.load_state(state.pins)
+        self._offsets = {each.person: each.offset.copy() for each in state.offsets}
 
     # ---- shapes
 

@@ -4,13 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
+from ..recording import FloatArray, IntArray
+from ..state import Array, Count, Range, SharedState, require
 from ..tree import ROOT
 from .shape_table import ShapeTable
 from .shapes import Shape, mean_shape
+
+
+@dataclass(frozen=True, eq=False)
+class WaitingState(SharedState):
+    """Segments of one person that joined one primitive.
+
+    Attributes:
+        person: Whose they are.
+        primitive: Id of the primitive.
+        numbers: Their numbers in the tree of all people, shape (n,).
+        postures: Their mean postures, shape (n, D).
+        movements: Their movements, shape (n, P * D).
+    """
+
+    person: Count
+    primitive: Annotated[int, Range(1)]
+    numbers: Annotated[IntArray, Array("n", low=0)]
+    postures: Annotated[FloatArray, Array("n", None)]
+    movements: Annotated[FloatArray, Array("n", None)]
+
+    def check(self) -> None:
+        """Check that something waits, and nothing twice."""
+        numbers = self.numbers.tolist()
+        require(0 < len(set(numbers)) == len(numbers), "numbers", "must differ, at least one")
 
 
 @dataclass
@@ -28,6 +54,21 @@ class Waiting:
     primitive: int
     slot: int
     shapes: dict[int, Shape] = field(default_factory=dict)
+    _kept: WaitingState | None = field(default=None, repr=False, compare=False)
+
+    def state(self) -> WaitingState:
+        """Return everything: the same object as long as nothing has changed."""
+        kept = self._kept
+        if kept is None or kept.numbers.tolist() != list(self.shapes):
+            postures, movements = zip(*self.shapes.values(), strict=True)
+            kept = self._kept = WaitingState(
+                self.person,
+                self.primitive,
+                np.array(list(self.shapes), np.int64),
+                np.array(postures),
+                np.array(movements),
+            )
+        return kept
 
 
 class WaitingRoom:
@@ -95,21 +136,16 @@ class WaitingRoom:
                     self.join(each.person, home, shapes)
         return moved
 
-    def state(self) -> list[Any]:
-        """Return everything as plain values and arrays."""
-        return [
-            [each.person, each.primitive, [[n, *shape] for n, shape in each.shapes.items()]]
-            for each in self
-        ]
+    def state(self) -> tuple[WaitingState, ...]:
+        """Return all that waits."""
+        return tuple(each.state() for each in self)
 
-    def load_state(self, state: Sequence[Any]) -> None:
+    def load_state(self, state: Sequence[WaitingState]) -> None:
         """Resume from what `state` returned."""
-        for person, primitive, shapes in state:
-            known = {
-                int(n): Shape(np.array(posture), np.array(movement))
-                for n, posture, movement in shapes
-            }
-            self.join(int(person), int(primitive), known)
+        for each in state:
+            shapes = map(Shape, each.postures, each.movements)
+            known = dict(zip(each.numbers.tolist(), shapes, strict=True))
+            self.join(each.person, each.primitive, known)
 
     def _keep(self, each: Waiting, numbers: Collection[int]) -> None:
         each.shapes = {n: shape for n, shape in each.shapes.items() if n in numbers}

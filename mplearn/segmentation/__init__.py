@@ -1,6 +1,7 @@
 """Segmentation of a stream of motion into candidates for primitives, on-line."""
 
 from .base import Segmenter as Segmenter
+from .base import SegmenterState as SegmenterState
 from .kinematic_centroid import KinematicCentroid as KinematicCentroid
 from .kinematic_centroid import KinematicCentroidConfig as KinematicCentroidConfig
 from .kohlmorgen_lemm import KohlmorgenLemm as KohlmorgenLemm

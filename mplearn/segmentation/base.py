@@ -4,10 +4,29 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import Any
+
+from numpy.typing import NDArray
 
 from ..errors import InvalidValueError
 from ..recording import FloatArray, Segment
+from ..state import State
+
+
+@dataclass(frozen=True, eq=False)
+class SegmenterState(State):
+    """What a segmenter remembers.
+
+    Attributes:
+        segmenter: Name of its class.
+        rate_hz: Frames per second [1/s].
+        arrays: Its arrays by name; each field of a record is one, as ``record.field``.
+    """
+
+    segmenter: str
+    rate_hz: float
+    arrays: dict[str, NDArray[Any]]
 
 
 class Segmenter(ABC):
@@ -30,15 +49,16 @@ class Segmenter(ABC):
         """Close what is open, as at the end of a stream, and start afresh at frame 0."""
 
     @abstractmethod
-    def state(self) -> dict[str, Any]:
-        """Return the whole state as plain values and arrays; `load_state` resumes bit for bit."""
+    def state(self) -> SegmenterState:
+        """Return the whole state; `load_state` resumes bit for bit."""
 
     @abstractmethod
-    def load_state(self, state: dict[str, Any]) -> None:
+    def load_state(self, state: SegmenterState) -> None:
         """Resume from what `state` returned.
 
         Raises:
-            InvalidValueError: The state belongs to another kind or width of segmenter.
+            StateError: The state is damaged, or belongs to another kind, rate or width of
+                segmenter; nothing has changed then.
         """
 
     @abstractmethod

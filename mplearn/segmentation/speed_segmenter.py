@@ -11,7 +11,8 @@ import numpy as np
 from ..errors import FrameError, InvalidValueError
 from ..maths.filters import butterworth
 from ..recording import FloatArray, Segment
-from .base import Segmenter
+from ..state import LARGEST, require, validated
+from .base import Segmenter, SegmenterState
 from .speed import STILL, ZeroVelocityConfig, all_low, initial_state, running_speed, settings_of
 
 
@@ -121,32 +122,79 @@ class SpeedSegmenter(Segmenter):
             return []
         return [Segment(start, end, confidence=0.0, decided_at=end - 1, still=still)]
 
-    def state(self) -> dict[str, Any]:
-        """Return the whole state as plain values and arrays; `load_state` resumes bit for bit."""
-        arrays = {name: array.copy() for name, array in self._arrays.items()}
-        return {"segmenter": type(self).__name__, "rate_hz": self.rate_hz, **arrays}
+    def state(self) -> SegmenterState:
+        """Return the whole state; `load_state` resumes bit for bit."""
+        columns = {
+            name: column.copy()
+            for own, array in self._arrays.items()
+            for name, column in _columns(own, array).items()
+        }
+        return SegmenterState(type(self).__name__, self.rate_hz, columns)
 
-    def load_state(self, state: dict[str, Any]) -> None:
+    def load_state(self, state: SegmenterState) -> None:
         """Resume from what `state` returned.
 
         Raises:
-            InvalidValueError: The state belongs to another kind, rate or width of segmenter.
+            StateError: The state is damaged, or belongs to another kind, rate or width of
+                segmenter; nothing has changed then.
         """
-        own = {"segmenter": type(self).__name__, "rate_hz": self.rate_hz}
-        for key, value in own.items():
-            if state.get(key) != value:
-                raise InvalidValueError(
-                    f"the state's {key} must be {value!r}, not {state.get(key)!r}"
-                )
-        loaded = {}
-        for name, array in self._arrays.items():
-            if name not in state:
-                raise InvalidValueError(f"the state lacks {name!r}")
-            value = np.array(state[name], dtype=array.dtype)
-            if value.shape != array.shape:
-                raise InvalidValueError(
-                    f"the state's {name!r} must have shape {array.shape}, not {value.shape}"
-                )
-            loaded[name] = value
+        state = validated(state)
+        kind = type(self).__name__
+        require(state.segmenter == kind, "segmenter", f"must be {kind!r}, not {state.segmenter!r}")
+        require(
+            state.rate_hz == self.rate_hz, "rate_hz", f"must be {self.rate_hz}, not {state.rate_hz}"
+        )
+        loaded = {name: array.copy() for name, array in self._arrays.items()}
+        wanted = {
+            name: column
+            for own, array in loaded.items()
+            for name, column in _columns(own, array).items()
+        }
+        lacking, strange = wanted.keys() - state.arrays.keys(), state.arrays.keys() - wanted.keys()
+        require(not lacking, "arrays", f"lacks {sorted(lacking)}")
+        require(not strange, "arrays", f"knows no {sorted(strange)}")
+        for name, column in wanted.items():
+            _check(state.arrays[name], column, f"arrays.{name}")
+            column[...] = state.arrays[name]
+        _check_watch(loaded["state"][0])
         self._arrays = loaded
         self._bind()
+
+
+def _columns(name: str, array: Any) -> dict[str, Any]:
+    """Return the fields of an array of records by name, as views; any other array as it is."""
+    if array.dtype.names is None:
+        return {name: array}
+    return {f"{name}.{each}": array[each] for each in array.dtype.names}
+
+
+def _check(value: Any, own: Any, place: str) -> None:
+    """Check that a stored array is like one's own."""
+    require(
+        value.dtype == own.dtype and value.shape == own.shape,
+        place,
+        f"must have shape {own.shape} of {own.dtype}, not {value.shape} of {value.dtype}",
+    )
+    least = -1 if own.dtype.kind == "i" else -LARGEST
+    fine = bool(((value >= least) & (value <= LARGEST)).all())  # NaN fails too
+    require(fine, place, f"must hold numbers in [{least:g}, {LARGEST:g}]")
+
+
+def _check_watch(state: Any) -> None:
+    """Check the record of the watch over the speed."""
+    frames = state["frames"]
+    for name, low, high in (
+        ("frames", 0, np.inf),
+        ("mode", 0, 2),
+        ("start", 0, frames + 1),
+        ("ending", 0.0, 1.0),
+        ("valley_frame", -1, frames),
+        ("dip_frame", -1, frames),
+        ("rest_frames", 0, frames),
+        *((each, 0.0, np.inf) for each in ("peak", "valley", "mean", "mean_root", "rest")),
+    ):
+        require(
+            low <= state[name] <= high,
+            f"arrays.state.{name}",
+            f"must lie in [{low:g}, {high:g}], not {state[name]:g}",
+        )

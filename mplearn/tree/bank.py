@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from copy import copy
+from dataclasses import dataclass
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -11,6 +13,7 @@ from numba import njit
 from ..hmm import fit
 from ..hmm.kernels import log_densities, log_likelihood
 from ..recording import FloatArray, IntArray
+from ..state import Array, State, require
 from . import form
 from .config import TreeConfig
 from .rows import Rows
@@ -40,6 +43,27 @@ class Exemplar(NamedTuple):
     log_next: FloatArray
     own: FloatArray
     duration: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class BankState(State):
+    """Exemplars by number: what is compared; models follow from it.
+
+    Attributes:
+        floor: Smallest variance of each channel, shape (D,).
+        numbers: Their numbers, shape (n,).
+        columns: Their points, shape (n, D, P).
+        duration: How long each lasted [frame], shape (n,).
+    """
+
+    floor: Annotated[FloatArray, Array("d", low=1e-30)]
+    numbers: Annotated[IntArray, Array("n", low=0)]
+    columns: Annotated[FloatArray, Array("n", "d", None, nan=True)]
+    duration: Annotated[FloatArray, Array("n", low=1e-6)]
+
+    def check(self) -> None:
+        """Check that no number comes twice."""
+        require(len(set(self.numbers.tolist())) == len(self.numbers), "numbers", "must differ")
 
 
 class ExemplarBank:
@@ -160,46 +184,35 @@ class ExemplarBank:
             matrix[i, :i] = matrix[:i, i] = row
         return matrix
 
-    def subset(self, numbers: Iterable[int]) -> ExemplarBank:
-        """Return a bank of some of the exemplars, sharing no memory."""
-        return ExemplarBank.from_points(self.config, self.points(numbers))
+    def fork(self) -> ExemplarBank:
+        """Return a bank that holds the same, and goes on apart; what neither changes is shared."""
+        twin = copy(self)
+        twin._slots, twin._rows = dict(self._slots), self._rows.fork()
+        return twin
 
-    def points(self, numbers: Iterable[int] | None = None) -> dict[str, Any]:
-        """Return what `from_points` needs of all exemplars, or of some; models follow from it."""
-        numbers = sorted(self._slots if numbers is None else numbers)
+    def state(self, numbers: Iterable[int]) -> BankState:
+        """Return some of the exemplars."""
+        numbers = sorted(numbers)
         slots = self._slots_of(numbers)
-        return {
-            "floor": self.floor.copy(),
-            "numbers": np.array(numbers, np.int64),
-            "columns": self._rows.gather(slots, _COLUMNS),
-            "duration": self._rows.gather(slots, _DURATION),
-        }
+        return BankState(
+            self.floor.copy(),
+            np.array(numbers, np.int64),
+            self._rows.gather(slots, _COLUMNS),
+            self._rows.gather(slots, _DURATION),
+        )
 
     @classmethod
-    def from_points(cls, config: TreeConfig, points: dict[str, Any]) -> ExemplarBank:
-        """Return the bank that `points` described."""
-        floor = np.array(points["floor"], dtype=np.float64)
-        bank = cls(config, len(floor), floor)
-        parts = (points[name] for name in ("numbers", "columns", "duration"))
-        for number, columns, duration in zip(*parts, strict=True):
-            columns = np.asarray(columns, dtype=np.float64)
-            bank.add(int(number), bank.model(columns.T, float(duration)))
-        return bank
+    def from_state(cls, config: TreeConfig, state: BankState) -> ExemplarBank:
+        """Return the bank that `state` described.
 
-    def state(self) -> dict[str, Any]:
-        """Return all exemplars as plain arrays."""
-        numbers = self.numbers()
-        slots = self._slots_of(numbers)
-        rows = {name: self._rows.gather(slots, k) for k, name in enumerate(Exemplar._fields)}
-        return {"floor": self.floor.copy(), "numbers": np.array(numbers, np.int64), **rows}
-
-    @classmethod
-    def from_state(cls, config: TreeConfig, state: dict[str, Any]) -> ExemplarBank:
-        """Return the bank that `state` described."""
-        bank = cls(config, len(state["floor"]), state["floor"])
-        rows = (np.asarray(state[name], dtype=np.float64) for name in Exemplar._fields)
-        for number, *parts in zip(state["numbers"], *rows, strict=True):
-            bank.add(int(number), Exemplar(*parts))
+        Raises:
+            ModelError: A channel of an exemplar is missing throughout.
+        """
+        bank = cls(config, len(state.floor), state.floor)
+        for number, columns, duration in zip(
+            state.numbers.tolist(), state.columns, state.duration.tolist(), strict=True
+        ):
+            bank.add(number, bank.model(columns.T, duration))
         return bank
 
     def _slots_of(self, numbers: Sequence[int]) -> IntArray:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 
 from ..recording import FloatArray, IntArray
+from ..state import Blob, within
 from . import form
 from .bank import ExemplarBank
 from .config import TreeConfig
-from .spread import ChannelSpread, DistanceSample
+from .spread import ChannelSpread, DistanceSample, SampleState, SpreadState
 
 _RESCALE = 1.5  # models are made again when the variance of all motion has changed by this factor
 
@@ -33,12 +33,13 @@ class SegmentMemory:
         self.config = config
         self.bank = ExemplarBank(config, len(groups), np.ones(len(groups)))
         self.frames: dict[int, FloatArray] = {}
+        self._blobs: dict[int, Blob] = {}
         self._spread = ChannelSpread(groups)
         self._sample = DistanceSample(config.n_sampled, config.seed)
         self._holds: Counter[int] = Counter()
 
     def remember(self, number: int, frames: FloatArray) -> None:
-        """Take up a segment, shape (L, D), held once."""
+        """Take up a segment, shape (L, D), held once; it is not written to from now on."""
         points = form.points_of(frames, self.config.form)
         self._spread.update(points)
         if not self._sample.numbers:
@@ -64,6 +65,7 @@ class SegmentMemory:
         for number in numbers:
             if self._holds[number] == 0:
                 del self._holds[number], self.frames[number]
+                self._blobs.pop(number, None)
                 self.bank.drop(number)
 
     def rescale(self) -> bool:
@@ -77,8 +79,12 @@ class SegmentMemory:
         if change.max() <= _RESCALE and change.min() >= 1 / _RESCALE:
             return False
         self.bank.refit(floor)
-        self._sample.measure(self.bank)
+        self.measure()
         return True
+
+    def measure(self) -> None:
+        """Measure the distances in the sample again."""
+        self._sample.measure(self.bank)
 
     def scale(self) -> float:
         """Return the largest distance expected between executions of one motion."""
@@ -88,25 +94,47 @@ class SegmentMemory:
         """Return the variance of each channel over all motion, shape (D,)."""
         return self._spread.own_variances()
 
-    def state(self) -> dict[str, Any]:
-        """Return everything as plain values and arrays, but for who holds what."""
-        return {
-            "spread": self._spread.state(),
-            "sample": self._sample.state(),
-            "bank": self.bank.state(),
-            "frames": [self.frames[number].copy() for number in self.bank.numbers()],
-        }
+    def blob(self, number: int) -> Blob:
+        """Return the frames of a segment as a part that is kept once, by its content."""
+        if number not in self._blobs:
+            self._blobs[number] = Blob(self.frames[number])
+        return self._blobs[number]
 
-    def load_state(self, state: dict[str, Any], held: Iterable[int]) -> None:
-        """Resume from what `state` returned; ``held`` are all numbers that are held, with repeats.
+    def spread(self) -> SpreadState:
+        """Return the state of the running statistics."""
+        return self._spread.state()
 
-        The sample's own are added.
+    def sample(self) -> SampleState:
+        """Return the state of the sample of all segments."""
+        return self._sample.state(self.blob)
+
+    def load(
+        self,
+        floor: FloatArray,
+        spread: SpreadState,
+        sample: SampleState,
+        held: Iterable[tuple[int, Blob]],
+    ) -> None:
+        """Remember what was remembered before; models follow from the frames and the floor.
+
+        Args:
+            floor: Smallest variance of each channel, shape (D,).
+            spread: The running statistics.
+            sample: The sample; its segments are held, too.
+            held: Numbers and frames of all that others hold, with repeats.
+
+        Raises:
+            StateError: A segment cannot be modelled.
         """
-        self._spread.load_state(state["spread"])
-        self._sample.load_state(state["sample"])
-        self.bank = ExemplarBank.from_state(self.config, state["bank"])
-        self.frames = {
-            number: np.array(frames, dtype=np.float64)
-            for number, frames in zip(self.bank.numbers(), state["frames"], strict=True)
-        }
-        self._holds = Counter([*self._sample.numbers, *held])
+        self._spread.load_state(spread)
+        with within("sample"):
+            self._sample.load_state(sample)
+        held = [*zip(self._sample.numbers, sample.frames, strict=True), *held]
+        self._holds = Counter(number for number, _ in held)
+        self._blobs = dict(sorted(dict(held).items()))
+        self.frames = {number: blob.array for number, blob in self._blobs.items()}
+        self.bank = ExemplarBank(self.config, len(floor), floor)
+        for number, frames in self.frames.items():
+            with within(f"segment {number}"):
+                seen = form.centred(form.points_of(frames, self.config.form), self.config.form)
+                self.bank.add(number, self.bank.model(seen, len(frames)))

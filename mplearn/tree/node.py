@@ -2,14 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 
-from ..recording import FloatArray
+from ..recording import FloatArray, IntArray
+from ..state import Array, Blob, Count, SharedState, require
 from .clustering import most_redundant
 from .spread import without
+
+Happening: TypeAlias = Literal["born", "split", "merged", "moved"]
+
+
+@dataclass(frozen=True, eq=False)
+class NodeState(SharedState):
+    """A node with its exemplars; attributes are those of `Node`.
+
+    Attributes:
+        frames: The exemplars as they came, shape (L, D) each.
+    """
+
+    id: Count
+    parent: Count | None
+    born_at: Count
+    members: Annotated[IntArray, Array("k", low=0)]
+    frames: tuple[Annotated[Blob, Array(None, "d", nan=True)], ...]
+    matrix: Annotated[FloatArray, Array("k", "k", low=0.0)]
+    n_placed: Count
+    n_frames: Count
+    children: tuple[Count, ...]
+    settled: tuple[Count, ...]
+    history: tuple[tuple[Happening, Count], ...]
+    whole: bool
+    apart: tuple[Count, ...]
+
+    def exemplars(self) -> Iterator[tuple[int, Blob]]:
+        """Go through the numbers and frames of the exemplars."""
+        return zip(self.members.tolist(), self.frames, strict=True)
+
+    def check(self) -> None:
+        """Check that nothing is there twice, and that distances are distances."""
+        members = set(self.members.tolist())
+        require(len(members) == len(self.members), "members", "must differ")
+        require(len(set(self.children)) == len(self.children), "children", "must differ")
+        require(len(self.frames) == len(members), "frames", f"must be {len(members)} segments")
+        require(members.issuperset(self.settled), "settled", f"must be among {sorted(members)}")
+        require(np.array_equal(self.matrix, self.matrix.T), "matrix", "must be symmetric")
 
 
 @dataclass
@@ -41,9 +81,10 @@ class Node:
     n_frames: int = 0
     children: list[int] = field(default_factory=list)
     settled: set[int] = field(default_factory=set)
-    history: list[tuple[str, int]] = field(default_factory=list)
+    history: list[tuple[Happening, int]] = field(default_factory=list)
     whole: bool = False
     apart: set[int] = field(default_factory=set)
+    _kept: tuple[tuple[Any, ...], NodeState] | None = field(default=None, repr=False, compare=False)
 
     @property
     def is_leaf(self) -> bool:
@@ -78,30 +119,56 @@ class Node:
             gone += self.remove([most_redundant(self.matrix)])
         return gone
 
-    def state(self) -> dict[str, Any]:
-        """Return everything as plain values and arrays."""
-        plain = {name: getattr(self, name) for name in _PLAIN}
-        return plain | {
-            "members": list(self.members),
-            "children": list(self.children),
-            "settled": sorted(self.settled),
-            "apart": sorted(self.apart),
-            "matrix": self.matrix.copy(),
-            "history": [list(event) for event in self.history],
-        }
+    def state(self, blob_of: Callable[[int], Blob]) -> NodeState:
+        """Return everything, with the exemplars: the same object as long as nothing has changed.
+
+        Args:
+            blob_of: Returns the frames of an exemplar, by its number.
+        """
+        now = self._plain()
+        if self._kept is None or self._kept[0] != now or self._kept[1].matrix is not self.matrix:
+            state = NodeState(
+                id=self.id,
+                parent=self.parent,
+                born_at=self.born_at,
+                members=np.array(self.members, np.int64),
+                frames=tuple(map(blob_of, self.members)),
+                matrix=self.matrix,
+                n_placed=self.n_placed,
+                n_frames=self.n_frames,
+                children=tuple(self.children),
+                settled=tuple(sorted(self.settled)),
+                history=tuple(self.history),
+                whole=self.whole,
+                apart=tuple(sorted(self.apart)),
+            )
+            self._kept = now, state
+        return self._kept[1]
 
     @classmethod
-    def from_state(cls, state: dict[str, Any]) -> Node:
+    def from_state(cls, state: NodeState) -> Node:
         """Return the node that `state` described."""
-        return cls(
-            **{name: state[name] for name in _PLAIN},
-            members=[int(number) for number in state["members"]],
-            children=[int(child) for child in state["children"]],
-            settled={int(number) for number in state["settled"]},
-            apart={int(id) for id in state["apart"]},
-            matrix=np.array(state["matrix"], dtype=np.float64),
-            history=[(str(kind), int(when)) for kind, when in state["history"]],
+        node = cls(
+            id=state.id,
+            parent=state.parent,
+            born_at=state.born_at,
+            members=state.members.tolist(),
+            matrix=state.matrix,
+            n_placed=state.n_placed,
+            n_frames=state.n_frames,
+            children=list(state.children),
+            settled=set(state.settled),
+            history=list(state.history),
+            whole=state.whole,
+            apart=set(state.apart),
         )
+        node._kept = node._plain(), state
+        return node
 
-
-_PLAIN = ("id", "parent", "born_at", "n_placed", "n_frames", "whole")
+    def _plain(self) -> tuple[Any, ...]:
+        """Return all that is changed in place, for comparison."""
+        return (
+            *(self.parent, self.born_at, self.n_placed, self.n_frames, self.whole),
+            *(tuple(self.members), tuple(self.children), tuple(self.history)),
+            *(tuple(sorted(self.settled)), tuple(sorted(self.apart))),
+        )

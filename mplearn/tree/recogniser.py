@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from copy import copy
-from dataclasses import asdict, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ..hmm.sequences import as_frames
 from ..recording import FloatArray
+from ..state import Count, State, require, validated, within
 from . import form
-from .bank import ExemplarBank
-from .config import FormConfig, TreeConfig
+from .bank import BankState, ExemplarBank
+from .config import TreeConfig
 from .placement import Match
 from .rejection import Strangers, spreads
-from .search import NodeIndex
+from .search import IndexState, NodeIndex
 
 
 class Recognition(NamedTuple):
@@ -33,6 +34,27 @@ class Recognition(NamedTuple):
     distance: float
     ratio: float
     alternatives: tuple[Match, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class RecogniserState(State):
+    """A recogniser; attributes are those of its constructor."""
+
+    config: TreeConfig
+    shortest_frames: Count
+    bank: BankState
+    index: IndexState
+
+    def check(self) -> None:
+        """Check that the nodes' exemplars are there, in the form of the rules."""
+        points = self.bank.columns.shape[2]
+        wanted = self.config.form.n_points
+        require(points == wanted, "bank.columns", f"must hold {wanted} points each, not {points}")
+        known = set(self.bank.numbers.tolist())
+        for k, group in enumerate(self.index.members):
+            require(
+                known.issuperset(group), f"index.members[{k}]", "must name exemplars of the bank"
+            )
 
 
 class Recogniser:
@@ -109,23 +131,37 @@ class Recogniser:
         known = best.ratio <= 1 and best.node in self.primitives
         return Recognition(best.node if known else None, best.distance, best.ratio, tuple(matches))
 
-    def state(self) -> dict[str, Any]:
-        """Return everything as plain values and arrays."""
-        return {
-            "config": asdict(self.config),
-            "shortest_frames": self.shortest_frames,
-            "bank": self._bank.points(),
-            "index": self._index.state(),
-        }
+    def matrices(self) -> dict[int, FloatArray]:
+        """Return the distances among the exemplars of each primitive, shape (k, k).
+
+        They are those of `Recognition` to the configured power.
+        """
+        index = self._index
+        known = zip(index.ids.tolist(), index.leaves.tolist(), index.members, strict=True)
+        return {id: self._bank.matrix(members) for id, is_leaf, members in known if is_leaf}
+
+    def state(self) -> RecogniserState:
+        """Return everything that it knows."""
+        numbers = {number for group in self._index.members for number in group}
+        return RecogniserState(
+            config=self.config,
+            shortest_frames=self.shortest_frames,
+            bank=self._bank.state(numbers),
+            index=self._index.state(),
+        )
 
     @classmethod
-    def from_state(cls, state: dict[str, Any]) -> Recogniser:
-        """Return the recogniser that `state` described: equal in every decision."""
-        settings = dict(state["config"])
-        config = TreeConfig(**(settings | {"form": FormConfig(**settings["form"])}))
-        bank = ExemplarBank.from_points(config, state["bank"])
-        index = NodeIndex.from_state(config, bank, state["index"])
-        return cls(config, bank, index, int(state["shortest_frames"]))
+    def from_state(cls, state: RecogniserState) -> Recogniser:
+        """Return the recogniser that `state` described: equal in every decision.
+
+        Raises:
+            StateError: It describes none.
+        """
+        state = validated(state)
+        with within("bank"):
+            bank = ExemplarBank.from_state(state.config, state.bank)
+        index = NodeIndex.from_state(state.config, bank, state.index)
+        return cls(state.config, bank, index, state.shortest_frames)
 
 
 def refusal(frames: FloatArray, shortest_frames: int, longest_frames: float = math.inf) -> str:

@@ -28,6 +28,14 @@ class Rows:
         self.blocks: list[tuple[FloatArray, ...]] = []
         self.n_slots = 0
         self._free: list[int] = []
+        self._lent: set[int] = set()  # blocks that a fork shows as well: copied before a write
+
+    def fork(self) -> Rows:
+        """Return rows that hold the same, and go on apart; blocks are copied when one changes."""
+        twin = Rows(*self.shapes)
+        twin.blocks, twin.n_slots, twin._free = list(self.blocks), self.n_slots, list(self._free)
+        twin._lent, self._lent = set(range(len(self.blocks))), set(range(len(self.blocks)))
+        return twin
 
     def take(self) -> int:
         """Return a slot that is free."""
@@ -45,6 +53,9 @@ class Rows:
     def write(self, slot: int, values: Sequence[Any]) -> None:
         """Write the arrays of a row."""
         block, row = divmod(slot, BLOCK)
+        if block in self._lent:
+            self.blocks[block] = tuple(stacked.copy() for stacked in self.blocks[block])
+            self._lent.remove(block)
         for stacked, value in zip(self.blocks[block], values, strict=True):
             stacked[row] = value
 

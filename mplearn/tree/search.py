@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from copy import copy
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ..recording import FloatArray, IntArray
+from ..recording import BoolArray, FloatArray, IntArray
+from ..state import Array, Range, State, require, require_no_cycle
 from .bank import Exemplar, ExemplarBank
 from .config import TreeConfig
 from .node import Node
@@ -25,6 +28,33 @@ _KNOWN = np.dtype(
         ("slot", np.int64),
     ]
 )
+
+
+@dataclass(frozen=True, eq=False)
+class IndexState(State):
+    """What the search knows; attributes are those of `NodeIndex`, shape (n,) each.
+
+    Attributes:
+        parents: The node above each.
+        diameters: Largest distance between the exemplars of each.
+    """
+
+    limit: Annotated[float, Range(0.0)]
+    ids: Annotated[IntArray, Array("n", low=1)]
+    parents: Annotated[IntArray, Array("n", low=0)]
+    leaves: Annotated[BoolArray, Array("n")]
+    members: tuple[tuple[int, ...], ...]
+    diameters: Annotated[FloatArray, Array("n", low=0.0)]
+    caps: Annotated[FloatArray, Array("n", low=0.0, high=np.inf)] | None = None
+
+    def check(self) -> None:
+        """Check that ids rise, that each node has exemplars, and that none lies below itself."""
+        require(bool((np.diff(self.ids) > 0).all()), "ids", "must rise")
+        require(len(self.members) == len(self.ids), "members", f"must be {len(self.ids)} lists")
+        for k, group in enumerate(self.members):
+            require(bool(group), f"members[{k}]", "must hold a number")
+        parents = dict(zip(self.ids.tolist(), self.parents.tolist(), strict=True))
+        require_no_cycle(parents, lambda id: f"parents[{list(parents).index(id)}]")
 
 
 class NodeIndex:
@@ -64,7 +94,7 @@ class NodeIndex:
             self.drop(node.id)
         else:
             facts = (node.id, node.parent, node.is_leaf, node.diameter)
-            self._enter(facts, node.members, bank)
+            self.enter(facts, node.members, bank)
 
     def drop(self, id: int) -> None:
         """Forget a node, if it is known."""
@@ -74,9 +104,10 @@ class NodeIndex:
             self._known = np.delete(self._known, k)
             del self.members[k]
 
-    def _enter(
+    def enter(
         self, facts: tuple[int, int, bool, float], members: Sequence[int], bank: ExemplarBank
     ) -> None:
+        """Take note of a node: its id, its parent's, whether it is a leaf, its diameter."""
         k = int(np.searchsorted(self.ids, facts[0]))
         if facts[0] not in self.ids[k : k + 1]:
             new = np.array([(*facts, self._means.take())], _KNOWN)
@@ -162,29 +193,35 @@ class NodeIndex:
             found = [nearest, *found]
             level = nearest.node
 
-    def state(self) -> dict[str, Any]:
-        """Return everything as plain values and arrays."""
-        return {
-            "limit": self.limit,
-            "caps": None if self.caps is None else self.caps.copy(),
-            "ids": self.ids.copy(),
-            "parents": self._known["parent"].copy(),
-            "leaves": self.leaves.copy(),
-            "members": [list(group) for group in self.members],
-            "diameters": self._known["diameter"].copy(),
-        }
+    def fork(self) -> NodeIndex:
+        """Return an index that knows the same, and goes on apart; see `ExemplarBank.fork`."""
+        twin = copy(self)
+        twin._known, twin.members = self._known.copy(), list(self.members)
+        twin._means = self._means.fork()
+        return twin
+
+    def state(self) -> IndexState:
+        """Return everything that the index knows."""
+        return IndexState(
+            limit=self.limit,
+            caps=None if self.caps is None else self.caps.copy(),
+            ids=self.ids.copy(),
+            parents=self._known["parent"].copy(),
+            leaves=self.leaves.copy(),
+            members=tuple(map(tuple, self.members)),
+            diameters=self._known["diameter"].copy(),
+        )
 
     @classmethod
-    def from_state(cls, config: TreeConfig, bank: ExemplarBank, state: dict[str, Any]) -> NodeIndex:
+    def from_state(cls, config: TreeConfig, bank: ExemplarBank, state: IndexState) -> NodeIndex:
         """Return the index that `state` described."""
         index = cls(config, bank)
-        index.limit = float(state["limit"])
-        caps = state.get("caps")
-        index.caps = None if caps is None else np.array(caps, dtype=np.float64)
-        columns = (state[name] for name in ("ids", "parents", "leaves", "diameters", "members"))
-        for id, parent, is_leaf, diameter, members in zip(*columns, strict=True):
-            facts = (int(id), int(parent), bool(is_leaf), float(diameter))
-            index._enter(facts, [int(number) for number in members], bank)
+        index.limit = state.limit
+        index.caps = None if state.caps is None else state.caps.copy()
+        columns = (state.ids, state.parents, state.leaves, state.diameters)
+        rows = zip(*(each.tolist() for each in columns), state.members, strict=True)
+        for id, parent, is_leaf, diameter, members in rows:
+            index.enter((id, parent, is_leaf, diameter), list(members), bank)
         return index
 
 

@@ -2,13 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from ..recording import FloatArray, IntArray
+from ..state import Array, Blob, SharedState, State, require
 from .bank import ExemplarBank
+
+
+@dataclass(frozen=True, eq=False)
+class SpreadState(State):
+    """Values seen in each channel, their mean, and the squares of their deviations, shape (D,)."""
+
+    count: Annotated[FloatArray, Array("d", low=0.0)]
+    mean: Annotated[FloatArray, Array("d")]
+    squares: Annotated[FloatArray, Array("d", low=0.0)]
+
+
+@dataclass(frozen=True, eq=False)
+class SampleState(SharedState):
+    """A sample of the segments, and the distances among them.
+
+    Attributes:
+        numbers: Their numbers, shape (n,).
+        frames: The segments as they came, shape (L, D) each.
+        matrix: The distances, shape (n, n).
+    """
+
+    numbers: Annotated[IntArray, Array("n", low=0)]
+    frames: tuple[Annotated[Blob, Array(None, "d", nan=True)], ...]
+    matrix: Annotated[FloatArray, Array("n", "n", low=0.0)]
+
+    def check(self) -> None:
+        """Check that each segment is there once, with its frames."""
+        require(len(set(self.numbers.tolist())) == len(self.numbers), "numbers", "must differ")
+        require(
+            len(self.frames) == len(self.numbers), "frames", f"must be {len(self.numbers)} segments"
+        )
+        require(np.array_equal(self.matrix, self.matrix.T), "matrix", "must be symmetric")
 
 
 class ChannelSpread:
@@ -49,15 +83,14 @@ class ChannelSpread:
         shared = np.bincount(self.groups, variance) / np.maximum(np.bincount(self.groups), 1)
         return np.asarray(np.maximum(shared[self.groups], 1e-18))
 
-    def state(self) -> dict[str, Any]:
-        """Return everything as plain arrays."""
-        return {"count": self._count, "mean": self._mean.copy(), "squares": self._squares.copy()}
+    def state(self) -> SpreadState:
+        """Return everything."""
+        return SpreadState(self._count.copy(), self._mean.copy(), self._squares.copy())
 
-    def load_state(self, state: dict[str, Any]) -> None:
+    def load_state(self, state: SpreadState) -> None:
         """Resume from what `state` returned."""
-        self._count, self._mean, self._squares = (
-            np.array(state[name], dtype=np.float64) for name in ("count", "mean", "squares")
-        )
+        self._count, self._mean = state.count.copy(), state.mean.copy()
+        self._squares = state.squares.copy()
 
 
 class DistanceSample:
@@ -73,6 +106,7 @@ class DistanceSample:
         self.seed = seed
         self.numbers: list[int] = []
         self._matrix = np.zeros((size, size))
+        self._state: SampleState | None = None  # as long as nothing changes
 
     def place_for(self, n_seen: int) -> int | None:
         """Return where in the sample the segment after ``n_seen`` others goes; None: nowhere."""
@@ -91,6 +125,7 @@ class DistanceSample:
         row = bank.distances(bank[number], self.numbers, forms_only=True)
         row[place] = 0.0
         self._matrix[place, : len(row)] = self._matrix[: len(row), place] = row
+        self._state = None
         return gone
 
     def measure(self, bank: ExemplarBank) -> None:
@@ -98,6 +133,7 @@ class DistanceSample:
         self._matrix[: len(self.numbers), : len(self.numbers)] = bank.matrix(
             self.numbers, forms_only=True
         )
+        self._state = None
 
     def scale(self, spread: float, mean_share: float) -> float:
         """Return the largest distance expected between executions of one motion.
@@ -118,17 +154,29 @@ class DistanceSample:
             return 0.0
         return float(min(spread * np.percentile(nearest, 25), mean_share * mean))
 
-    def state(self) -> dict[str, Any]:
-        """Return everything as plain arrays."""
-        n = len(self.numbers)
-        return {"numbers": np.array(self.numbers, np.int64), "matrix": self._matrix[:n, :n].copy()}
+    def state(self, blob_of: Callable[[int], Blob]) -> SampleState:
+        """Return everything, with the frames of the segments."""
+        if self._state is None:
+            n = len(self.numbers)
+            self._state = SampleState(
+                np.array(self.numbers, np.int64),
+                tuple(map(blob_of, self.numbers)),
+                self._matrix[:n, :n].copy(),
+            )
+        return self._state
 
-    def load_state(self, state: dict[str, Any]) -> None:
-        """Resume from what `state` returned."""
-        self.numbers = [int(number) for number in state["numbers"]]
-        n = len(self.numbers)
+    def load_state(self, state: SampleState) -> None:
+        """Resume from what `state` returned.
+
+        Raises:
+            StateError: The sample is larger than this one may be.
+        """
+        n = len(state.numbers)
+        require(n <= self.size, "numbers", f"must be at most {self.size}, not {n}")
+        self.numbers = state.numbers.tolist()
         self._matrix = np.zeros((self.size, self.size))
-        self._matrix[:n, :n] = state["matrix"]
+        self._matrix[:n, :n] = state.matrix
+        self._state = state
 
 
 def moments(matrix: FloatArray) -> tuple[float, float]:

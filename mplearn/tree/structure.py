@@ -168,7 +168,7 @@ class Structure:
         parent.children.append(node.id)
         if parent.id != ROOT:
             bank = self.memory.bank
-            for number in node.members:
+            for number in [n for n in node.members if n not in parent.members]:
                 parent.add(number, bank.distances(bank[number], parent.members))
                 self.memory.hold(number)
             parent.settled.update(node.members)

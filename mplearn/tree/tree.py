@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -11,21 +12,113 @@ from ..errors import InvalidValueError, UnknownPrimitiveError
 from ..hmm import FactorialHMM, LeftRightHMM
 from ..hmm.sequences import as_frames
 from ..recording import FloatArray
+from ..state import (
+    Array,
+    Blob,
+    Count,
+    Range,
+    State,
+    require,
+    require_no_cycle,
+    validated,
+)
+from .bank import ExemplarBank
 from .births import form_primitives
 from .config import TreeConfig
 from .editing import chosen_groups, leaf_of, pair_of, place_below
 from .memory import SegmentMemory
 from .models import GroupModels
-from .node import Node
+from .node import Node, NodeState
 from .placement import ROOT, Change, Placement
 from .recogniser import Recogniser, refusal
 from .revision import merge_duplicates, split_mixed
-from .search import NodeIndex
+from .spread import SampleState, SpreadState
 from .structure import Structure
 
 _SHORTEST_S = 0.1
 _LONGEST_S = 60.0
 _LIKENESS = 1.1  # largest distance over the tree's scale at which two segments may show one motion
+
+
+@dataclass(frozen=True, eq=False)
+class TreeState(State):
+    """A tree: what was ever seen, in sums, and the nodes with their exemplars.
+
+    Attributes:
+        n_seen: Segments ever seen.
+        next_id: Id of the node that is formed next.
+        floor: Smallest variance of each channel in the models of exemplars, shape (D,).
+        spread: How much all motion varies.
+        sample: Some of all segments.
+        nodes: The nodes, the root first.
+    """
+
+    n_seen: Count
+    next_id: Annotated[int, Range(1)]
+    floor: Annotated[FloatArray, Array("d", low=1e-30)]
+    spread: SpreadState
+    sample: SampleState
+    nodes: tuple[NodeState, ...]
+
+    def check(self) -> None:
+        """Check that the nodes make one tree, and that equal numbers are the same segment."""
+        width = len(self.floor)
+        require(len(self.spread.count) == width, "spread.count", f"must have shape ({width},)")
+        _check_nodes(self.nodes, self.next_id)
+        frames: dict[int, Blob] = {}
+        parts: dict[str, NodeState | SampleState] = {"sample": self.sample}
+        parts |= {f"nodes[{k}]": node for k, node in enumerate(self.nodes)}
+        for place, part in parts.items():
+            numbers = part.members if isinstance(part, NodeState) else part.numbers
+            name = "members" if isinstance(part, NodeState) else "numbers"
+            for i, (number, blob) in enumerate(zip(numbers.tolist(), part.frames, strict=True)):
+                require(number < self.n_seen, f"{place}.{name}", f"{number} was never seen")
+                same = frames.setdefault(number, blob)
+                require(
+                    same.array is blob.array
+                    or np.array_equal(same.array, blob.array, equal_nan=True),
+                    f"{place}.frames[{i}]",
+                    f"must be those of segment {number} elsewhere",
+                )
+
+
+def _check_nodes(nodes: Sequence[NodeState], next_id: int) -> None:
+    """Check that nodes make one tree below the root, each primitive with an exemplar."""
+    known = {node.id: node for node in nodes}
+    require(len(known) == len(nodes), "nodes", "must have different ids")
+    require(
+        bool(nodes) and nodes[0].id == ROOT and nodes[0].parent is None,
+        "nodes[0]",
+        f"must be the root, {ROOT}, below nothing",
+    )
+    for k, node in enumerate(nodes):
+        place = f"nodes[{k}]"
+        require(node.id < next_id, f"{place}.id", f"must be below next_id, {next_id}")
+        for child in node.children:
+            below = known.get(child)
+            require(
+                below is not None and below.parent == node.id,
+                f"{place}.children",
+                f"{child} does not lie below {node.id}",
+            )
+        for id in node.apart:
+            require(0 < id < next_id, f"{place}.apart", f"there never was a node {id}")
+        if k == 0:
+            continue
+        above = None if node.parent is None else known.get(node.parent)
+        require(
+            above is not None and node.id in above.children,
+            f"{place}.parent",
+            f"must be the node that {node.id} is a child of, not {node.parent}",
+        )
+        if not node.children:
+            require(len(node.members) > 0, f"{place}.members", "must hold a number")
+            require(node.n_placed > 0, f"{place}.n_placed", "must be at least 1")
+            require(node.n_frames > 0, f"{place}.n_frames", "must be at least 1")
+    places = {node.id: k for k, node in enumerate(nodes)}
+    require_no_cycle(
+        {node.id: node.parent for node in nodes}, lambda id: f"nodes[{places[id]}].parent"
+    )
 
 
 class PrimitiveTree:
@@ -129,13 +222,20 @@ class PrimitiveTree:
         self.node(id)
         return self._models.of(id)
 
+    @property
+    def bank(self) -> ExemplarBank:
+        """Models of the segments that the tree remembers, by number; only the tree changes it."""
+        return self._memory.bank
+
+    @property
+    def limit(self) -> float:
+        """Largest radius of a primitive, on the scale of the rules."""
+        return self._structure.index.limit
+
     def recogniser(self) -> Recogniser:
         """Return what the tree would recognise now, frozen; at the stated rate, if there is one."""
-        index = self._structure.index
-        numbers = {number for group in index.members for number in group}
-        bank = self._memory.bank.subset(numbers)
-        known = NodeIndex.from_state(self.config, bank, index.state())
-        frozen = Recogniser(self.config, bank, known, self._shortest_frames)
+        index, bank = self._structure.index.fork(), self._memory.bank.fork()
+        frozen = Recogniser(self.config, bank, index, self.shortest_frames)
         return frozen.calibrated(self.config.false_acceptance)
 
     # ---- learning
@@ -151,7 +251,7 @@ class PrimitiveTree:
         """
         frames = as_frames(frames, self.n_channels)
         longest = round(_LONGEST_S * self.rate_hz)
-        reason = refusal(frames, self._shortest_frames, longest)
+        reason = refusal(frames, self.shortest_frames, longest)
         if reason:
             return Placement(-1, ROOT, False, np.inf, np.inf, refused=reason)
         structure, bank, number = self._structure, self._memory.bank, self.n_seen
@@ -187,6 +287,25 @@ class PrimitiveTree:
             nearest=matches[0].node if matches else None,
             like=like,
         )
+
+    def place_waiting(self) -> Change:
+        """Place what waits in the root where it fits by now, or in primitives of its own."""
+        structure, bank = self._structure, self.bank
+        found = [(n, structure.index.search(bank[n], bank)[:1]) for n in structure.root.members]
+        change = Change()
+        for number, best in found:  # all are compared first: their order must not matter
+            if best and best[0].ratio <= 1 and best[0].node in self.leaves:
+                leaf = structure.nodes[best[0].node]
+                change = change.then(structure.take_in(leaf, [number]))
+        if not self.config.local:
+            change = change.then(form_primitives(structure, structure.root, self.n_seen))
+        return self._edited(change)
+
+    def remeasure(self) -> None:
+        """Measure all distances among segments again."""
+        self._memory.measure()
+        self._structure.remeasure()
+        self._models.forget()
 
     # ---- learning by hand
 
@@ -249,26 +368,56 @@ class PrimitiveTree:
 
     # ---- keeping
 
-    def state(self) -> dict[str, Any]:
-        """Return all of the state, plain values and arrays: `load_state` resumes bit for bit."""
-        return {
-            "n_seen": self.n_seen,
-            "next_id": self._structure.next_id,
-            **self._memory.state(),
-            "nodes": [node.state() for node in self.nodes],
-        }
+    def state(self) -> TreeState:
+        """Return all that the tree knows: `load_state` resumes bit for bit."""
+        memory = self._memory
+        return TreeState(
+            n_seen=self.n_seen,
+            next_id=self._structure.next_id,
+            floor=memory.bank.floor.copy(),
+            spread=memory.spread(),
+            sample=memory.sample(),
+            nodes=tuple(node.state(memory.blob) for node in self.nodes),
+        )
 
-    def load_state(self, state: dict[str, Any]) -> None:
-        """Resume from what `state` returned, under the same configuration."""
-        nodes = [Node.from_state(node) for node in state["nodes"]]
-        self.n_seen = int(state["n_seen"])
-        self._memory.load_state(state, [number for node in nodes for number in node.members])
-        self._structure = Structure(self.config, self._memory)
-        self._structure.next_id = int(state["next_id"])
-        self._structure.nodes = {node.id: node for node in nodes}
+    def load_state(self, state: TreeState) -> None:
+        """Resume from what `state` returned, under the same configuration.
+
+        Raises:
+            StateError: Something in it is wrong, or does not fit this tree; nothing has changed.
+        """
+        state = validated(state)
+        self._check_fits(state)
+        memory = SegmentMemory(self.config, np.array(self.groups, np.int64))
+        memory.load(
+            state.floor,
+            state.spread,
+            state.sample,
+            [each for node in state.nodes for each in node.exemplars()],
+        )
+        self.n_seen = state.n_seen
+        self._memory = memory
+        self._structure = Structure(self.config, memory)
+        self._structure.next_id = state.next_id
+        self._structure.nodes = {node.id: Node.from_state(node) for node in state.nodes}
         self._structure.reindex()
         self._structure.tune()
         self._models = GroupModels(self.config, self._structure)
+
+    def _check_fits(self, state: TreeState) -> None:
+        """Check that segments are such as this tree takes up."""
+        width, longest = self.n_channels, round(_LONGEST_S * self.rate_hz)
+        require(len(state.floor) == width, "floor", f"must have shape ({width},)")
+        parts = {"sample": state.sample.frames}
+        parts |= {f"nodes[{k}]": node.frames for k, node in enumerate(state.nodes)}
+        for place, segments in parts.items():
+            for i, blob in enumerate(segments):
+                reason = (
+                    refusal(blob.array, self.shortest_frames, longest)
+                    if blob.array.shape[1] == width
+                    else f"must have {width} channels, not {blob.array.shape[1]}"
+                )
+                require(not reason, f"{place}.frames[{i}]", reason)
 
     def _waiting_like(self, node: Node) -> int | None:
         """Return what the newest segment of the root is most like among those before it."""
@@ -280,5 +429,6 @@ class PrimitiveTree:
         return node.members[nearest] if alike else None
 
     @property
-    def _shortest_frames(self) -> int:
+    def shortest_frames(self) -> int:
+        """Fewest frames of a segment that is taken up."""
         return max(2, round(_SHORTEST_S * self.rate_hz))

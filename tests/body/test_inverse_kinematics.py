@@ -9,6 +9,7 @@ from mplearn.body import IKConfig, InverseKinematics, human_body, marker_set, ro
 from mplearn.body.calibration import Calibration
 from mplearn.body.follower import follower
 from mplearn.body.gauss_newton import solve_frame
+from mplearn.body.inverse_kinematics import FollowedState
 from mplearn.body.kinematics import integrate
 from mplearn.body.linkage import Linkage
 from mplearn.errors import BodyError, FrameError, InvalidValueError
@@ -54,8 +55,8 @@ def known(body, posture, names=NAMES, **config):
     start[seen.own] = posture
     offsets = marker_set("plug_in_gait39").select(names).attach(seen.tree)[1]
     ik.load_state(
-        {
-            "calibration": Calibration(
+        FollowedState(
+            calibration=Calibration(
                 factors=np.ones_like(seen.tree.offset),
                 offsets=offsets,
                 scale=1.0,
@@ -63,11 +64,11 @@ def known(body, posture, names=NAMES, **config):
                 height_m=body.height_m,
                 residual_m=0.0,
                 posture=start,
-            ).state(),
-            "posture": start,
-            "variance": np.full(seen.tree.n_dofs, 0.01),
-            "fresh": False,
-        }
+            ),
+            posture=start,
+            variance=np.full(seen.tree.n_dofs, 0.01),
+            fresh=False,
+        )
     )
     return ik
 

@@ -17,7 +17,7 @@ def by_id(predictions):
 def test_two_parts_foretell_as_their_sum(inside, beside):
     graph = learned(inside)
     whole = graph.copy()
-    whole.absorb(learned(beside))
+    whole.add(learned(beside))
     extension = Extension(graph)
     for id in sorted(set(beside)):
         extension.add_node(id)

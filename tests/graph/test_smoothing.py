@@ -71,6 +71,6 @@ def test_histories_are_bounded_and_keep_what_is_frequent():
         a, b, c, d = rng.integers(3, 30, 4).tolist()
         graph.observe(1, 2, 1.0, before=[0])
         graph.observe(c, d, 1.0, before=[a, b])
-    assert len(graph.state()["histories"]) <= 200
-    frequent = [row for row in graph.state()["histories"].tolist() if row[1:3] == [0, 1]]
+    assert len(graph.state().histories) <= 200
+    frequent = [row for row in graph.state().histories.tolist() if row[1:3] == [0, 1]]
     assert frequent[0][-2:] == [2, 300]

@@ -6,7 +6,7 @@ import pytest
 
 from mplearn.errors import InvalidValueError
 from mplearn.learner import LearnerConfig, MotionLearner, SegmentClosed
-from mplearn.learner.merge import merge
+from mplearn.merging import merge_learners as merge
 from mplearn.recording import Recording
 
 

@@ -8,7 +8,8 @@ import pytest
 from mplearn import LearnerConfig, MotionLearner, Recording
 from mplearn.demonstrator import Person, demonstrate
 from mplearn.evaluation.streams import join_people
-from mplearn.learner import PersonChanged, Recognised, SegmentClosed, merge
+from mplearn.learner import PersonChanged, Recognised, SegmentClosed
+from mplearn.merging import merge_learners as merge
 
 SCRIPT = ("BAR", "BAL") * 6
 SIZES = {"small": 1.58, "middle": 1.70, "tall": 1.84}

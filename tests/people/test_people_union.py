@@ -6,8 +6,8 @@ import pytest
 from test_people_editing import sound
 from test_people_tree import N_MOTIONS, QUICK, RULES, D, Teacher
 
+from mplearn.merging import merge_people
 from mplearn.people import PeopleTree
-from mplearn.people.union import unite
 from mplearn.tree import ROOT
 
 
@@ -50,7 +50,7 @@ def meanings(united, one, two):
 
 def test_who_is_in_both_has_one_tree_and_each_motion_one_primitive(shards):
     one, two, _ = shards
-    united = unite(one.tree, two.tree, FORTH)
+    united = merge_people(one.tree, two.tree, FORTH)
     tree = united.tree
     assert tree.people == (0, 1, 2)
     assert tree.n_seen == one.tree.n_seen + two.tree.n_seen
@@ -65,7 +65,7 @@ def test_who_is_in_both_has_one_tree_and_each_motion_one_primitive(shards):
 
 def test_primitives_keep_their_names_and_their_meaning(shards):
     one, two, _ = shards
-    united = unite(one.tree, two.tree, FORTH)
+    united = merge_people(one.tree, two.tree, FORTH)
     names = meanings(united, one, two)
     assert united.first == {id: id for id in one.tree.leaves}
     for shard, new_id in ((one, united.first), (two, united.second)):
@@ -77,7 +77,7 @@ def test_primitives_keep_their_names_and_their_meaning(shards):
 
 def test_the_order_of_the_two_changes_names_only(shards):
     one, two, _ = shards
-    forth, back = unite(one.tree, two.tree, FORTH), unite(two.tree, one.tree, BACK)
+    forth, back = merge_people(one.tree, two.tree, FORTH), merge_people(two.tree, one.tree, BACK)
 
     def content(united, first, second, people):
         return {
@@ -94,7 +94,7 @@ def test_the_order_of_the_two_changes_names_only(shards):
 
 def test_a_united_tree_goes_on_and_is_kept(shards):
     one, two, teacher = shards
-    tree = unite(one.tree, two.tree, FORTH).tree
+    tree = merge_people(one.tree, two.tree, FORTH).tree
     again = PeopleTree(QUICK, D, 100.0, people=RULES)
     again.load_state(tree.state())
     before, known = tree.n_seen, tree.leaves
@@ -111,12 +111,12 @@ def test_a_united_tree_goes_on_and_is_kept(shards):
 
 def test_people_who_are_strangers_are_kept_apart_and_yet_share(shards):
     one, two, _ = shards
-    before = repr(one.tree.state()), repr(two.tree.state())
-    tree = unite(one.tree, two.tree, {0: 2, 1: 3}).tree
+    before = one.tree.state(), two.tree.state()
+    tree = merge_people(one.tree, two.tree, {0: 2, 1: 3}).tree
     assert tree.people == (0, 1, 2, 3) or tree.people == (0, 1, 3, 2)
     assert len(tree.leaves) == N_MOTIONS
     sound(tree)
-    assert (repr(one.tree.state()), repr(two.tree.state())) == before
+    assert (one.tree.state(), two.tree.state()) == before
 
 
 def test_what_a_person_said_holds_in_the_union(shards):
@@ -127,7 +127,7 @@ def test_what_a_person_said_holds_in_the_union(shards):
     tree.merge(first, second)
     id = next(id for id in tree.leaves if id != first)
     tree.split(id)
-    united = unite(one.tree, tree, {1: 3, 0: 2}).tree
+    united = merge_people(one.tree, tree, {1: 3, 0: 2}).tree
     sound(united)
     keys = [set(united._leaves_of(id)) for id in united.leaves]
     assert sum(len({key for key in group if key[0] in (2, 3)}) > 1 for group in keys) == len(
@@ -138,7 +138,10 @@ def test_what_a_person_said_holds_in_the_union(shards):
 def test_nothing_learned_adds_nothing(shards):
     one, _, _ = shards
     empty = PeopleTree(QUICK, D, 100.0, people=RULES)
-    for united in (unite(one.tree, empty, {0: 0}), unite(empty, one.tree, {0: 0, 1: 1})):
+    for united in (
+        merge_people(one.tree, empty, {0: 0}),
+        merge_people(empty, one.tree, {0: 0, 1: 1}),
+    ):
         assert len(united.tree.leaves) == len(one.tree.leaves)
         assert united.tree.n_seen == one.tree.n_seen
         sound(united.tree)

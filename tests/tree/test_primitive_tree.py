@@ -4,6 +4,7 @@ import hashlib
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from motions import RATE_HZ, Motions
 
 from mplearn.errors import FrameError, InvalidValueError, UnknownPrimitiveError
+from mplearn.state import checkpoint, from_plain, to_plain
+from mplearn.state.packing import packed, unpacked
 from mplearn.tree import ROOT, FormConfig, PrimitiveTree, TreeConfig
 
 D = 6
@@ -40,25 +43,9 @@ def home_of(placements):
     return home
 
 
-def digest(value):
+def digest(state):
     """A hash over a state that depends on every bit."""
-    sha = hashlib.sha256()
-
-    def feed(part):
-        if isinstance(part, dict):
-            for key in sorted(part):
-                sha.update(key.encode())
-                feed(part[key])
-        elif isinstance(part, list | tuple):
-            for item in part:
-                feed(item)
-        elif isinstance(part, np.ndarray):
-            sha.update(np.ascontiguousarray(part).tobytes())
-        else:
-            sha.update(repr(part).encode())
-
-    feed(value)
-    return sha.hexdigest()
+    return hashlib.sha256(checkpoint(state).document).hexdigest()
 
 
 @pytest.mark.parametrize("n_motions", [2, 5, 25])
@@ -122,16 +109,23 @@ def test_two_leaves_of_one_motion_are_merged():
     tree, _, _, motions = learned(3, 8, split_ratio=np.inf)
     leaf = tree.leaves[0]
     state = tree.state()
-    twin = next(dict(node) for node in state["nodes"] if node["id"] == leaf)
-    k = len(twin["members"]) // 2
-    first = next(node for node in state["nodes"] if node["id"] == leaf)
-    root = next(node for node in state["nodes"] if node["id"] == ROOT)
-    twin |= {"id": 77, "members": twin["members"][k:], "matrix": twin["matrix"][k:, k:]}
-    first |= {"members": first["members"][:k], "matrix": first["matrix"][:k, :k]}
-    root["children"].append(77)
-    state["nodes"].append(twin)
+    root, *others = state.nodes
+    whole = next(node for node in others if node.id == leaf)
+    k = len(whole.members) // 2
+    first, twin = (
+        replace(
+            whole,
+            id=id,
+            members=whole.members[part],
+            frames=whole.frames[part],
+            matrix=whole.matrix[part, part],
+        )
+        for id, part in ((leaf, slice(k)), (77, slice(k, None)))
+    )
+    root = replace(root, children=(*root.children, 77))
+    nodes = (root, *(first if node is whole else node for node in others), twin)
     again = new_tree(split_ratio=np.inf)
-    again.load_state(state)
+    again.load_state(replace(state, next_id=78, nodes=nodes))
     assert len(again.leaves) == 4
     merges = []
     for _ in range(6):
@@ -211,9 +205,11 @@ def test_memory_is_bounded_however_long_the_stream():
         tree.insert(motions.perform(m % 3))
     assert len(tree.node(ROOT).members) <= 10
     assert all(len(tree.exemplars(leaf)) <= 6 for leaf in tree.leaves)
-    held = tree.state()["bank"]["numbers"]
+    held = tree.bank.numbers()
     assert len(held) <= 10 + 12 + 6 * len(tree.leaves)
-    assert len(tree.state()["frames"]) == len(held)
+    state = tree.state()
+    kept = {n for node in state.nodes for n in node.members.tolist()}
+    assert kept | set(state.sample.numbers.tolist()) == set(held)
     assert sum(tree.node(leaf).n_placed for leaf in tree.leaves) >= 60
 
 
@@ -359,19 +355,11 @@ def test_bad_rules_are_named():
         new_tree().node(9)
 
 
-def test_state_is_plain():
+def test_a_state_is_plain_values_and_arrays():
     tree, *_ = learned(2, 5)
-
-    def plain(value):
-        if isinstance(value, dict):
-            return all(isinstance(key, str) and plain(item) for key, item in value.items())
-        if isinstance(value, list):
-            return all(plain(item) for item in value)
-        return value is None or isinstance(value, np.ndarray | int | float | str | bool)
-
-    assert plain(tree.state())
-    assert plain(tree.recogniser().state())
-    json.dumps(tree.recogniser().state()["config"])
+    for state in (tree.state(), tree.recogniser().state()):
+        body, _ = packed(to_plain(state))
+        assert from_plain(type(state), unpacked(json.loads(json.dumps(body)), _)) == state
 
 
 def test_a_constant_channel_and_a_segment_that_rests_spoil_nothing():

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
-from typing import Any
-
-import numpy as np
 
 from ...baselines import PostureGraph
 from ...body import keypoints_of, robot_body
 from ...demonstrator import paper_session
 from ...learner import LearnerConfig, MotionLearner
 from ...recording import FloatArray
+from ...state import State, checkpoint
 from ..observing import observe
 from ..table import Table
 
@@ -69,15 +66,10 @@ def _learned(frames: FloatArray, channels: tuple[str, ...], rate_hz: float) -> M
     return learner
 
 
-def _n_bytes(state: Any) -> int:
-    """Return the memory of the numbers in a state [bytes]."""
-    if isinstance(state, np.ndarray):
-        return state.nbytes
-    if isinstance(state, Mapping):
-        return sum(_n_bytes(each) for each in state.values())
-    if isinstance(state, list | tuple):
-        return sum(_n_bytes(each) for each in state)
-    return 8
+def _n_bytes(state: State) -> int:
+    """Return the size of a state, each exemplar counted once [bytes]."""
+    kept = checkpoint(state)
+    return len(kept.document) + sum(map(len, kept.new.values()))
 
 
 def _kib(n_bytes: int) -> str:

@@ -6,16 +6,16 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from ..people import PeopleTree
+from ..people.leaf import Leaf
+from ..people.nodes import tidied
+from ..people.pins import Key
+from ..people.sharing import Sharing
 from ..tree import ROOT, Node
-from ..tree.union import union
-from .leaf import Leaf
-from .nodes import tidied
-from .people_tree import PeopleTree
-from .pins import Key
-from .sharing import Sharing
+from .trees import merge_trees
 
 
-class PeopleUnion(NamedTuple):
+class MergedPeople(NamedTuple):
     """Two trees of several people as one.
 
     Attributes:
@@ -35,12 +35,11 @@ class PeopleUnion(NamedTuple):
     moved: dict[int, int]
 
 
-def unite(first: PeopleTree, second: PeopleTree, people: Mapping[int, int]) -> PeopleUnion:
-    """Join two trees of several people; neither changes.
+def merge_people(first: PeopleTree, second: PeopleTree, people: Mapping[int, int]) -> MergedPeople:
+    """Merge two trees of several people; neither changes.
 
-    The trees of a person whom both know become one (`mplearn.tree.union`); then it is found again
-    which leaves are one primitive. That depends on the order of the two only for the names of
-    primitives.
+    The trees of a person whom both know become one (`merge_trees`); then it is found again which
+    leaves are one primitive. That depends on the order of the two only for the names of primitives.
 
     Args:
         first: One tree.
@@ -50,21 +49,25 @@ def unite(first: PeopleTree, second: PeopleTree, people: Mapping[int, int]) -> P
     Raises:
         InvalidValueError: The trees have other rules, channels or rates.
     """
+    return merged_into(first.copy(), second.copy(), people)
+
+
+def merged_into(first: PeopleTree, second: PeopleTree, people: Mapping[int, int]) -> MergedPeople:
+    """Merge two trees of several people, both of which are used up; see `merge_people`."""
     if not second.n_seen:
-        return PeopleUnion(_copy(first), {id: id for id in first.leaves}, {}, first.n_seen, {}, {})
+        return MergedPeople(first, {id: id for id in first.leaves}, {}, first.n_seen, {}, {})
     if {*first.people, *(people[each] for each in second.people)} == {first.people[0]}:
         return _of_one_person(first, second)
     return _of_several(first, second, people)
 
 
-def _of_one_person(first: PeopleTree, second: PeopleTree) -> PeopleUnion:
-    person = first.people[0]
-    joined = union(first.of(person), second.of(second.people[0]))
-    tree = _copy(first)
-    tree.adopt({person: joined.tree}, first.n_seen + second.n_seen)
-    return PeopleUnion(
-        tree,
-        {id: id for id in first.leaves},
+def _of_one_person(first: PeopleTree, second: PeopleTree) -> MergedPeople:
+    person, leaves, n_before = first.people[0], first.leaves, first.n_seen
+    joined = merge_trees(first.of(person), second.of(second.people[0]))
+    first.adopt({person: joined.tree}, n_before + second.n_seen)
+    return MergedPeople(
+        first,
+        {id: id for id in leaves},
         {id: joined.new_id[id] for id in second.leaves},
         joined.new_number,
         dict(joined.change.moved),
@@ -72,9 +75,9 @@ def _of_one_person(first: PeopleTree, second: PeopleTree) -> PeopleUnion:
     )
 
 
-def _of_several(first: PeopleTree, second: PeopleTree, people: Mapping[int, int]) -> PeopleUnion:
-    tree, other = _copy(first), _copy(second)
-    mine, theirs = tree.sharing(), other.sharing()
+def _of_several(first: PeopleTree, second: PeopleTree, people: Mapping[int, int]) -> MergedPeople:
+    before = first.leaves, second.leaves
+    mine, theirs = first.sharing(), second.sharing()
     ids, numbers = mine.next_id - 1, mine.n_seen
     mine.next_id += theirs.next_id - 1
     mine.n_seen += theirs.n_seen
@@ -82,7 +85,7 @@ def _of_several(first: PeopleTree, second: PeopleTree, people: Mapping[int, int]
     origins = [_Origin.of(mine, leaf, 0, leaf.key) for leaf in mine.leaves]
     origins += [_Origin.of(theirs, leaf, ids, new_key[leaf.key]) for leaf in theirs.leaves]
     _join_leaves(mine, theirs, new_key, ids)
-    mine.pins = mine.pins.united(theirs.pins.renamed(new_key))
+    mine.pins = mine.pins.merged(theirs.pins.renamed(new_key))
     for each in theirs.waiting:
         shapes = {n + numbers: shape for n, shape in each.shapes.items()}
         mine.waiting.join(people[each.person], each.primitive + ids, shapes)
@@ -94,12 +97,12 @@ def _of_several(first: PeopleTree, second: PeopleTree, people: Mapping[int, int]
         id + ids: above + ids if above != ROOT else ROOT for id, above in theirs.parents.items()
     }
     heirs, moved = _regrouped(mine, origins)
-    tree.adopt(mine.trees, mine.n_seen)
+    first.adopt(mine.trees, mine.n_seen)
     homes = {leaf.key: leaf.primitive for leaf in mine.leaves}
-    return PeopleUnion(
-        tree,
-        {id: heirs[id] for id in first.leaves},
-        {id: heirs[id + ids] for id in second.leaves},
+    return MergedPeople(
+        first,
+        {id: heirs[id] for id in before[0]},
+        {id: heirs[id + ids] for id in before[1]},
         numbers,
         {number: homes[key] for key, number in placed},
         moved,
@@ -131,7 +134,7 @@ def _join_trees(
         moved: tuple[tuple[int, int], ...] = ()
         local = {node.id: node.id for node in own.nodes}
         if home in mine.trees:
-            own, local, shift, change = union(mine.trees[home], own)
+            own, local, shift, change = merge_trees(mine.trees[home], own)
             moved = change.moved
         mine.trees[home] = own
         here = mine.numbers.setdefault(home, {})
@@ -199,11 +202,3 @@ def _regrouped(
     sharing.name_leaves()
     tidied(sharing.above, sharing.parents, sharing.primitives)
     return new, moved
-
-
-def _copy(tree: PeopleTree) -> PeopleTree:
-    copy = PeopleTree(
-        tree.config, tree.n_channels, tree.rate_hz, tree.groups, tree.people_config, tree.mirror
-    )
-    copy.load_state(tree.state())
-    return copy

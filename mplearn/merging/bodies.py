@@ -1,0 +1,84 @@
+"""Bodies that are known from different streams: who is the same person?"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..body.known_bodies import BodiesState, KnownBodies
+from ..recording import FloatArray
+
+
+def merge_bodies(first: KnownBodies, second: KnownBodies) -> tuple[BodiesState, dict[int, int]]:
+    """Return all known bodies together, and the number there of each person of the second.
+
+    Who is the same is found one to one, the surest first; all others are new to the first, as long
+    as there is room, and then the nearest. Neither changes.
+    """
+    mine, theirs, config = first.state(), second.state(), first.config
+    pairs = [
+        (_likeness(first, mine, theirs, i, j), i, j)
+        for i in range(mine.n_people)
+        for j in range(theirs.n_people)
+    ]
+    numbers: dict[int, int] = {}
+    for likeness, i, j in sorted(pairs, reverse=True):
+        if likeness > config.caution and j not in numbers and i not in numbers.values():
+            numbers[j] = i
+    n_people = mine.n_people
+    for j in range(theirs.n_people):
+        if j in numbers:
+            continue
+        if n_people < config.max_people:
+            numbers[j] = n_people
+            n_people += 1
+        else:
+            numbers[j] = max(pair for pair in pairs if pair[2] == j)[1]
+    squares, counts = _summed(first, mine, theirs)
+    merged = replace(
+        mine,
+        n_people=n_people,
+        means=mine.means.copy(),
+        blocks=mine.blocks.copy(),
+        squares=squares,
+        counts=counts,
+    )
+    for j, i in numbers.items():
+        _add(merged, i, theirs.means[j], float(theirs.blocks[j]))
+    return merged, numbers
+
+
+def _summed(
+    bodies: KnownBodies, mine: BodiesState, theirs: BodiesState
+) -> tuple[FloatArray, FloatArray]:
+    """Return squares and counts of both together; what is assumed counts once."""
+    squares, counts = bodies.given
+    return mine.squares + (theirs.squares - squares), mine.counts + (theirs.counts - counts)
+
+
+def _likeness(bodies: KnownBodies, mine: BodiesState, theirs: BodiesState, i: int, j: int) -> float:
+    """Return how much better one body than two explains what was seen here and there [nat]."""
+    one, two = mine.means[i], theirs.means[j]
+    given_squares, given_counts = bodies.given
+    squares = mine.squares + theirs.squares - given_squares
+    variance = squares / (mine.counts + theirs.counts - given_counts)
+    doubt = 1.0 + 4.0 / max(mine.blocks[i], 1.0) + 4.0 / max(theirs.blocks[j], 1.0)
+    people = np.concatenate((mine.means[: mine.n_people], theirs.means[: theirs.n_people]))
+    usual = np.nanmean(people, axis=0)
+    anybody = bodies.anybody(usual) + variance
+    slips = bodies.config.slips
+    same = [bodies.fit(a, b, doubt * variance, slips) for a, b in ((one, two), (two, one))]
+    new = [bodies.fit(each, usual, anybody, 0.5) for each in (one, two)]
+    return 0.5 * (sum(same) - sum(new))
+
+
+def _add(merged: BodiesState, person: int, mean: FloatArray, blocks: float) -> None:
+    """Take over the second's mean of a person into arrays that are still being made."""
+    own, before = merged.means[person], merged.blocks[person]
+    both = (own == own) & (mean == mean) & (before > 0) & (blocks > 0)
+    share = blocks / max(before + blocks, 1.0)
+    step = np.where(both, mean - own, 0.0)
+    merged.squares[:] += step**2 * before * share
+    merged.means[person] = np.where(np.isnan(own), mean, own + share * step)
+    merged.blocks[person] = before + blocks

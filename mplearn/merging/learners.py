@@ -1,0 +1,109 @@
+"""Learners of parts of a corpus, as one that goes on learning."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..errors import InvalidValueError
+from ..learner import MotionLearner
+from ..learner.chain import Chain
+from .graphs import merge_graphs
+from .observers import merge_observers
+from .people import merged_into
+
+
+def merge_learners(learners: Sequence[MotionLearner]) -> MotionLearner:
+    """Return a learner that knows what all of some know, as if their streams followed each other.
+
+    The learners stay as they are; a stream that one is in the middle of is ended for the merged
+    one. Where markers are observed, people are matched by their bodies: who is known to both is one
+    person, all others are kept apart; without markers all is one person's. Primitives that several
+    have learned become one (`merge_people`); the counts of transitions are added, so that they do
+    not depend on the order of the learners but for the names of primitives; what none had
+    recognised alone is counted where it is known now. The first learner's primitives keep their
+    ids, as far as they stay what they were.
+
+    Each learner is copied once, however many there are; exemplars never are.
+
+    Raises:
+        InvalidValueError: There are no learners, or they have other configurations.
+    """
+    if not learners:
+        raise InvalidValueError("at least one learner is needed to merge")
+    for other in learners[1:]:
+        if other.config != learners[0].config:
+            raise InvalidValueError(
+                f"learners must have the same configuration, not {learners[0].config} and "
+                f"{other.config}"
+            )
+    ended = map(_ended, learners)
+    merged = _Merged(next(ended))
+    for other in ended:
+        merged.take(other)
+    return merged.learner()
+
+
+def _ended(learner: MotionLearner) -> MotionLearner:
+    """Return a copy of a learner whose stream is over."""
+    copy = MotionLearner.from_state(learner.state())
+    copy.end_stream()
+    return copy
+
+
+class _Merged:
+    """What some learners know, one after the other.
+
+    Args:
+        first: The first of them; it is used up, and so are all others.
+    """
+
+    def __init__(self, first: MotionLearner) -> None:
+        self._first = first
+        self._state = first.state()
+        self._tree, self._graph, self._chain = first.tree, first.graph, first.chain
+        self._observer = first.observer
+
+    def take(self, other: MotionLearner) -> None:
+        """Merge another learner into what is known."""
+        state, n_frames = other.state(), self._state.n_frames
+        people = {person: person for person in other.tree.people}
+        if self._observer is not None and other.observer is not None:
+            seen, numbers = merge_observers(self._observer, other.observer)
+            self._observer.load_state(seen)
+            people |= numbers
+            self._state = replace(self._state, n_people=seen.identity.bodies.n_people)
+        merged = merged_into(self._tree, other.tree, people)
+        parts = ((self._graph, merged.first), (other.graph, merged.second))
+        graph = merge_graphs((each, {id: new[id] for id in each.ids}) for each, new in parts)
+        for id in merged.tree.leaves:
+            graph.add_node(id)
+        config = self._state.config
+        chain = Chain(graph, config.rate_hz, config.longest_pause_s)
+        self._chain.rename(merged.first)
+        other.chain.rename(merged.second)
+        chain.append(self._chain, 0, 0)
+        chain.append(other.chain, merged.new_number, n_frames)
+        chain.correct(merged.moved)
+        chain.count_late(merged.placed)
+        self._tree, self._graph, self._chain = merged.tree, graph, chain
+        self._state = replace(
+            self._state,
+            n_frames=n_frames + state.n_frames,
+            stream_start=n_frames + state.n_frames,
+            person=people.get(state.person, self._state.person),
+        )
+
+    def learner(self) -> MotionLearner:
+        """Return a learner that knows it all."""
+        if self._tree is self._first.tree and self._graph is self._first.graph:
+            return self._first
+        return MotionLearner.from_state(
+            replace(
+                self._state,
+                observer=None if self._observer is None else self._observer.state(),
+                tree=self._tree.state(),
+                graph=self._graph.state(),
+                chain=self._chain.state(),
+            )
+        )

@@ -1,0 +1,30 @@
+"""Observers of different streams, as one that knows everybody."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..body import MotionObserver
+from ..body.observer import KnownState, ObserverState
+from .bodies import merge_bodies
+
+
+def merge_observers(
+    first: MotionObserver, second: MotionObserver
+) -> tuple[ObserverState, dict[int, int]]:
+    """Return the state of the first with the people of the second, and their numbers there.
+
+    Neither changes.
+    """
+    state = first.state()
+    bodies, numbers = merge_bodies(first.identity.bodies, second.identity.bodies)
+    known = {each.person: each.body for each in state.known}
+    for each in second.state().known:
+        if each.person in numbers:
+            known.setdefault(numbers[each.person], each.body)
+    merged = replace(
+        state,
+        identity=replace(state.identity, bodies=bodies),
+        known=tuple(KnownState(person, body) for person, body in known.items()),
+    )
+    return merged, numbers

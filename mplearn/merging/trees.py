@@ -1,0 +1,192 @@
+"""Two trees of one person that were learned apart, as one that goes on learning."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InvalidValueError
+from ..recording import IntArray
+from ..state import Blob
+from ..tree import ROOT, Change, PrimitiveTree
+from ..tree.node import NodeState
+from ..tree.search import mean_nearest
+from ..tree.spread import SampleState, SpreadState
+from ..tree.tree import TreeState
+
+_REACH = 1.25  # radii of few exemplars are small
+
+
+class MergedTree(NamedTuple):
+    """Two trees as one.
+
+    Attributes:
+        tree: The tree, which goes on learning.
+        new_id: Its id of each node of the second tree; those of the first keep theirs.
+        new_number: How much its numbers of the second tree's segments are larger than they were.
+        change: What became of segments that neither tree alone had placed.
+    """
+
+    tree: PrimitiveTree
+    new_id: dict[int, int]
+    new_number: int
+    change: Change
+
+
+def merge_trees(first: PrimitiveTree, second: PrimitiveTree) -> MergedTree:
+    """Merge two trees; neither changes, and their exemplars are not copied.
+
+    A leaf of the second becomes one with a leaf of the first if the distance from the exemplars of
+    each to those of the other is, on average, hardly above its radius; one to one, the nearest
+    pairs first. All others stay what they were. Statistics add up as if one tree had seen all
+    segments; those that wait in the roots are placed where they fit now.
+
+    Raises:
+        InvalidValueError: The trees have other rules, channels or rates.
+    """
+    for name in ("config", "n_channels", "rate_hz", "groups"):
+        mine, other = getattr(first, name), getattr(second, name)
+        if mine != other:
+            raise InvalidValueError(f"trees must agree in {name}, not {mine} and {other}")
+    a, b = first.state(), second.state()
+    shift = a.next_id - 1
+    new_id = {node.id: node.id + shift if node.id != ROOT else ROOT for node in b.nodes}
+    tree = PrimitiveTree(first.config, first.n_channels, first.rate_hz, first.groups)
+    tree.load_state(_joined(tree, a, b, new_id))
+    tree.remeasure()
+    gone = _merge(tree, first.leaves, [new_id[id] for id in second.leaves])
+    older = tree.leaves
+    change = tree.place_waiting()
+    late = _merge(tree, older, change.born)
+    moved = tuple((number, late.get(id, id)) for number, id in change.moved)
+    born = tuple(id for id in change.born if id not in late)
+    known = {old: gone.get(new, new) for old, new in new_id.items()}
+    return MergedTree(tree, known, first.n_seen, Change(born=born, moved=moved))
+
+
+def _merge(tree: PrimitiveTree, mine: Sequence[int], theirs: Sequence[int]) -> dict[int, int]:
+    """Merge the leaves that are one primitive; return what absorbed each that is gone."""
+    gone = {}
+    for one, other in _matches(tree, mine, theirs):
+        whole = tree.node(one).whole or tree.node(other).whole
+        tree.merge(one, other)
+        tree.node(one).whole = whole  # the rules made it one, they may split it
+        gone[other] = one
+    return gone
+
+
+def _renumbered(node: NodeState, n_before: int, new_id: Mapping[int, int]) -> NodeState:
+    """Return a node with other numbers of segments and other ids."""
+    return replace(
+        node,
+        id=new_id[node.id],
+        parent=None if node.parent is None else new_id[node.parent],
+        members=node.members + n_before,
+        settled=tuple(number + n_before for number in node.settled),
+        children=tuple(new_id[child] for child in node.children),
+        apart=tuple(new_id[id] for id in node.apart if id in new_id),
+    )
+
+
+def _joined(
+    tree: PrimitiveTree, a: TreeState, b: TreeState, new_id: Mapping[int, int]
+) -> TreeState:
+    """Return the state of a tree that holds all nodes of two; distances are to be measured."""
+    config = tree.config
+    spread = _added(a.spread, b.spread)
+    variances = spread.squares / np.maximum(spread.count, 1)
+    groups = np.array(tree.groups)
+    shared = np.bincount(groups, variances) / np.maximum(np.bincount(groups), 1)
+    nodes = [_renumbered(node, a.n_seen, new_id) for node in b.nodes]
+    return TreeState(
+        n_seen=a.n_seen + b.n_seen,
+        next_id=a.next_id + b.next_id - 1,
+        floor=config.variance_floor**2 * np.maximum(shared[groups], 1e-18),
+        spread=spread,
+        sample=_sampled(a, b, config.n_sampled, config.seed),
+        nodes=_with_one_root(a.nodes, nodes, config.max_unplaced),
+    )
+
+
+def _added(a: SpreadState, b: SpreadState) -> SpreadState:
+    """Return counts, means and sums of squares of two sets of values together [Chan1979]."""
+    count = a.count + b.count
+    share = b.count / np.maximum(count, 1)
+    step = b.mean - a.mean
+    squares = a.squares + b.squares + step**2 * a.count * share
+    return SpreadState(count, a.mean + share * step, squares)
+
+
+def _sampled(a: TreeState, b: TreeState, size: int, seed: int) -> SampleState:
+    """Return a uniform sample of all segments from uniform samples of two parts of them."""
+    mine, theirs = a.sample.numbers, b.sample.numbers + a.n_seen
+    frames: dict[int, Blob] = dict(zip(mine.tolist(), a.sample.frames, strict=True))
+    frames |= zip(theirs.tolist(), b.sample.frames, strict=True)
+    rng = np.random.default_rng((seed, a.n_seen, b.n_seen))
+    numbers = _drawn(mine, theirs, a.n_seen, b.n_seen, size, rng)
+    return SampleState(
+        numbers, tuple(frames[n] for n in numbers.tolist()), np.zeros((len(numbers),) * 2)
+    )
+
+
+def _drawn(
+    a: IntArray, b: IntArray, n_a: int, n_b: int, size: int, rng: np.random.Generator
+) -> IntArray:
+    if len(a) + len(b) <= size:
+        return np.concatenate([a, b]).astype(np.int64)
+    from_a = int(rng.hypergeometric(n_a, n_b, size))
+    from_a = min(max(from_a, size - len(b)), len(a))
+    chosen = (rng.choice(a, from_a, replace=False), rng.choice(b, size - from_a, replace=False))
+    return np.concatenate(chosen).astype(np.int64)
+
+
+def _with_one_root(
+    a: Sequence[NodeState], b: Sequence[NodeState], most: int
+) -> tuple[NodeState, ...]:
+    """Return the nodes of both, under one root in which at most so many segments wait."""
+    mine, theirs = a[0], b[0]
+    members = np.concatenate([mine.members, theirs.members])[-most:]
+    frames = (*mine.frames, *theirs.frames)[-most:]
+    root = replace(
+        mine,
+        members=members,
+        frames=frames,
+        matrix=np.zeros((len(members),) * 2),
+        children=(*mine.children, *theirs.children),
+        n_placed=mine.n_placed + theirs.n_placed,
+        n_frames=mine.n_frames + theirs.n_frames,
+    )
+    return (root, *a[1:], *b[1:])
+
+
+def _matches(
+    tree: PrimitiveTree, mine: Sequence[int], theirs: Sequence[int]
+) -> list[tuple[int, int]]:
+    """Return the pairs of leaves that are one primitive."""
+    if not (mine and theirs):
+        return []
+    config, bank = tree.config, tree.bank
+    means = np.stack([bank.mean_profile(tree.node(id).members) for id in mine])
+    near = []
+    for other in theirs:
+        offsets = means - bank.mean_profile(tree.node(other).members)
+        closest = np.argsort((offsets**2).sum(axis=1), kind="stable")
+        for k in closest[: config.n_candidates or None]:
+            matrix = np.stack(
+                [
+                    bank.distances(bank[n], tree.node(other).members)
+                    for n in tree.node(mine[k]).members
+                ]
+            )
+            forth = mean_nearest(matrix, config.n_nearest).mean() / tree.radius(mine[k])
+            back = mean_nearest(matrix.T, config.n_nearest).mean() / tree.radius(other)
+            if forth + back <= 2 * _REACH:
+                near.append((float(forth + back), mine[k], other))
+    pairs: list[tuple[int, int]] = []
+    for _, i, j in sorted(near):
+        if all(i != one and j != other for one, other in pairs):
+            pairs.append((i, j))
+    return pairs

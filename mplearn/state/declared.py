@@ -1,0 +1,168 @@
+"""How a stateful object declares its state: frozen dataclasses with checked types.
+
+cattrs and msgspec turn dataclasses into plain values, too. Neither knows arrays, whose types,
+shapes and ranges are most of what must be checked here, nor parts that are kept once by their
+content; and both convert what merely looks like the wanted type. What would remain of either is the
+walk over dataclass fields, which is the smaller part of `structure`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import StateError
+
+LARGEST = 1e250  # of a number in a state, where nothing else is said: what lies beyond is damage
+
+
+@dataclass(frozen=True)
+class Range:
+    """Marks a number that lies in [low, high]; NaN never does.
+
+    It is used as in ``Annotated[float, Range(0.0)]``.
+    """
+
+    low: float = -LARGEST
+    high: float = LARGEST
+
+
+@dataclass(frozen=True)
+class Array:
+    """Marks an array, as in ``Annotated[FloatArray, Array("n", "n", low=0.0)]``.
+
+    Args:
+        *shape: Length of each axis: a number, a name (equal names in one state are equal lengths),
+            or None for any.
+        low: Smallest value.
+        high: Largest value.
+        nan: Whether NaN may stand for what is missing.
+    """
+
+    shape: tuple[int | str | None, ...]
+    low: float
+    high: float
+    nan: bool
+
+    def __init__(
+        self,
+        *shape: int | str | None,
+        low: float = -LARGEST,
+        high: float = LARGEST,
+        nan: bool = False,
+    ) -> None:
+        for name, value in (("shape", shape), ("low", low), ("high", high), ("nan", nan)):
+            object.__setattr__(self, name, value)
+
+
+Count: TypeAlias = Annotated[int, Range(0)]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Base of all states: what an object needs to go on as if nothing had happened.
+
+    A subclass is a dataclass (``frozen=True, eq=False``) whose fields are plain values, arrays,
+    tuples of those, `Blob`, and other states. Arrays in it are never written to: who makes a state
+    copies what changes later, and so does who resumes from one. States are equal if all that they
+    hold is, NaN included.
+    """
+
+    def check(self) -> None:
+        """Check what holds between fields; types, shapes and ranges are checked before.
+
+        Raises:
+            StateError: It does not hold; the place is that of the field.
+        """
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all that two states hold is equal bit for bit."""
+        if type(other) is not type(self):
+            return NotImplemented
+        from .packing import packed
+        from .plain import to_plain
+
+        return packed(to_plain(self)) == packed(to_plain(other))
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+@dataclass(frozen=True, eq=False)
+class SharedState(State):
+    """A state that is kept once, by content: as long as it does not change, it is one object.
+
+    An owner returns the same object from its ``state()`` until something has changed; a checkpoint
+    writes it once, and refers to it from then on.
+    """
+
+
+class Blob:
+    """An array that never changes, kept once by its content, such as an exemplar.
+
+    Args:
+        array: The values; nobody writes to them from now on.
+    """
+
+    __slots__ = ("array", "content")
+
+    def __init__(self, array: NDArray[Any]) -> None:
+        self.array = np.ascontiguousarray(array)
+        self.content: Any = None  # key and parts, once somebody asked (`checkpoint`)
+
+    def __len__(self) -> int:
+        """Length of the first axis."""
+        return len(self.array)
+
+    def __repr__(self) -> str:
+        """Return shape and key, which tells the content."""
+        from .checkpoint import key_of
+
+        return f"Blob({self.array.shape}, {key_of(self)})"
+
+
+def require(holds: bool, place: str, problem: str | Callable[[], str]) -> None:
+    """Raise a `StateError` at a place where something does not hold."""
+    if not holds:
+        raise StateError(problem if isinstance(problem, str) else problem(), place)
+
+
+def require_no_cycle(parents: Mapping[int, int | None], place: Callable[[int], str]) -> None:
+    """Raise a `StateError` where a node lies below itself.
+
+    Args:
+        parents: The node above each node; one that is not among them is above all.
+        place: Returns the place of what is said of a node.
+    """
+    safe: set[int] = set()
+    for start in parents:
+        path: list[int] = []
+        at: int | None = start
+        while at is not None and at in parents and at not in safe:
+            if at in path[-1:] or (len(path) > len(parents)):
+                raise StateError(f"node {at} lies below itself", place(at))
+            path.append(at)
+            at = parents[at]
+        safe.update(path)
+
+
+def shown(value: object) -> str:
+    """Return a value for a message, shortened."""
+    if isinstance(value, np.ndarray):
+        return f"an array of {value.dtype} {value.shape}"
+    if isinstance(value, (dict, list, tuple)):
+        return f"a {type(value).__name__} of {len(value)}"
+    if isinstance(value, int | float | bool | str | None):
+        return f"{value!r:.60}"
+    return f"a {type(value).__name__}"
+
+
+def limits(low: float, high: float) -> str:
+    """Return a range for a message."""
+    if math.isinf(low) and math.isinf(high):
+        return "any number"
+    return f"in [{low:g}, {high:g}]"
