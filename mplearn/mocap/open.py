@@ -16,15 +16,28 @@ from .bvh import BVHReader
 from .c3d import C3DReader
 from .csv_table import CSVReader
 from .files import bad_file, is_file, is_folder, stem
+from .g1_csv import G1CSVReader
 from .labels import labels_beside
+from .mvnx import MVNXReader
 from .reader import Hints, Reader, joined
 from .registry import reader_for, reader_of, register_reader, suffixes
 from .resample import resample
+from .smpl import SMPLReader
 from .trc import TRCReader
 from .ui_prmd import UIPRMDReader
 
 # the most general first: the latest is asked first
-for _reader in (CSVReader(), TRCReader(), BVHReader(), AMCReader(), C3DReader(), UIPRMDReader()):
+for _reader in (
+    CSVReader(),
+    G1CSVReader(),
+    TRCReader(),
+    BVHReader(),
+    AMCReader(),
+    MVNXReader(),
+    SMPLReader(),
+    C3DReader(),
+    UIPRMDReader(),
+):
     register_reader(_reader)
 
 

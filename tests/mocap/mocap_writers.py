@@ -256,6 +256,154 @@ def write_default_amc(path: Path) -> Path:
     return write_amc(path)
 
 
+MVNX_JOINTS = (
+    # child, parent, where the joint is in the parent [m]: x forward, y left, z up in a T pose
+    ("L5", "Pelvis", (0.0, 0.0, 0.10)),
+    ("L3", "L5", (0.0, 0.0, 0.11)),
+    ("T12", "L3", (0.0, 0.0, 0.10)),
+    ("T8", "T12", (0.0, 0.0, 0.10)),
+    ("Neck", "T8", (0.0, 0.0, 0.14)),
+    ("Head", "Neck", (0.0, 0.0, 0.09)),
+    ("RightShoulder", "T8", (0.0, -0.03, 0.09)),
+    ("RightUpperArm", "RightShoulder", (0.0, -0.14, 0.0)),
+    ("RightForeArm", "RightUpperArm", (0.0, -0.28, 0.0)),
+    ("RightHand", "RightForeArm", (0.0, -0.24, 0.0)),
+    ("LeftShoulder", "T8", (0.0, 0.03, 0.09)),
+    ("LeftUpperArm", "LeftShoulder", (0.0, 0.14, 0.0)),
+    ("LeftForeArm", "LeftUpperArm", (0.0, 0.28, 0.0)),
+    ("LeftHand", "LeftForeArm", (0.0, 0.24, 0.0)),
+    ("RightUpperLeg", "Pelvis", (0.0, -0.08, 0.0)),
+    ("RightLowerLeg", "RightUpperLeg", (0.0, 0.0, -0.42)),
+    ("RightFoot", "RightLowerLeg", (0.0, 0.0, -0.40)),
+    ("RightToe", "RightFoot", (0.14, 0.0, -0.07)),
+    ("LeftUpperLeg", "Pelvis", (0.0, 0.08, 0.0)),
+    ("LeftLowerLeg", "LeftUpperLeg", (0.0, 0.0, -0.42)),
+    ("LeftFoot", "LeftLowerLeg", (0.0, 0.0, -0.40)),
+    ("LeftToe", "LeftFoot", (0.14, 0.0, -0.07)),
+)
+MVNX_SEGMENTS = ("Pelvis", *(child for child, _, _ in MVNX_JOINTS))
+MVNX_ENDS = {"Head": (0.0, 0.0, 0.18), "RightHand": (0.0, -0.18, 0.0), "LeftHand": (0.0, 0.18, 0.0),
+             "RightToe": (0.06, 0.0, -0.02), "LeftToe": (0.06, 0.0, -0.02)}  # fmt: skip
+
+
+def mvnx_motion(n_frames: int = 12, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Origins (T, 23, 3) [m] and orientations (T, 23, 4), w x y z, of a person who moves."""
+    from scipy.spatial.transform import Rotation
+
+    rng = np.random.default_rng(seed)
+    local = {}
+    for name in MVNX_SEGMENTS:
+        turns = 0.2 * rng.normal(size=3) + np.cumsum(0.02 * rng.normal(size=(n_frames, 3)), axis=0)
+        local[name] = Rotation.from_rotvec(turns)
+    steps = 0.003 * rng.normal(size=(n_frames, 3))
+    places = {"Pelvis": np.array([0.3, -0.2, 0.93]) + np.cumsum(steps, axis=0)}
+    world = {"Pelvis": local["Pelvis"]}
+    for child, parent, offset in MVNX_JOINTS:
+        places[child] = places[parent] + world[parent].apply(offset)
+        world[child] = world[parent] * local[child]
+    quaternions = [world[name].as_quat(scalar_first=True) for name in MVNX_SEGMENTS]
+    return np.stack([places[n] for n in MVNX_SEGMENTS], 1), np.stack(quaternions, 1)
+
+
+def write_mvnx(
+    path: Path,
+    motion: tuple[np.ndarray, np.ndarray] | None = None,
+    *,
+    holds: tuple[str, ...] = ("orientation", "position", "jointAngle"),
+    version: str = "4",
+    head: str = '<?xml version="1.0" encoding="UTF-8"?>',
+    subject: str = 'label="Anna" frameRate="100" segmentCount="23"',
+) -> Path:
+    positions, orientations = mvnx_motion() if motion is None else motion
+    points: dict[str, list[tuple[str, tuple[float, ...]]]] = {name: [] for name in MVNX_SEGMENTS}
+    joints = []
+    for child, parent, offset in MVNX_JOINTS:
+        points[parent].append((f"j{child}", offset))
+        points[child].append((f"j{child}", (0.0, 0.0, 0.0)))
+        joints.append(
+            f'<joint label="j{child}"><connector1>{parent}/j{child}</connector1>'
+            f"<connector2>{child}/j{child}</connector2></joint>"
+        )
+    for name, place in MVNX_ENDS.items():
+        points[name].append((f"pEnd{name}", place))
+
+    def text(values: np.ndarray) -> str:
+        return " ".join(f"{x:.9f}" for x in np.ravel(values))
+
+    segments = "".join(
+        f'<segment label="{name}" id="{i}"><points>'
+        + "".join(
+            f'<point label="{label}"><pos_b>{text(place)}</pos_b></point>'
+            for label, place in points[name]
+        )
+        + "</points></segment>\n"
+        for i, name in enumerate(MVNX_SEGMENTS, 1)
+    )
+    rest = np.zeros((len(MVNX_SEGMENTS), 4))
+    rest[:, 0] = 1.0
+    frames = [
+        f'<frame time="0" index="" tc="" ms="0" type="{kind}"><orientation>{text(rest)}'
+        f"</orientation><position>{text(np.zeros((23, 3)))}</position></frame>\n"
+        for kind in ("identity", "tpose", "tpose-isb")
+    ]
+    for i, (place, turn) in enumerate(zip(positions, orientations, strict=True)):
+        angles = np.full((len(MVNX_JOINTS), 3), 10.0 + i)
+        found = {"orientation": turn, "position": place, "jointAngle": angles}
+        inside = "".join(f"<{name}>{text(found[name])}</{name}>" for name in holds)
+        frames.append(
+            f'<frame time="{10 * i}" index="{i}" type="normal">{inside}'
+            f"<velocity>{text(place)}</velocity></frame>\n"
+        )
+    path.write_text(
+        f'{head}\n<mvnx xmlns="http://www.xsens.com/mvn/mvnx" version="{version}">\n'
+        f"<subject {subject}>\n<segments>{segments}</segments>\n<joints>{''.join(joints)}"
+        f"</joints>\n<frames>\n{''.join(frames)}</frames>\n</subject>\n</mvnx>\n"
+    )
+    return path
+
+
+def smpl_poses(n_frames: int = 12, n_joints: int = 52, seed: int = 0) -> np.ndarray:
+    """Rotation vectors (T, 3 J) of a person who stands, z up, and moves a little."""
+    rng = np.random.default_rng(seed)
+    steps = 0.02 * rng.normal(size=(n_frames, n_joints, 3))
+    vectors = 0.25 * rng.normal(size=(n_joints, 3)) + np.cumsum(steps, axis=0)
+    vectors[:, 0] = [np.pi / 2, 0.0, 0.0]  # the model's y is the world's z
+    return vectors.reshape(n_frames, -1)
+
+
+def write_smpl(path: Path, **arrays: object) -> Path:
+    content: dict[str, object] = {
+        "poses": smpl_poses(),
+        "trans": np.tile([0.4, -0.1, 0.95], (12, 1)),
+        "mocap_framerate": np.array(100.0),
+        "betas": np.zeros(16),
+        "gender": np.array("neutral"),
+    }
+    content |= arrays
+    np.savez(path, **{name: value for name, value in content.items() if value is not None})
+    return path
+
+
+def g1_values(n_frames: int = 12, seed: int = 0) -> np.ndarray:
+    """The root's x y z [m] and quaternion x y z w, and 29 joints [rad], shape (T, 36)."""
+    from scipy.spatial.transform import Rotation
+
+    rng = np.random.default_rng(seed)
+    joints = 0.2 * rng.normal(size=29) + np.cumsum(0.02 * rng.normal(size=(n_frames, 29)), axis=0)
+    turns = np.cumsum(0.02 * rng.normal(size=(n_frames, 3)), axis=0)
+    root = np.tile([0.5, -0.3, 0.78], (n_frames, 1)) + 0.01 * turns
+    return np.concatenate([root, Rotation.from_rotvec(turns).as_quat(), joints], axis=1)
+
+
+def write_g1_csv(
+    path: Path, values: np.ndarray | None = None, header: list[str] | None = None
+) -> Path:
+    rows = [header] if header else []
+    rows += [[f"{x:.9f}" for x in row] for row in (g1_values() if values is None else values)]
+    path.write_text("".join(",".join(row) + "\n" for row in rows))
+    return path
+
+
 Writer = Callable[[Path], Path]
 WRITERS: dict[str, tuple[str, Writer]] = {
     "UI-PRMD": (UI_PRMD_NAME, write_ui_prmd),
@@ -264,6 +412,9 @@ WRITERS: dict[str, tuple[str, Writer]] = {
     "BVH": ("take.bvh", write_bvh),
     "TRC": ("take.trc", write_trc),
     "CSV": ("take.csv", write_csv),
+    "G1 CSV": ("take.csv", write_g1_csv),
+    "MVNX": ("take.mvnx", write_mvnx),
+    "SMPL": ("take.npz", write_smpl),
 }
 """For each reader, by its format: a file name, and what writes a small valid file there."""
 

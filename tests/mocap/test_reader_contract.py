@@ -33,10 +33,11 @@ from mplearn.mocap import (
 from mplearn.recording import Recording
 
 FORMATS = sorted(WRITERS)
-BINARY = {"C3D"}
-SKELETAL = {"AMC", "BVH"}
-TEXT_FORMATS = [format for format in FORMATS if format not in BINARY]
-SEPARATORS = {"TRC": "\t", "CSV": ",", "UI-PRMD": ","}
+WITHOUT_ROWS = {"C3D", "MVNX", "SMPL"}
+SKELETAL = {"AMC", "BVH", "G1 CSV", "MVNX", "SMPL"}
+RATES_HZ = {"AMC": 120.0, "G1 CSV": 30.0}  # which do not say theirs
+TEXT_FORMATS = [format for format in FORMATS if format not in WITHOUT_ROWS]
+SEPARATORS = {"TRC": "\t", "CSV": ",", "UI-PRMD": ",", "G1 CSV": ","}
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +111,7 @@ def test_a_reader_without_a_suffix_is_refused(wrong: tuple[str, ...]) -> None:
 def test_reads_metres_and_seconds(valid: dict[str, Path], format: str, positions: bool) -> None:
     recording = open_recording(valid[format], positions=positions)
     assert len(recording) == 12
-    assert recording.rate_hz == pytest.approx(120.0 if format == "AMC" else 100.0)
+    assert recording.rate_hz == pytest.approx(RATES_HZ.get(format, 100.0))
     assert len(set(recording.channels)) == len(recording.channels)
     assert valid[format].name.startswith(recording.name)
     if recording.is_markers:
