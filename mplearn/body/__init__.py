@@ -4,7 +4,6 @@ from .body import Body as Body
 from .calibration import Calibration as Calibration
 from .features import feature_channels as feature_channels
 from .features import features_of as features_of
-from .features import foot_clearance as foot_clearance
 from .features import posture_of as posture_of
 from .first_posture import TooFewMarkersError as TooFewMarkersError
 from .human import PROPORTIONS as PROPORTIONS

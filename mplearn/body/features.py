@@ -13,7 +13,6 @@ from mplearn.maths.yaw_roll_pitch import roll_pitch_of, yaw_roll_pitch_quaternio
 from mplearn.recording import FloatArray
 
 from .body import Body
-from .points import points_of
 from .robot import robot_body
 
 BASE_CHANNELS = ("base_height", "base_roll", "base_pitch")
@@ -76,24 +75,3 @@ def posture_of(
     q[..., 3:7] = np.stack(turn, axis=-1)
     q[..., 7 + body.driven] = features[..., 3:]
     return q
-
-
-def foot_clearance(features: FloatArray, body: Body | None = None) -> FloatArray:
-    """Return how high each sole's lowest corner is above the other foot's or its own lowest.
-
-    Args:
-        features: Shape (T, 3 + driven).
-        body: The body; the robot where not given.
-
-    Returns:
-        Height of the left and the right sole above the lower of both, shape (T, 2) [m].
-    """
-    body = body or robot_body()
-    tree = body.tree
-    soles = [i for i, site in enumerate(tree.site_names) if site.startswith("sole_")]
-    left = np.array([tree.site_names[i].endswith("_l") for i in soles])
-    features = np.ascontiguousarray(np.atleast_2d(features), dtype=np.float64)
-    heights = points_of(features, body, tree.site_body[soles], tree.site_offset[soles])[..., 2]
-    lowest = np.stack((heights[:, left].min(axis=1), heights[:, ~left].min(axis=1)), axis=1)
-    clearance: FloatArray = lowest - lowest.min(axis=1, keepdims=True)
-    return clearance

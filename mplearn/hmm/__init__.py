@@ -20,6 +20,5 @@ from .sequences import SequenceBatch as SequenceBatch
 from .stack import ModelStack as ModelStack
 from .stack import score_batch as score_batch
 from .stack import score_pairs as score_pairs
-from .statistics import Statistics as Statistics
 from .tracker import MotionTracker as MotionTracker
 from .tracker import activity as activity

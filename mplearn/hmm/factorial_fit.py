@@ -17,8 +17,8 @@ from .factorial_posterior import Moments
 from .fit import fit
 from .model import LeftRightHMM
 from .motion_model import MotionModel
+from .parameters import as_floor
 from .sequences import as_frames, as_weights
-from .statistics import as_floor
 
 
 def fit_factorial(

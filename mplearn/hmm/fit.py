@@ -10,8 +10,8 @@ from ..errors import InvalidValueError, ModelError
 from ..recording import FloatArray
 from .em import em
 from .model import LeftRightHMM
+from .parameters import as_floor, as_model, check_lengths, empty_parameters
 from .sequences import SequenceBatch
-from .statistics import as_floor, as_model, check_lengths, empty_parameters
 
 
 def fit(

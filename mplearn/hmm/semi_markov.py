@@ -20,8 +20,8 @@ from .fit import fit
 from .kernels import log_densities, log_norms
 from .model import checked_gaussians
 from .motion_model import held
+from .parameters import as_floor
 from .sequences import SequenceBatch, as_frames, as_weights
-from .statistics import as_floor
 
 LEAST_SPREAD = 0.7  # frames: below it a normal distribution over whole frames has other moments
 

@@ -114,24 +114,3 @@ def push_point(
         tail = tail + 1 if tail + 1 < size else 0
         between += row_sums[head]
     distances[slot] = 0.0
-
-
-def density_distance(a: FloatArray, b: FloatArray, sigma: float) -> float:
-    """Integrated square error between the Parzen densities of two windows, by the closed form.
-
-    Args:
-        a: Points of one window, shape (W, n).
-        b: Points of the other, shape (W, n).
-        sigma: Width of the kernels, in the points' unit.
-
-    Returns:
-        The distance over (4 pi sigma^2)^(-n/2), in [0, 2].
-
-    Source: [Kulic2012] eq. 1-2.
-    """
-
-    def mean_kernel(x: FloatArray, y: FloatArray) -> float:
-        squared = ((x[:, None, :] - y[None, :, :]) ** 2).sum(axis=2)
-        return float(np.exp(-squared / (4.0 * sigma * sigma)).mean())
-
-    return max(0.0, mean_kernel(a, a) - 2.0 * mean_kernel(a, b) + mean_kernel(b, b))

@@ -13,7 +13,6 @@ from mplearn.body import (
     MotionObserver,
     TooFewMarkersError,
     features_of,
-    foot_clearance,
     human_body,
     marker_set,
     posture_of,
@@ -98,15 +97,6 @@ def test_features_and_postures_are_inverse_to_each_other():
         posture_of(np.zeros(32))
     with pytest.raises(BodyError, match="45"):
         features_of(np.zeros(44))
-
-
-def test_foot_clearance_sees_the_raised_foot():
-    robot = robot_body()
-    q = np.tile(robot.rest, (2, 1))
-    for name, angle in (("hip_pitch_r", -1.0), ("knee_r", 1.0)):
-        q[1, 7 + robot.joint_names.index(name)] = angle
-    lift = 0.4 - 0.4 * np.cos(1.0)  # the shank stays vertical
-    np.testing.assert_allclose(foot_clearance(features_of(q)), [[0, 0], [0, lift]], atol=1e-9)
 
 
 def test_the_observer_gathers_then_streams():

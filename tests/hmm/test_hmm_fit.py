@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from em_steps import expected_statistics, model_of, no_statistics
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mplearn.errors import InvalidValueError, ModelError
-from mplearn.hmm import Statistics, distance, distance_matrix, fit, select_size, to_hmmlearn
+from mplearn.hmm import SequenceBatch, distance, distance_matrix, em, fit, select_size, to_hmmlearn
 from mplearn.hmm.selection import n_parameters
 
 
@@ -64,23 +65,25 @@ def test_statistics_of_a_group_are_the_sum_over_its_exemplars(seed):
     rng = np.random.default_rng(seed)
     sequences = [motion(rng, int(rng.integers(10, 40))) for _ in range(3)]
     model = fit(sequences, 4)
-    whole = Statistics.expected(model, sequences)
-    parts = [Statistics.expected(model, [sequence]) for sequence in sequences]
-    for a, b in zip(whole, parts[0].plus(parts[1]).plus(parts[2]), strict=True):
-        np.testing.assert_allclose(a, b, atol=1e-8)
-    for a, b in zip(whole.minus(parts[1]), parts[0].plus(parts[2]), strict=True):
-        np.testing.assert_allclose(a, b, atol=1e-8)
-    assert whole.mass[:, 0].sum() == pytest.approx(sum(map(len, sequences)))
-    assert whole.moves.sum() == pytest.approx(3 * 3)
+    *whole, likelihood = expected_statistics(model, sequences)
+    parts = [expected_statistics(model, [sequence]) for sequence in sequences]
+    for total, of_parts in zip((*whole, likelihood), zip(*parts, strict=True), strict=True):
+        np.testing.assert_allclose(total, sum(of_parts), atol=1e-8)
+    mass, _, _, _, moves = whole
+    assert mass[:, 0].sum() == pytest.approx(sum(map(len, sequences)))
+    assert moves.sum() == pytest.approx(3 * 3)
 
 
 def test_fit_equals_its_steps_taken_one_by_one():
     rng = np.random.default_rng(2)
     sequences = [motion(rng, n) for n in (40, 55)]
     weights = [rng.uniform(0.1, 1, n) for n in (40, 55)]
-    model = Statistics.equal_split(sequences, 5, weights).to_model(1e-3)
+    batch = SequenceBatch.of(sequences, weights)
+    split = no_statistics(5, 5)
+    em.equal_split(batch.frames, batch.weights, batch.offsets, split)
+    model = model_of(split, 1e-3)
     for _ in range(3):
-        model = Statistics.expected(model, sequences, weights).to_model(1e-3)
+        model = model_of(expected_statistics(model, sequences, weights)[:5], 1e-3)
     direct = fit(sequences, 5, weights=weights, n_steps=3, tolerance=-np.inf, variance_floor=1e-3)
     np.testing.assert_allclose(direct.means, model.means, atol=1e-12)
     np.testing.assert_allclose(direct.variances, model.variances, atol=1e-12)

@@ -1,7 +1,7 @@
 """Boundaries that are known: exactly, in made signals; from people's takes, in real ones."""
 
 import itertools
-import time
+import sys
 
 import numpy as np
 import pytest
@@ -67,18 +67,44 @@ def test_sure_boundaries_are_deeper():
     assert min(s.confidence for s in stops) > max(s.confidence for s in slowings)
 
 
-@pytest.mark.parametrize(("name", "limit_us"), [("zero-velocity", 60), ("kohlmorgen-lemm", 200)])
-def test_a_frame_is_cheap(name, limit_us):
-    frames, _ = bell_motions(30, 30, 100.0, seed=4)
-    segmenter = make_segmenter(name, 30, 100.0)
-    segmenter.segment(frames[:100])
-    times = []
-    for start in range(0, 2000, 500):
-        began = time.perf_counter()
-        for frame in frames[start : start + 500]:
+def calls_for(segmenter, frame):
+    """How many functions a frame calls."""
+    calls = 0
+
+    def count(_frame, event, _argument):
+        nonlocal calls
+        calls += event in ("call", "c_call")
+
+    sys.setprofile(count)
+    try:
+        segmenter.update(frame)
+    finally:
+        sys.setprofile(None)
+    return calls
+
+
+def size_of(state):
+    if isinstance(state, dict):
+        return sum(map(size_of, state.values()))
+    return getattr(state, "nbytes", 8)
+
+
+@both
+def test_a_frame_costs_the_same_few_calls_and_no_memory_however_many_came_before(name):
+    calls = {}
+    for n_channels in (3, 30):
+        frames, _ = bell_motions(30, n_channels, 100.0, seed=4)
+        segmenter = make_segmenter(name, n_channels, 100.0)
+        segmenter.segment(frames[:100])  # compiles
+        calls[n_channels] = [calls_for(segmenter, frame) for frame in frames[:1000]]
+        size = size_of(segmenter.state())
+        for frame in frames[1000:-1000]:
             segmenter.update(frame)
-        times.append((time.perf_counter() - began) / 500)
-    assert min(times) * 1e6 < limit_us  # generous: a busy machine is no regression
+        late = [calls_for(segmenter, frame) for frame in frames[-1000:]]
+        assert size_of(segmenter.state()) == size
+        assert set(late) == set(calls[n_channels])
+    assert set(calls[3]) == set(calls[30])
+    assert max(calls[30]) < 20
 
 
 def pelvis_features(recording):

@@ -4,6 +4,7 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
+from densities import density_distance
 from known_motions import mackey_glass
 
 from mplearn.evaluation.boundaries import Boundary, match_boundaries
@@ -16,7 +17,7 @@ from mplearn.segmentation.viterbi import (
     last_changes,
     path_arrays,
 )
-from mplearn.segmentation.windows import density_distance, push_point, window_arrays
+from mplearn.segmentation.windows import push_point, window_arrays
 
 ONE = np.ones(1)  # all channels alike
 

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from densities import density_distance
 from scipy.integrate import dblquad, quad
 
-from mplearn.segmentation.windows import density_distance, push_point, window_arrays
+from mplearn.segmentation.windows import push_point, window_arrays
 
 ONE = np.ones(1)  # all channels alike
 
