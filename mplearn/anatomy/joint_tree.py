@@ -10,6 +10,7 @@ import numpy as np
 from ..recording import FloatArray, Skeleton
 
 TOGETHER = 0.006  # joints closer than this share of the skeleton's extent are one
+LOOSE, LOOSE_M = 0.25, 0.02  # how much a bone may stretch and still be one: of its length, and [m]
 LIKE, LIKE_FLAT = 0.2, 0.012  # how unlike two bones of a pair may be: relative, of the extent
 
 
@@ -40,12 +41,12 @@ class JointTree:
             points: Where they are in some frames, shape (T, J, 3) [m].
         """
         parents = np.array(skeleton.parents)
-        lengths = np.array(
-            [
-                0.0 if parent < 0 else np.median(_norm(points[:, joint] - points[:, parent]))
-                for joint, parent in enumerate(parents)
-            ]
-        )
+        bones = _norm(points - points[:, np.maximum(parents, 0)])  # (T, J)
+        lengths = np.median(bones, axis=0)
+        give = np.ptp(np.quantile(bones, (0.05, 0.95), axis=0), axis=0)
+        # a joint that moves freely in its parent, as the hips in a root on the floor, hangs on none
+        parents = np.where((parents >= 0) & (give > LOOSE * lengths + LOOSE_M), -1, parents)
+        lengths[parents < 0] = 0.0
         near = TOGETHER * _extent(parents, lengths)
         node_of: list[int] = []
         members: list[list[int]] = []

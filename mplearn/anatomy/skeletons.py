@@ -17,7 +17,7 @@ import numpy as np
 from ..body.marker_tables import TABLES
 from ..errors import BodyError
 from ..mocap.kinematics import AXIS_MARK
-from ..recording import FloatArray, Recording, Skeleton
+from ..recording import FloatArray, IntArray, Recording, Skeleton
 from .body_map import BodyMap
 from .joint_tree import JointTree
 from .name_hints import left_of_pair
@@ -27,6 +27,8 @@ from .sides import facing_votes
 SOME_FRAMES = 120  # of a recording are looked at
 STRAIGHT = 0.9  # cosine of a leg's bend at which the zero pose still stands
 FLAT = 0.8  # cosine between a foot and the vertical up to which it stands on its sole
+ABOVE_SHOULDERS = 0.03  # [m] on the human of 1.75 m: the base of the neck is higher
+NECK_RISE = 0.084
 _TABLE = TABLES["landmarks"]
 _ARM = ("shoulder", "elbow", "wrist")
 # lengths on the human of 1.75 m [m]: what the person's are compared with
@@ -166,13 +168,19 @@ class _Builder:
         up = mid_shoulders - mid_hips
         long = np.linalg.norm(up, axis=1)
         rough = float(np.median(long)) / (_REFERENCE_M["trunk"] - 0.084)
-        # the base of the neck is 8 cm above the shoulders on the human of 1.75 m
-        candidates = [self.arms.root, *self.plan.head[:2]]
-        above = [
-            float(np.median(((self._at(n) - mid_shoulders) * up).sum(axis=1) / long))
-            for n in candidates
-        ]
-        self.neck = candidates[int(np.argmin(np.abs(np.array(above) - 0.07 * rough)))]
+        # arms hang below the base of the neck, or on it; above it there may be two joints of a neck
+        head = self.plan.head
+        rises = {
+            node: float(
+                np.quantile(((self._at(node) - mid_shoulders) * up).sum(axis=1) / long, 0.9)
+            )
+            for node in (self.arms.root, *head[:2])
+        }
+        if rises[self.arms.root] > ABOVE_SHOULDERS * rough or not head:
+            self.neck = self.arms.root
+        else:
+            necks = head[:2] if len(head) > 2 else head[:1]
+            self.neck = min(necks, key=lambda node: abs(rises[node] - NECK_RISE * rough))
         trunk = float(np.median(np.linalg.norm(self._at(self.neck) - mid_hips, axis=1)))
         thigh = np.mean([self.tree.length(a, b) for a, b, _ in self.legs.nodes])
         shank = np.mean([self.tree.length(b, c) for _, b, c in self.legs.nodes])
@@ -260,13 +268,16 @@ class _Builder:
         """
         if joint not in self.axes:
             return None
-        return self.zero if self.zero is not None else self._upright_axes(joint, self.trunk)
+        zero: FloatArray | None = self.zero
+        if zero is not None:
+            return zero
+        return self._upright_axes(joint, self.trunk, self.upright)
 
-    def _upright_axes(self, joint: int, wanted: FloatArray) -> FloatArray:
-        """Return the axes on a bone that are the wanted ones (T, 3, 3) while a person stands."""
+    def _upright_axes(self, joint: int, wanted: FloatArray, frames: IntArray) -> FloatArray:
+        """Return the axes on a bone that are the wanted ones, (T, 3, 3), in some of the frames."""
         arms = self.points[:, list(self.axes[joint])] - self.points[:, [joint]]  # rows: its axes
         turned = np.einsum("tki,kj->tij", arms, np.linalg.inv(self._shown(joint)).T)
-        total = np.einsum("tji,tjk->ik", turned[self.upright], wanted[self.upright])
+        total = np.einsum("tji,tjk->ik", turned[frames], wanted[frames])
         u, _, vt = np.linalg.svd(total)
         axes: FloatArray = (u * (1.0, 1.0, np.linalg.det(u @ vt))) @ vt
         return axes
@@ -313,6 +324,11 @@ class _Builder:
     def _turner(self, node: int) -> int:
         """Return the joint that turns the bone which ends at a node."""
         return self.skeleton.parents[self.tree.joints[node][0]]
+
+    def _own(self, node: int) -> int:
+        """Return the last joint of a node that turns anything."""
+        joints = [joint for joint in self.tree.joints[node] if joint in self.axes]
+        return joints[-1] if joints else self.tree.joints[node][-1]
 
     def _limbs(self) -> None:
         for pair, names in ((self.legs, ("hip", "knee", "ankle")), (self.arms, _ARM)):
@@ -370,7 +386,7 @@ class _Builder:
         if skull != self.neck:
             self._joint("skull", skull)
         beyond = (self.neck, *after)[int(np.argmin(off)) + 1 :]
-        joint = self._turner(beyond[0]) if beyond else self.tree.joints[skull][-1]
+        joint = self._turner(beyond[0]) if beyond else self._own(skull)
         axes = self._neutral(joint)
         origin = _TABLE["skull"][1] if skull != self.neck else (0.0, 0.0, 0.0)
         if axes is not None:
@@ -411,7 +427,7 @@ class _Builder:
 
     def _stiff_hand(self, side: str, elbow: int, wrist: int) -> None:
         """Where the hand has no end: it goes on from the forearm in the zero pose."""
-        joint = self.tree.joints[wrist][-1]
+        joint = self._own(wrist)
         if joint in self.axes:
             way = _unit(self.tree.rest[wrist] - self.tree.rest[elbow])
             length = -_TABLE["hand_l"][1][2]
@@ -434,7 +450,7 @@ class _Builder:
     def _foot(self, side: str) -> None:
         leg = "lr".index(side)
         ankle, outer = self.legs.nodes[leg][2], self.legs.outer[leg]
-        joint = self._turner(outer[0]) if outer else self.tree.joints[ankle][-1]
+        joint = self._turner(outer[0]) if outer else self._own(ankle)
         axes = self._foot_axes(joint, ankle, outer[-1]) if outer else self._neutral(joint)
         if axes is not None:
             for place in ("ball", "heel"):
@@ -456,9 +472,11 @@ class _Builder:
                 return axes_along(self.zero[:, 2], across)
         up = np.broadcast_to(self.turn[2], self._at(ankle).shape)
         ahead = self._at(toes) - self._at(ankle)
-        if np.median(np.abs(_cosines(ahead, up))[self.upright]) > FLAT:
+        low = np.argsort(self._at(ankle) @ self.turn[2] + self._at(toes) @ self.turn[2])
+        low = low[: len(self.upright)]  # a foot is flat when it is on the floor
+        if np.median(np.abs(_cosines(ahead, up))[low]) > FLAT:
             return None
-        return self._upright_axes(joint, axes_along(up, np.cross(up, ahead)))
+        return self._upright_axes(joint, axes_along(up, np.cross(up, ahead)), low)
 
     # ---- all of it
 

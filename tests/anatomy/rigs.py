@@ -85,7 +85,8 @@ class Rig:
 
     Attributes:
         names: Key of `NAMES`.
-        zero: The zero pose: "hang", "T", "A", "lying", "sitting" or "odd".
+        zero: The zero pose: "hang", "T", "A", "lying", "sitting" or "odd"; with "bones", each bone
+            lies along the x axis of its own, as animation programs have it.
         order: Order of the rotation channels.
         spine: Joints between hips and neck; 2 are the body's own.
         bends: Whether a longer spine shares out the bends, instead of having stiff joints.
@@ -132,6 +133,8 @@ def write_rig(path: Path, body: Body, postures: np.ndarray, rate_hz: float, rig:
     """Write postures (T, 7 + n) of a body as BVH."""
     nodes = _nodes(body, postures, rig)
     rest = _nodes(body, _zero_pose(body, rig.zero)[None], rig)
+    if rig.zero == "bones":
+        _along_bones(rest)
     axes = {"y": [[0, 1, 0], [0, 0, 1], [1, 0, 0]], "z": np.eye(3), "x": np.roll(np.eye(3), 1, 0)}
     to_file = np.array(axes[rig.up], dtype=float)
     to_file = to_file @ Rotation.from_euler("z", rig.yaw).as_matrix()
@@ -178,6 +181,7 @@ def _zero_pose(body: Body, name: str) -> np.ndarray:
     degrees = {
         "hang": {},
         "T": {"shoulder_roll": 90},
+        "bones": {},
         "A": {"shoulder_roll": 45},
         "lying": {"shoulder_roll": 20},
         "sitting": {"hip_pitch": -90, "knee": 90, "shoulder_roll": 30},
@@ -191,6 +195,22 @@ def _zero_pose(body: Body, name: str) -> np.ndarray:
     if name == "lying":
         q[3:7] = Rotation.from_euler("y", -90, degrees=True).as_quat(scalar_first=True)
     return q
+
+
+def _along_bones(rest: list[_Node]) -> None:
+    """Turn each bone of a zero pose to x, those of the right side to -x."""
+    old = [(node.pos[0].copy(), node.mat[0].copy()) for node in rest]
+    for k, node in enumerate(rest):
+        below = next((c for c, child in enumerate(rest) if child.parent == k), None)
+        if below is not None:
+            bone = old[k][1].T @ (old[below][0] - old[k][0])
+            sign = -1.0 if old[below][0][1] < -0.01 else 1.0
+            turn, _ = Rotation.align_vectors([[sign, 0.0, 0.0]], [bone])
+            node.mat = turn.as_matrix()[None]
+        if node.parent >= 0:
+            parent_pos, parent_mat = old[node.parent]
+            offset = parent_mat.T @ (old[k][0] - parent_pos)
+            node.pos = (rest[node.parent].pos[0] + rest[node.parent].mat[0] @ offset)[None]
 
 
 def _nodes(body: Body, postures: np.ndarray, rig: Rig) -> list[_Node]:
@@ -325,7 +345,7 @@ def _leg(rig, side, add, root, named, pos, mat, on, end):  # type: ignore[no-unt
 
 RIGS = (
     *(replace(Rig(), names=names) for names in NAMES),
-    *(replace(Rig(), zero=zero) for zero in ("hang", "A", "lying", "sitting", "odd")),
+    *(replace(Rig(), zero=zero) for zero in ("hang", "A", "lying", "sitting", "odd", "bones")),
     *(replace(Rig(), order=order) for order in ("XYZ", "XZY", "YXZ", "YZX", "ZXY")),
     *(replace(Rig(), spine=n) for n in (1, 3, 5, 7)),
     *(replace(Rig(), spine=n, bends=True) for n in (3, 4, 7)),
