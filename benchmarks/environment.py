@@ -60,7 +60,7 @@ def per_call_us(function: Callable[[], object], n: int = 1000) -> float:
 
 def double_support() -> Row:
     """A macro step with both feet down against ``mj_step`` with the same commands, interleaved."""
-    env = gym.make(ID, max_steps=10**6).unwrapped
+    env = gym.make(ID, max_episode_steps=10**6).unwrapped
     env.reset(seed=0)
     slots = [env.repertoire.slots[env.library[name].id] for name in CYCLE]
     simulation, model = env.simulation, env.model
@@ -129,7 +129,9 @@ def threads() -> Row:
 
     What two threads can gain at that moment is measured by hashing, which needs no Python either.
     """
-    vectors = {n: gym.make_vec(ID, num_envs=8, n_threads=n, max_steps=10**6) for n in (1, 2)}
+    vectors = {
+        n: gym.make_vec(ID, num_envs=8, n_threads=n, max_episode_steps=10**6) for n in (1, 2)
+    }
     infos = {n: vector.reset(seed=1)[1] for n, vector in vectors.items()}
     pools = {n: ThreadPoolExecutor(n) for n in vectors}
     work = [bytes(10**7)] * 8

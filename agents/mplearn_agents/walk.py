@@ -183,7 +183,7 @@ def walk(
         steps=tuple(done),
         postures=np.array(postures),
         step_of=np.array(step_of, dtype=np.int64),
-        rate_hz=float(base.frame_rate_hz) if record else 0.0,
+        rate_hz=float(base.pictures.frame_rate_hz) if record else 0.0,
         episodes=n_ended,
         successes=sum(outcomes) if len(outcomes) == n_ended else None,
     )

@@ -9,9 +9,11 @@ from gymnasium.envs.registration import register
 register(
     id="mplearn/PrimitiveHumanoid-v0",
     entry_point="mplearn_envs.environment.primitive_humanoid:PrimitiveHumanoidEnv",
+    max_episode_steps=100,
     vector_entry_point="mplearn_envs.environment.vector:PrimitiveHumanoidVectorEnv",
 )
 register(
     id="mplearn/OnlinePrimitiveHumanoid-v0",
     entry_point="mplearn_envs.environment.online:OnlinePrimitiveHumanoidEnv",
+    max_episode_steps=100,
 )

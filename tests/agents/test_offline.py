@@ -9,6 +9,8 @@ from mplearn.errors import InvalidValueError
 from mplearn_agents.cli import main
 from mplearn_agents.policies import RandomWalk
 from mplearn_agents.rl.offline import export_episodes
+from mplearn_envs.environment.options import ActionOptions
+from mplearn_envs.tasks import GoalTask
 
 minari = pytest.importorskip("minari")
 pytest.importorskip("h5py")
@@ -58,9 +60,26 @@ def test_what_comes_back_is_what_happened(library, tmp_path, monkeypatch):
     again.close()
 
 
+def test_the_environment_is_recovered_without_the_file_that_it_came_from(tmp_path, monkeypatch):
+    path = standing_library().save(tmp_path / "gone.mplearn")
+    env = gymnasium.make(
+        "mplearn/PrimitiveHumanoid-v0",
+        library=path,
+        task=GoalTask(deadline_s=20.0),
+        dynamics="kinematic",
+        actions=ActionOptions(capacity=48),
+    )
+    export_episodes(env, RandomWalk(), 1, "mplearn/x-v0", tmp_path)
+    path.unlink()
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    again = minari.load_dataset("mplearn/x-v0").recover_environment().unwrapped
+    assert again.library.version == standing_library().version
+    assert again.task == GoalTask(deadline_s=20.0) and again.actions.capacity == 48
+
+
 def test_what_cannot_be_stored_is_said(library, tmp_path):
-    env = make(standing_library())
-    with pytest.raises(InvalidValueError, match="names and files instead of objects"):
+    env = make(standing_library)  # a function: it may return another one each time
+    with pytest.raises(InvalidValueError, match="a library that is not live"):
         export_episodes(env, RandomWalk(), 1, "mplearn/x-v0", tmp_path)
     env.close()
     env = make(str(library))

@@ -153,7 +153,9 @@ def test_a_grown_agent_does_what_it_did(folder, config, agent, task):
     if task != "goal":  # an untrained one will do
         start = train(replace(config, task=task, steps=1, round_steps=1), folder / task)
     larger = replace(
-        start.config, library=str(folder / "grown.mplearn"), environment={"capacity": 40}
+        start.config,
+        library=str(folder / "grown.mplearn"),
+        environment={"actions": {"capacity": 40}},
     )
     small, large = make_environment(start.config), make_environment(larger)
     reversed_slots = dict(zip(start.slots, reversed(start.slots.values()), strict=True))

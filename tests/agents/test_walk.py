@@ -138,7 +138,7 @@ def test_goals_that_cannot_be_are_said(humanoid, library):
     weak = gymnasium.make(
         "mplearn/PrimitiveHumanoid-v0",
         library=library,
-        feasibility=FeasibilityConfig(torque_share=0.01),
+        motion={"feasibility": FeasibilityConfig(torque_share=0.01)},
         disable_env_checker=True,
     )
     with pytest.raises(RobotError, match=r"cannot perform the goal 'SQD'.*torque"):

@@ -54,9 +54,9 @@ def test_ours_passes():
     report = check_action_mask(make(), steps=60, illegal_share=0.2)
     assert report.illegal_tried > 3 and report.prior and report.flagged and 0 < report.legal < 1
     assert report.refused == 0
-    assert check_action_mask(make(illegal="raise"), illegal_share=0.3).refused > 3
+    assert check_action_mask(make(actions={"illegal": "raise"}), illegal_share=0.3).refused > 3
     assert check_action_mask(make(flat=True, task="follow")).prior
-    assert check_action_mask(make(novel_penalty=1.0)).legal > 0.3
+    assert check_action_mask(make(actions={"novel_penalty": 1.0})).legal > 0.3
 
 
 def test_other_conventions_pass():

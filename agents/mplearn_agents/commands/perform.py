@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> None:
         library=args.library or trained.library,
         task=args.task or trained.task,
         dynamics=args.dynamics,
-        speed=args.speed,
+        motion={"speed": args.speed},
         robot=make_robot(args.robot),
         disable_env_checker=True,
     )

@@ -52,7 +52,9 @@ def perform(library: PrimitiveLibrary, steps: int, seed: int) -> tuple[WalkResul
     import mplearn_envs  # noqa: F401  (registers the environment)
 
     env = gymnasium.make(
-        "mplearn/PrimitiveHumanoid-v0", library=library, frame_rate_hz=_FILM_HZ / PLAYBACK
+        "mplearn/PrimitiveHumanoid-v0",
+        library=library,
+        pictures={"frame_rate_hz": _FILM_HZ / PLAYBACK},
     )
     result = walk(env, RandomWalk(), steps, seed, record=True)
     robot: Robot = env.unwrapped.robot  # type: ignore[attr-defined]

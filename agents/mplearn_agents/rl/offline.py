@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, SupportsFloat
 import gymnasium
 
 from mplearn.errors import InvalidValueError
+from mplearn.library import PrimitiveLibrary
 from mplearn_agents.episodes import Episode, play
 from mplearn_agents.extras import require
 from mplearn_agents.policies import Policy
+from mplearn_envs.environment.plain import to_plain
 
 if TYPE_CHECKING:
     import minari
@@ -36,8 +38,8 @@ def export_episodes(
     them; of the infos those of `KEPT`.
 
     Args:
-        env: An environment that `gymnasium.make` made; its arguments are stored with the data, so
-            its library must be the built-in one or a file.
+        env: An environment that `gymnasium.make` made, of a library that is not live; its arguments
+            are stored with the data, the library's content included.
         policy: Who chooses.
         episodes: How many.
         dataset: Id of the data set, like "mplearn/goal-random-v0".
@@ -58,13 +60,17 @@ def export_episodes(
     from minari.data_collector import EpisodeBuffer
 
     try:
-        if env.spec is None:
+        spec = env.spec
+        if spec is None:
             raise ValueError("it has no spec")
-        env.spec.to_json()
+        if isinstance(spec.kwargs.get("library"), str):  # which may be gone by then
+            library = PrimitiveLibrary.load(spec.kwargs["library"])
+            spec.kwargs = spec.kwargs | {"library": to_plain(library)}
+        spec.to_json()
     except (TypeError, ValueError, AttributeError) as error:
         raise InvalidValueError(
             "the environment's arguments are stored with the data set: make it by gymnasium.make, "
-            f"with names and files instead of objects ({error})"
+            f"with a library that is not live, and tasks that are dataclasses ({error})"
         ) from error
     recorder = _Recorder(env)
     played = play(recorder, policy, episodes, seed)
@@ -74,7 +80,7 @@ def export_episodes(
             written = minari.create_dataset_from_buffers(
                 dataset_id=dataset,
                 buffer=[EpisodeBuffer(**each) for each in recorder.episodes],
-                env=env.spec,
+                env=spec,
                 observation_space=env.observation_space,
                 action_space=env.action_space,
                 algorithm_name=type(policy).__name__,

@@ -25,7 +25,6 @@ class Episode(NamedTuple):
         current: Id of the primitive performed last; None at the start and after a dead end.
         history: Ids of the primitives performed, the latest last, at most 100.
         time_s: Time since the start [s].
-        n_steps: Number of macro steps.
         running: Whether it goes on.
     """
 
@@ -34,7 +33,6 @@ class Episode(NamedTuple):
     current: int | None = None
     history: tuple[int, ...] = ()
     time_s: float = 0.0
-    n_steps: int = 0
     running: bool = True
 
     def after(
@@ -61,8 +59,7 @@ class Episode(NamedTuple):
         if gone or (chosen is None and self.choices.dead_end):
             current = None
         choices = repertoire.entries(reference) if current is None else repertoire.after(current)
-        time_s, n_steps = self.time_s + duration_s, self.n_steps + 1
-        return Episode(measured, choices, current, history, time_s, n_steps)
+        return Episode(measured, choices, current, history, self.time_s + duration_s)
 
 
 class EpisodeState(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any, Literal, SupportsFloat
+from typing import Any, Literal, SupportsFloat, get_args
 
 import gymnasium
 import mujoco
@@ -15,24 +15,28 @@ from numpy.typing import NDArray
 
 from mplearn.errors import InvalidValueError
 from mplearn.library import PrimitiveLibrary
+from mplearn_envs.data.library_source import LibrarySource
 from mplearn_envs.execution.modes import Dynamics, make_performer
 from mplearn_envs.execution.performer import Performer
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.rendering.screen import RENDER_MODES, Screen
+from mplearn_envs.robot import Robot, humanoid, make_robot
 from mplearn_envs.skills.action_choices import HOLD
-from mplearn_envs.skills.repertoire import Repertoire
-from mplearn_envs.tasks import Choice, Scene, Task
+from mplearn_envs.skills.repertoire import Repertoire, shared_repertoire
+from mplearn_envs.tasks import Choice, Scene, Task, make_task
 
 from .episode import Episode, EpisodeState
 from .observation import Observation, ObservationBuilder
+from .options import ActionOptions, MotionOptions, PictureOptions, require_number, require_one_of
+from .plain import PlainSpec, from_plain
 from .rewards import add, earned_meanwhile
 
 
-class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
+class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
     """Chooses and performs primitives of a repertoire, and rewards it by a task.
 
     See `PrimitiveHumanoidEnv` for the meaning of everything. An environment derived from this one
-    builds the parts, and may override `_begin` and `_meanwhile`.
+    says where its library comes from, and may override `_begin` and `_meanwhile`.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 (gymnasium declares it so)
@@ -40,41 +44,62 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
         "render_fps": 25,
     }
 
-    repertoire: Repertoire
-    task: Task
-    dynamics: Dynamics
-    hold_s: float
-    max_steps: int
-    discount: float
-    illegal: Literal["hold", "raise"]
-    illegal_penalty: float
-    novel_penalty: float | None
-    frame_rate_hz: float
-
-    def _set_up(self, flat: bool, screen: Screen) -> None:
-        """Complete the construction, once all parts are there."""
-        repertoire = self.repertoire
-        self.capacity = repertoire.capacity
+    def __init__(
+        self,
+        source: LibrarySource,
+        robot: Robot | str | None,
+        task: Task | str | Mapping[str, Any],
+        dynamics: Dynamics,
+        discount: float,
+        flat: bool,
+        motion: MotionOptions | Mapping[str, Any] | None,
+        actions: ActionOptions | Mapping[str, Any] | None,
+        pictures: PictureOptions | Mapping[str, Any] | None,
+        render_mode: Literal["human", "rgb_array"] | None,
+    ) -> None:
+        require_one_of("dynamics", dynamics, get_args(Dynamics))
+        require_one_of("flat", flat, (False, True))
+        require_one_of("render_mode", render_mode, (None, *RENDER_MODES))
+        require_number("discount", discount, 1e-9, 1.0, "in (0, 1]")
+        self.source = source
+        self.robot = make_robot(from_plain(robot)) if robot is not None else humanoid()
+        self.task = make_task(from_plain(task))
+        self.dynamics: Dynamics = dynamics
+        self.discount = discount
+        self.motion = MotionOptions.of(from_plain(motion), "motion")
+        self.actions = ActionOptions.of(from_plain(actions), "actions")
+        self.pictures = PictureOptions.of(from_plain(pictures), "pictures")
+        self.repertoire = self._made_repertoire()
+        self.capacity = self.repertoire.capacity
         self.action_space = spaces.Discrete(self.capacity)
-        n_joints = len(repertoire.robot.joint_names)
         self._builder = ObservationBuilder(
-            n_joints, self.capacity, self.task.space(repertoire), flat
+            len(self.robot.joint_names), self.capacity, self.task.space(self.repertoire), flat
         )
         self.observation_space = self._builder.space
-        self._screen = screen
-        self.render_mode = screen.mode
+        self._screen = Screen(
+            render_mode, self.pictures.width, self.pictures.height, self.pictures.draw_balance
+        )
+        self.render_mode = render_mode
         self.frame_callback: Callable[[], object] | None = None
         self._episode: Episode | None = None
+
+    def _made_repertoire(self) -> Repertoire:
+        library, motion = self.source.now(), self.motion
+        what = (self.actions.capacity, motion.speed, motion.style, motion.feasibility)
+        novel = self.actions.novel_penalty is not None
+        if self.source.live:
+            return Repertoire(library, self.robot, *what, novel=novel, growing=True)
+        return shared_repertoire(library, self.robot, *what, novel)
 
     @cached_property
     def performer(self) -> Performer:
         """Who performs; made when it is first needed."""
-        return make_performer(self.dynamics, self.repertoire, self.hold_s)
+        return make_performer(self.dynamics, self.repertoire, self.actions.hold_s)
 
     @cached_property
     def _frame_steps(self) -> int:
         period_s = self.repertoire.skills.planner.config.period_s
-        return max(1, round(1.0 / (self.frame_rate_hz * period_s)))
+        return max(1, round(1.0 / (self.pictures.frame_rate_hz * period_s)))
 
     # ---- what derived environments do besides
 
@@ -126,9 +151,9 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
         probability = float(before.choices.prior[slot])
         terms = self.task.bonuses(Choice(chosen, legal, probability, before.history))
         if not legal:
-            terms["illegal"] = -self.illegal_penalty
+            terms["illegal"] = -self.actions.illegal_penalty
         if novel:
-            terms["novel"] = -(self.novel_penalty or 0.0)
+            terms["novel"] = -(self.actions.novel_penalty or 0.0)
         watched = self.frame_callback is not None or self.render_mode == "human"
         outcome = self.performer.perform(
             chosen, self._frame if watched else None, self._frame_steps
@@ -152,8 +177,7 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
         info["novel"] = novel
         info["fallen"] = report.fallen
         info.update(outcome.figures)
-        truncated = episode.n_steps >= self.max_steps
-        return self._observation(), sum(terms.values()), terminated, truncated, info
+        return self._observation(), sum(terms.values()), terminated, False, info
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return which actions are legal, shape (capacity,): the convention of sb3-contrib."""
@@ -238,7 +262,7 @@ class MacroStepEnv(gymnasium.Env[Observation, np.int64]):
                 f"an action is an integer in [0, {self.capacity}), not {action!r}"
             )
         slot = int(value)
-        if self.illegal == "raise" and not mask[slot]:
+        if self.actions.illegal == "raise" and not mask[slot]:
             allowed = np.flatnonzero(mask).tolist()
             raise InvalidValueError(f"action {slot} is illegal here; legal are {allowed}")
         return slot

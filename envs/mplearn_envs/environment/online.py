@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 from mplearn.errors import InvalidValueError
 from mplearn.learner import (
@@ -16,16 +17,21 @@ from mplearn.learner import (
     TransitionSeen,
 )
 from mplearn.learner.events import Event
-from mplearn_envs.tasks import FollowTask
+from mplearn_envs.data.library_source import LibrarySource
+from mplearn_envs.execution.modes import Dynamics
+from mplearn_envs.robot import Robot
+from mplearn_envs.tasks import FollowTask, Task
 
 from .episode import EpisodeState
 from .live_demonstrator import DemonstratorLike, open_demonstrator
-from .primitive_humanoid import PrimitiveHumanoidEnv
+from .macro_step import MacroStepEnv
+from .options import ActionOptions, MotionOptions, PictureOptions, require_number
+from .plain import from_plain
 
 CAPACITY = 64
 
 
-class OnlinePrimitiveHumanoidEnv(PrimitiveHumanoidEnv):
+class OnlinePrimitiveHumanoidEnv(MacroStepEnv):
     """A humanoid that performs what a demonstrator, who is still moving, has shown so far.
 
     While the robot performs for ``info["duration_s"]``, the demonstrator moves on for the same
@@ -34,8 +40,8 @@ class OnlinePrimitiveHumanoidEnv(PrimitiveHumanoidEnv):
     primitive that turns out to be another, or several, leaves its slot. Before there is any, only
     hold is legal.
 
-    Actions, observations, rewards and all other arguments are those of `PrimitiveHumanoidEnv`;
-    ``capacity`` is 64 unless given. When there are more primitives, the newest have no slot.
+    Actions, observations and rewards are those of `PrimitiveHumanoidEnv`. When there are more
+    primitives than slots, the newest have none.
 
     ## Info
 
@@ -54,36 +60,56 @@ class OnlinePrimitiveHumanoidEnv(PrimitiveHumanoidEnv):
         learner: How to learn; None is the default. Channels and rate are the demonstrator's.
         warm_up_s: Time watched before the first action [s].
         carry_over: Whether what was learned outlives the episode.
-        **options: See `PrimitiveHumanoidEnv`.
+        robot: See `PrimitiveHumanoidEnv`, as for all that follow.
+        task: Any but "follow", whose demonstrator is another.
+        dynamics: See there.
+        discount: See there.
+        flat: See there.
+        motion: See there.
+        actions: See there; the capacity is 64 unless given.
+        pictures: See there.
+        render_mode: See there.
+        library: Must be None: it is learned.
 
     Raises:
-        InvalidValueError: An option is wrong; or a library is given, or the task "follow", whose
-            demonstrator is another.
+        InvalidValueError: An option is wrong, a library is given, or the task is "follow".
     """
 
     def __init__(
         self,
-        demonstrator: DemonstratorLike = "synthetic",
+        demonstrator: DemonstratorLike | Mapping[str, Any] = "synthetic",
         *,
-        learner: LearnerConfig | None = None,
+        learner: LearnerConfig | Mapping[str, Any] | None = None,
         warm_up_s: float = 60.0,
         carry_over: bool = False,
-        **options: Any,
+        robot: Robot | str | None = None,
+        task: str | Task | Mapping[str, Any] = "free",
+        dynamics: Dynamics = "simulated",
+        discount: float = 0.95,
+        flat: bool = False,
+        motion: MotionOptions | Mapping[str, Any] | None = None,
+        actions: ActionOptions | Mapping[str, Any] | None = None,
+        pictures: PictureOptions | Mapping[str, Any] | None = None,
+        render_mode: Literal["human", "rgb_array"] | None = None,
+        library: None = None,
     ) -> None:
-        if "library" in options:
+        if library is not None:
             raise InvalidValueError("an online environment learns its library: give none")
-        if not 0.0 <= warm_up_s <= 1e6:
-            raise InvalidValueError(f"warm_up_s must lie in [0, 1e6] s, not {warm_up_s}")
-        self.demonstrator = open_demonstrator(demonstrator)
-        config = learner or LearnerConfig(self.demonstrator.channels, self.demonstrator.rate_hz)
-        self.learner_config = replace(
-            config, channels=self.demonstrator.channels, rate_hz=self.demonstrator.rate_hz
-        )
+        require_number("warm_up_s", warm_up_s, 0.0, 1e6, "in [0, 1e6] s")
+        self.demonstrator = open_demonstrator(from_plain(demonstrator))
+        channels, rate_hz = self.demonstrator.channels, self.demonstrator.rate_hz
+        config = from_plain(learner) or LearnerConfig(channels, rate_hz)
+        self.learner_config = replace(config, channels=channels, rate_hz=rate_hz)
         self.warm_up_s = warm_up_s
         self.carry_over = carry_over
         self.learner = MotionLearner(self.learner_config)
-        options = {"capacity": CAPACITY} | options
-        super().__init__(self.learner, **options)
+        actions = ActionOptions.of(from_plain(actions), "actions")
+        if actions.capacity is None:
+            actions = replace(actions, capacity=CAPACITY)
+        source = LibrarySource(self.learner)
+        super().__init__(
+            source, robot, task, dynamics, discount, flat, motion, actions, pictures, render_mode
+        )
         if isinstance(self.task, FollowTask):
             raise InvalidValueError(
                 "the task 'follow' draws a demonstrator of its own from a library that is known: "

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
-from mplearn.generation import StyleName
 from mplearn_envs.data.library_source import LibrarySource, Source
 from mplearn_envs.execution.modes import Dynamics
-from mplearn_envs.rendering.screen import Screen
-from mplearn_envs.robot import Robot, humanoid
-from mplearn_envs.skills.feasibility import FeasibilityConfig
-from mplearn_envs.skills.repertoire import Repertoire, shared_repertoire
-from mplearn_envs.tasks import Task, make_task
+from mplearn_envs.robot import Robot
+from mplearn_envs.tasks import Task
 
 from .macro_step import MacroStepEnv
-from .options import require_options
+from .options import ActionOptions, MotionOptions, PictureOptions
+from .plain import from_plain
 
 
 class PrimitiveHumanoidEnv(MacroStepEnv):
@@ -88,7 +86,8 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
     ## Start, end
 
     An episode starts upright at rest, arms hanging, always the same but for the task. It terminates
-    when the robot falls or the task is done, and is truncated after ``max_steps`` macro steps.
+    when the robot falls or the task is done. ``gym.make`` truncates it after 100 macro steps, or
+    ``max_episode_steps``.
 
     ## Fidelity
 
@@ -118,25 +117,21 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
     Args:
         library: A `PrimitiveLibrary` or its file; None is the built-in one. Or what is live: a
             `MotionLearner`, or a function that returns a library.
-        robot: The robot; None is the humanoid.
+        robot: The robot, or its name; None is the humanoid.
         task: A `Task` or its name: "free", "goal", "follow" or "recite".
         dynamics: "simulated" or "kinematic".
-        capacity: Number of actions; None is the next power of two that fits, at least 32.
-        speed: Speed of performance as a share of the human's. The paper's robot moved at 0.5.
-        style: How motions are generated from primitives, see `mplearn.generation`.
-        max_steps: Macro steps until truncation.
-        hold_s: Duration of holding [s].
         discount: Discount per second.
-        illegal: What an illegal action does: "hold" or "raise".
-        illegal_penalty: Price of an illegal action.
-        novel_penalty: Price of a transition that was never observed; None makes it illegal.
-        feasibility: What the robot is allowed; None is the default.
         flat: Whether observations are flat arrays.
+        motion: How primitives are performed (speed, style, feasibility): `MotionOptions`, or a
+            mapping of some of them.
+        actions: What actions there are, and what they cost (capacity, holding, illegal and novel
+            ones): `ActionOptions`, or a mapping of some of them.
+        pictures: How pictures are drawn (size, balance, rate): `PictureOptions`, or a mapping of
+            some of them.
         render_mode: None, "rgb_array" or "human".
-        width: Width of pictures [pixels].
-        height: Height of pictures [pixels].
-        draw_balance: Whether support polygon, COG and ZMP are drawn on the floor of pictures.
-        frame_rate_hz: How often ``frame_callback`` is called [1/s of simulated time].
+
+    All of these but what is live are kept in ``env.spec``, objects too, as JSON holds them:
+    ``gym.make(EnvSpec.from_json(env.spec.to_json()))`` makes the same environment.
 
     Attributes:
         repertoire: What the robot can perform, in which slots, and what may follow what.
@@ -155,57 +150,25 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
 
     def __init__(
         self,
-        library: Source = None,
+        library: Source | Mapping[str, Any] = None,
         *,
-        robot: Robot | None = None,
-        task: str | Task = "free",
+        robot: Robot | str | None = None,
+        task: str | Task | Mapping[str, Any] = "free",
         dynamics: Dynamics = "simulated",
-        capacity: int | None = None,
-        speed: float = 0.5,
-        style: StyleName = "deterministic",
-        max_steps: int = 100,
-        hold_s: float = 0.5,
         discount: float = 0.95,
-        illegal: Literal["hold", "raise"] = "hold",
-        illegal_penalty: float = 1.0,
-        novel_penalty: float | None = None,
-        feasibility: FeasibilityConfig | None = None,
         flat: bool = False,
+        motion: MotionOptions | Mapping[str, Any] | None = None,
+        actions: ActionOptions | Mapping[str, Any] | None = None,
+        pictures: PictureOptions | Mapping[str, Any] | None = None,
         render_mode: Literal["human", "rgb_array"] | None = None,
-        width: int = 640,
-        height: int = 480,
-        draw_balance: bool = False,
-        frame_rate_hz: float = 25.0,
     ) -> None:
-        require_options(locals())
-        self.source = LibrarySource(library)
-        self.robot = robot or humanoid()
-        self.task = make_task(task)
-        self.dynamics = dynamics
-        self.speed = speed
-        self.style = style
-        self.max_steps = max_steps
-        self.hold_s = hold_s
-        self.discount = discount
-        self.illegal = illegal
-        self.illegal_penalty = illegal_penalty
-        self.novel_penalty = novel_penalty
-        self.feasibility = feasibility
-        self.flat = flat
-        self.draw_balance = draw_balance
-        self.frame_rate_hz = frame_rate_hz
-        self.repertoire = self._repertoire(capacity)
-        self._set_up(flat, Screen(render_mode, width, height, draw_balance))
+        source = LibrarySource(from_plain(library))
+        super().__init__(
+            source, robot, task, dynamics, discount, flat, motion, actions, pictures, render_mode
+        )
 
     def _begin(self) -> None:
         if self.source.live:
             library = self.source.now()
             self.repertoire.require_room(len(library))
             self.repertoire.update(library)
-
-    def _repertoire(self, capacity: int | None) -> Repertoire:
-        library, novel = self.source.now(), self.novel_penalty is not None
-        what = (capacity, self.speed, self.style, self.feasibility)
-        if self.source.live:
-            return Repertoire(library, self.robot, *what, novel=novel, growing=True)
-        return shared_repertoire(library, self.robot, *what, novel)

@@ -11,14 +11,16 @@ from typing import Any, cast
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers import TimeLimit
 from numpy.typing import NDArray
 
 from mplearn.errors import InvalidValueError
 
+from .plain import PlainSpec
 from .primitive_humanoid import PrimitiveHumanoidEnv
 
 
-class PrimitiveHumanoidVectorEnv(SyncVectorEnv):
+class PrimitiveHumanoidVectorEnv(PlainSpec, SyncVectorEnv):
     """Environments that are stepped in threads; results are those of single ones, bit for bit.
 
     While a robot is simulated, MuJoCo leaves Python to the other threads. What is known of the
@@ -30,7 +32,7 @@ class PrimitiveHumanoidVectorEnv(SyncVectorEnv):
         num_envs: Number of environments.
         n_threads: Number of threads; None is the number of processors that may be used.
         autoreset_mode: When an episode that is over begins anew, see gymnasium.
-        max_episode_steps: Another name of ``max_steps``.
+        max_episode_steps: Macro steps after which an episode is truncated; None: never.
         **options: Of each environment, see `PrimitiveHumanoidEnv`. Each gets a copy of a task
             object.
     """
@@ -44,15 +46,19 @@ class PrimitiveHumanoidVectorEnv(SyncVectorEnv):
         max_episode_steps: int | None = None,
         **options: Any,
     ) -> None:
-        for name, value in (("num_envs", num_envs), ("n_threads", n_threads)):
+        for name, value in (
+            ("num_envs", num_envs),
+            ("n_threads", n_threads),
+            ("max_episode_steps", max_episode_steps),
+        ):
             if value is not None and (not isinstance(value, int) or value < 1):
                 raise InvalidValueError(f"{name} must be an integer from 1, not {value!r}")
-        if max_episode_steps is not None:
-            options["max_steps"] = max_episode_steps
         self.options = options
         self.n_threads = n_threads or _n_processors()
         self._pool: ThreadPoolExecutor | None = None
-        super().__init__([_maker(options)] * num_envs, autoreset_mode=autoreset_mode)
+        super().__init__(
+            [_maker(options, max_episode_steps)] * num_envs, autoreset_mode=autoreset_mode
+        )
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Step all environments at a time; see `gymnasium.vector.SyncVectorEnv.step`."""
@@ -94,7 +100,7 @@ class _Begun(gymnasium.Wrapper[Any, Any, Any, Any]):
         env = cast(PrimitiveHumanoidEnv, self.unwrapped)
         known = self.action_space.contains(action)
         id = env.repertoire.primitive(int(action)) if known else None
-        return env.hold_s if id is None else env.repertoire.skills.duration_s(id)
+        return env.actions.hold_s if id is None else env.repertoire.skills.duration_s(id)
 
     def begin(self, pool: ThreadPoolExecutor, action: np.int64) -> Future[Any]:
         """Begin the step that `step` will be asked for."""
@@ -109,10 +115,15 @@ class _Begun(gymnasium.Wrapper[Any, Any, Any, Any]):
         return result.result()
 
 
-def _maker(options: dict[str, Any]) -> Callable[[], gymnasium.Env[Any, Any]]:
+def _maker(
+    options: dict[str, Any], max_episode_steps: int | None
+) -> Callable[[], gymnasium.Env[Any, Any]]:
     def make() -> gymnasium.Env[Any, Any]:
         own = {"task": copy.deepcopy(options["task"])} if "task" in options else {}
-        return _Begun(PrimitiveHumanoidEnv(**(options | own)))
+        env: gymnasium.Env[Any, Any] = PrimitiveHumanoidEnv(**(options | own))
+        if max_episode_steps is not None:
+            env = TimeLimit(env, max_episode_steps)
+        return _Begun(env)
 
     return make
 

@@ -13,13 +13,15 @@ from .unitree import unitree_g1
 ROBOTS: dict[str, Callable[[], Robot]] = {"humanoid": humanoid, "unitree_g1": unitree_g1}
 
 
-def make_robot(name: str) -> Robot:
-    """Return a robot by name.
+def make_robot(robot: str | Robot) -> Robot:
+    """Return a robot by its name, or the robot itself.
 
     Raises:
         InvalidValueError: There is none of that name.
         MissingDependencyError: Its model is not installed.
     """
-    if name not in ROBOTS:
-        raise InvalidValueError(f"robot must be one of {tuple(ROBOTS)}, not {name!r}")
-    return ROBOTS[name]()
+    if isinstance(robot, Robot):
+        return robot
+    if not isinstance(robot, str) or robot not in ROBOTS:
+        raise InvalidValueError(f"robot must be one of {tuple(ROBOTS)} or a Robot, not {robot!r}")
+    return ROBOTS[robot]()

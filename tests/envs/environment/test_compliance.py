@@ -149,7 +149,7 @@ def test_a_trained_policy_does_nothing_illegal():
     from stable_baselines3.common.vec_env import DummyVecEnv
 
     def make_flat():
-        return make(dynamics="kinematic", flat=True, task="goal", max_steps=20)
+        return make(dynamics="kinematic", flat=True, task="goal", max_episode_steps=20)
 
     vector = DummyVecEnv([make_flat] * 40)
     assert is_masking_supported(vector)

@@ -62,7 +62,7 @@ def test_returned_arrays_are_fresh():
 
 
 def test_frames_can_be_taken_within_a_step():
-    env = make(frame_rate_hz=25.0).unwrapped
+    env = make(pictures={"frame_rate_hz": 25.0}).unwrapped
     env.reset()
     heads = []
     env.frame_callback = lambda: heads.append(env.simulation.data.body("head").xpos[2])

@@ -125,7 +125,7 @@ def test_what_was_learned_can_be_carried_over():
 
 
 def test_too_many_primitives_have_no_slot():
-    env = make(capacity=3, warm_up_s=50.0)
+    env = make(actions={"capacity": 3}, warm_up_s=50.0)
     _, info = env.reset(seed=0)
     report = info["learner"]
     assert report["n_primitives"] - len(report["without_slot"]) == 2
@@ -147,7 +147,7 @@ def test_it_complies():
         ({"warm_up_s": np.nan}, "warm_up_s"),
         ({"library": standing_library()}, "learns its library"),
         ({"task": "follow"}, "follow"),
-        ({"capacity": 1}, "capacity"),
+        ({"actions": {"capacity": 1}}, "capacity"),
     ],
 )
 def test_bad_options_are_refused(options, message):
@@ -189,7 +189,7 @@ def learner_after(rounds):
 
 def test_a_live_environment_takes_a_snapshot_at_each_reset():
     learner = MotionLearner(LearnerConfig(humanoid().channels, RATE_HZ))
-    env = gymnasium.make(GIVEN, library=learner, dynamics="kinematic", capacity=32)
+    env = gymnasium.make(GIVEN, library=learner, dynamics="kinematic", actions={"capacity": 32})
     _, info = env.reset(seed=0)
     assert info["action_mask"].sum() == 1 and info["dead_end"]
     assert not env.step(0)[4]["illegal"]
@@ -209,7 +209,11 @@ def test_a_live_environment_takes_a_snapshot_at_each_reset():
 def test_a_function_may_give_the_library():
     shelves = [standing_library(("squat", "rise")), standing_library(("squat", "rise", "wave"))]
     env = gymnasium.make(
-        GIVEN, library=lambda: shelves[0], task=FreeTask(), capacity=4, dynamics="kinematic"
+        GIVEN,
+        library=lambda: shelves[0],
+        task=FreeTask(),
+        actions={"capacity": 4},
+        dynamics="kinematic",
     )
     env.reset()
     assert set(env.unwrapped.repertoire.slots.values()) == {1, 2}

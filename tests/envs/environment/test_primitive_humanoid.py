@@ -66,14 +66,14 @@ def test_where_nothing_starts_near_the_nearest_is_legal():
 
 
 def test_a_random_walk_goes_on_and_on():
-    env = make(max_steps=1000)
+    env = make(max_episode_steps=1000)
     seen = walk(env, 120, 3)
     performed = {action for action, *_ in seen}
     assert performed == {0, *(SLOT[m[0]] for m in MOTIONS if m[0] != "jump")}
 
 
 def test_slots_are_stable_and_free_ones_illegal():
-    small, large = make(("arms up", "arms down")), make(capacity=64)
+    small, large = make(("arms up", "arms down")), make(actions={"capacity": 64})
     assert small.action_space.n == 32 and large.action_space.n == 64
     assert small.unwrapped.repertoire.primitive(1) == large.unwrapped.repertoire.primitive(1)
     _, info = large.reset()
@@ -82,7 +82,7 @@ def test_slots_are_stable_and_free_ones_illegal():
 
 
 def test_an_illegal_action_holds_and_costs():
-    env = make(illegal_penalty=3.0)
+    env = make(actions={"illegal_penalty": 3.0})
     env.reset()
     observation, reward, terminated, _, info = env.step(SLOT["jump"])
     assert info["illegal"] and not terminated
@@ -90,7 +90,7 @@ def test_an_illegal_action_holds_and_costs():
     assert reward == pytest.approx(sum(info["reward_terms"].values()))
     assert observation["current_primitive"] == 0
     assert info["duration_s"] == pytest.approx(0.5, abs=0.02)
-    strict = make(illegal="raise")
+    strict = make(actions={"illegal": "raise"})
     strict.reset()
     with pytest.raises(InvalidValueError, match="illegal here; legal are"):
         strict.step(31)
@@ -102,7 +102,7 @@ def test_an_illegal_action_holds_and_costs():
 def test_a_macro_step_lasts_as_long_as_the_primitive():
     durations = {}
     for speed in (0.5, 1.0):
-        env = make(speed=speed)
+        env = make(motion={"speed": speed})
         env.reset()
         *_, info = env.step(SLOT["squat"])
         durations[speed] = info["duration_s"]
@@ -142,7 +142,7 @@ def test_users_bring_their_own_task():
 
 
 def test_truncation_and_stepping_on():
-    env = make(max_steps=2)
+    env = make(max_episode_steps=2)
     env.reset()
     assert not env.step(0)[3] and env.step(0)[3]
     with pytest.raises(InvalidValueError, match="call reset"):

@@ -12,7 +12,7 @@ from mplearn_envs.environment.vector import PrimitiveHumanoidVectorEnv
 from mplearn_envs.tasks import GoalTask
 
 ID = "mplearn/PrimitiveHumanoid-v0"
-OPTIONS = {"max_steps": 4}
+OPTIONS = {"max_episode_steps": 4}
 
 
 def make(n, **options):
@@ -73,7 +73,7 @@ def test_there_are_as_many_threads_as_processors_that_may_be_used(monkeypatch):
 
 
 def test_an_error_in_a_thread_is_raised():
-    vector = make(2, dynamics="kinematic", illegal="raise")
+    vector = make(2, dynamics="kinematic", actions={"illegal": "raise"})
     vector.reset()
     with pytest.raises(InvalidValueError, match="illegal here"):
         vector.step(np.array([0, 31]))

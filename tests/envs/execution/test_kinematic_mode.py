@@ -93,7 +93,7 @@ def test_memory_is_bounded(monkeypatch):
 def test_environments_of_one_library_share_what_they_know():
     first, second = make("kinematic").unwrapped, make("simulated").unwrapped
     assert first.repertoire is second.repertoire
-    assert make("kinematic", speed=0.4).unwrapped.repertoire is not first.repertoire
+    assert make("kinematic", motion={"speed": 0.4}).unwrapped.repertoire is not first.repertoire
     assert copy.deepcopy(first).repertoire is first.repertoire
     twin = pickle.loads(pickle.dumps(first))
     assert twin.repertoire is not first.repertoire
@@ -148,7 +148,7 @@ def test_kinematic_frames_are_smooth():
 
 
 def test_novel_transitions_are_legal_at_a_price():
-    env = make("simulated", novel_penalty=0.7, task=ReciteTask(request=("rise",)))
+    env = make("simulated", actions={"novel_penalty": 0.7}, task=ReciteTask(request=("rise",)))
     _, info = env.reset()
     feasible = {env.unwrapped.repertoire.slots[id] for id in env.unwrapped.repertoire.feasible_ids}
     assert set(np.flatnonzero(info["action_mask"]).tolist()) == {0, *feasible}

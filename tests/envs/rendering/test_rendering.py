@@ -20,7 +20,10 @@ ID = "mplearn/PrimitiveHumanoid-v0"
 def pictured(renderer):
     """An environment that can draw."""
     env = gymnasium.make(
-        ID, library=standing_library(), render_mode="rgb_array", width=160, height=120
+        ID,
+        library=standing_library(),
+        render_mode="rgb_array",
+        pictures={"width": 160, "height": 120},
     )
     env.reset(seed=0)
     env.render()  # the driver rounds the first picture of a new context differently

@@ -22,7 +22,7 @@ ALL = (
     "task", ALL, ids=lambda task: type(task).__name__ + getattr(task, "kind", "")
 )
 def test_observations_stay_within_bounds_and_are_fresh(task):
-    env = make(task, max_steps=30)
+    env = make(task, max_episode_steps=30)
     observation, info = env.reset(seed=1)
     rng = np.random.default_rng(0)
     for _ in range(60):
