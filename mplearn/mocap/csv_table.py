@@ -1,124 +1,361 @@
-"""CSV with a header of channel names, and, where there are any, times and labels.
+"""Tables with a header of column names: CSV, TSV and their like, from any tool.
 
-The first row names the columns; the separator is a comma, semicolon or tab. Special names are:
+The separator is a comma, semicolon, tab or white space; decimals have a point or a comma; an empty
+cell, ``NaN``, ``NA`` or ``null`` is a missing measurement. Special names, in any spelling, are:
 
-* ``time``, ``time_s`` or ``t``: seconds; without such a column `Hints.rate_hz` is needed;
+* ``time``, ``time_s``, ``t``, ``timestamp``, ``Time (ms)``, ...: when; without such a column
+  `Hints.rate_hz` is needed;
+* ``frame``, ``Frame#``, ``index``, ...: numbers of frames, which are no measurement;
 * ``label``: class of the motion; consecutive rows with the same one are a `LabelledSegment`, rows
   without one belong to none;
 * ``segment``: any text; where it changes a segment ends even if the label stays, so that
   repetitions can be told apart;
 * ``person``: who moves, the same in every row.
 
-All other columns are measurements, an empty cell is a missing one. Markers are three columns each,
-``NAME.x, NAME.y, NAME.z`` [m], z up; angles are radians.
+All other columns are measurements. Markers are three columns each, ``NAME.x, NAME.y, NAME.z`` or
+``NAME_x``, ``NAME X (mm)``, ``x_NAME``, ..., also below each other (names in one row, axes in the
+next), or a row for each point (``frame, landmark, x, y, z``): metres and z up, unless the person
+shows otherwise. Where most columns are markers, the others are left out. All other channels are
+radians and metres; those whose names say ``(deg)`` or ``(mm)`` are converted.
 """
 
 from __future__ import annotations
 
-import csv
 import itertools
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 
-from ..recording import IntArray, LabelledSegment, Recording
-from .clock import even_clock
-from .files import bad_file, read_text, stem
-from .numbers import numbers
+from ..errors import RecordingError
+from ..recording import FloatArray, IntArray, LabelledSegment, Recording, marker_channels
+from .clock import Clock, even_clock
+from .columns import MEDIAPIPE_POSE, Columns, angle_factor, meaning_of
+from .files import bad_file, head_text, read_text, stem
+from .findings import Findings
+from .names import chosen_names
+from .numbers import measured_rows
 from .options import option
 from .reader import Hints, Reader
-from .space import checked_markers, file_axes
+from .sheet import Header, Sheet, find_header, is_number
+from .size import named_unit
+from .space import Space, placed
 
-_TIMES = ("time", "time_s", "t")
-_TEXTS = ("label", "segment", "person")
+_MARKERS_SHARE = 0.5  # of the measured columns: from there on it is a table of markers
+_LEAST_MARKERS = 3  # that a .txt file must name to be taken for a table
+# steps between frames from which on times count less than seconds: 2 ms are 500 Hz
+_FINER = ((1e-3, "milliseconds", 2.0), (1e-6, "microseconds", 2e3), (1e-9, "nanoseconds", 2e6))
+_SAME_STEP = 0.01
+_TURN = 2 * np.pi
 
 
 class CSVReader(Reader):
-    """Reads CSV files with named columns; see the module's docstring for the format."""
+    """Reads tables with named columns; see the module's docstring for the format."""
 
     format = "CSV"
-    suffixes = (".csv",)
+    suffixes = (".csv", ".tsv", ".txt")
+
+    def accepts(self, path: Path) -> bool:
+        """Whether it is called a table, or is a text that begins like one of markers."""
+        if not path.name.lower().removesuffix(".gz").endswith(".txt"):
+            return True
+        try:
+            header = find_header(Sheet.of(path, head_text(path)))
+        except RecordingError:
+            return False
+        return len(meaning_of(header.names).markers) >= _LEAST_MARKERS
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read the table; see `Reader.read`."""
-        header, rows, places = _table(path)
-        special = {name: header.index(name) for name in (*_TIMES, *_TEXTS) if name in header}
-        for row, place in zip(rows, places, strict=True):
-            if len(row) != len(header):
-                raise bad_file(path, f"line {place} has {len(row)} columns", f"{len(header)}")
-        measured = [i for i in range(len(header)) if i not in special.values()]
-        if not measured or not rows:
-            raise bad_file(
-                path, f"{len(measured)} channels, {len(rows)} rows", "at least one of each"
+        findings = Findings(self.format)
+        sheet = Sheet.of(path, read_text(path))
+        header = find_header(sheet)
+        columns = meaning_of(header.names)
+        _check_names(path, columns)
+        table = _read(sheet, header, columns, findings)
+        if columns.points is not None:
+            table = _by_points(path, table, columns)
+        person = _person(path, table)
+        rate_hz, clock = _clock(path, table, hints, findings)
+        index = np.rint(clock.places).astype(np.int64)
+        values = clock.even(table.values)
+        labels = _segments(table.texts, index, person)
+        if table.markers is None:
+            return Recording(
+                values,
+                rate_hz,
+                table.channels,
+                stem(path),
+                person,
+                labels,
+                report=findings.report(rate_hz),
             )
-        cells = [[row[i] for i in measured] for row in rows]
-        values = numbers(path, cells, len(measured), places)
-
-        index = np.arange(len(rows))
-        rate_hz = hints.rate_hz
-        times = [special[name] for name in _TIMES if name in special]
-        if len(times) > 1:
-            raise bad_file(path, "several columns of times", f"one of {', '.join(_TIMES)}")
-        if times:
-            column = numbers(path, [[row[times[0]]] for row in rows], 1, places)[:, 0]
-            clock = even_clock(path, column)
-            index, values = clock.places.astype(int), clock.even(values)
-            rate_hz = rate_hz or clock.rate_hz
-        if rate_hz is None or np.isnan(rate_hz):
-            raise bad_file(
-                path, "no rate", f"a column {' or '.join(_TIMES)} [s], or {option('rate_hz')}"
-            )
-        frames = values
-        texts = {
-            name: [row[special[name]].strip() for row in rows] for name in special if name in _TEXTS
-        }
-        people = sorted(set(texts.get("person", [""])))
-        if len(people) > 1:
-            raise bad_file(path, f"several persons: {people[:5]}", "one person in a file")
-        recording = Recording(
-            frames=frames,
-            rate_hz=rate_hz,
-            channels=tuple(header[i] for i in measured),
-            name=stem(path),
-            person=people[0],
-            labels=_segments(texts, index, people[0]),
+        points = values.reshape(len(values), -1, 3)
+        seen = (~np.isnan(points).any(axis=2)).sum(axis=0)
+        kept, names = chosen_names(path, table.markers, seen, findings)
+        points = points[:, kept]
+        space = Space(table.unit_m or 1.0, says_unit=table.unit_m is not None)
+        _warn_of_pictures(points, names, findings)
+        at = placed(path, points, names, rate_hz, space, hints, findings)
+        return Recording(
+            at.points.reshape(len(points), -1),
+            rate_hz,
+            marker_channels(names),
+            stem(path),
+            person,
+            labels,
+            report=findings.report(rate_hz, at.unit_m, at.up),
         )
-        if not recording.is_markers:
-            return recording
-        points = recording.markers @ file_axes(hints.up_axis, "z", "x").T * (hints.unit_m or 1.0)
-        checked_markers(path, points, recording.marker_names)
-        return replace(recording, frames=points.reshape(frames.shape))
 
 
-def _table(path: Path) -> tuple[list[str], list[list[str]], list[int]]:
-    lines = read_text(path).splitlines()
-    separator = max(",;\t", key=lines[0].count)
-    reader = csv.reader(lines, delimiter=separator, strict=True)
-    rows, places = [], []
-    try:
-        header = [name.strip() for name in next(reader)]
-        for row in reader:
-            if any(cell.strip() for cell in row):
-                rows.append(row)
-                places.append(reader.line_num)
-    except (csv.Error, StopIteration) as error:
-        raise bad_file(
-            path, f"not a table ({error})", "rows of cells below a row of names"
-        ) from error
-    if not all(header) or len(set(header)) != len(header):
-        raise bad_file(path, f"columns named {header[:6]}", "names, each different")
-    if all(_is_number(name) for name in header):
-        raise bad_file(path, "the first row holds numbers", "the names of the columns")
-    return header, rows, places
+@dataclass(frozen=True, eq=False)
+class _Table:
+    """A table's measured columns, and what goes with them.
+
+    Attributes:
+        values: Shape (T, D).
+        channels: Names of its columns, length D; empty for markers.
+        markers: Names of the D / 3 markers; None where the columns are none.
+        unit_m: Length of the markers' unit [m], where the header says it.
+        times: Columns of times [any unit], each of shape (T,), with their unit [s] if it is said.
+        numbers: Numbers of the frames, shape (T,); None where there are none.
+        texts: Columns of texts by name, each of length T.
+    """
+
+    values: FloatArray
+    channels: tuple[str, ...]
+    markers: tuple[str, ...] | None
+    unit_m: float | None
+    times: tuple[tuple[FloatArray, float | None], ...]
+    numbers: FloatArray | None
+    texts: dict[str, list[str]]
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
+def _check_names(path: Path, columns: Columns) -> None:
+    plain = [name for i, name in enumerate(columns.names) if i not in columns.frames]
+    marked = {i for c in columns.markers.values() for i in c}
+    single = [n for i, n in enumerate(columns.names) if i not in marked and i not in columns.frames]
+    if not all(plain) or (len(set(single)) != len(single) and not columns.doubled):
+        raise bad_file(path, f"columns named {list(columns.names[:6])}", "names, each different")
+
+
+def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) -> _Table:
+    path, n_columns = sheet.path, len(columns.names)
+    first = next((cells for _, cells in sheet.rows(header.start)), [])
+    textual = dict(columns.texts)
+    if columns.points is not None:
+        textual["point"] = columns.points
+    for i in columns.times:  # times of the day are texts
+        if i < len(first) and first[i].strip() and not is_number(first[i]):
+            textual[f"time {i}"] = i
+    texts: dict[str, list[str]] = {name: [] for name in textual}
+    numeric = [i for i in range(n_columns) if i not in textual.values()]
+
+    def rows() -> Iterator[tuple[int, list[str]]]:
+        for line, cells in sheet.rows(header.start):
+            if not textual:
+                yield line, cells
+                continue
+            while len(cells) > n_columns and not cells[-1].strip():
+                cells.pop()
+            if len(cells) != n_columns:
+                raise bad_file(path, f"line {line} has {len(cells)} columns", f"{n_columns}")
+            for name, i in textual.items():
+                texts[name].append(cells[i].strip())
+            yield line, [cells[i] for i in numeric]
+
+    group = 3 if columns.markers else 1
+    found = measured_rows(path, rows(), len(numeric), findings, group=group)
+    place = {column: k for k, column in enumerate(numeric)}
+    numbers = [i for i in columns.frames if _counts(found[:, place[i]])]
+    times = [i for i in columns.times if i in place]
+    left = [i for i in numeric if i not in times and i not in numbers]
+    left = [i for i in left if i not in columns.confidences]
+    if (not left and columns.points is None) or not len(found):
+        raise bad_file(path, f"{len(left)} channels, {len(found)} rows", "at least one of each")
+    if not all(columns.names[i] for i in left):
+        raise bad_file(path, f"columns named {list(columns.names[:6])}", "names, each different")
+    clock = [(found[:, place[i]], columns.time_unit_s(i)) for i in times]
+    clock += [(_of_day(path, texts.pop(n)), 1.0) for n in list(texts) if n.startswith("time ")]
+    table = _Table(
+        found[:, [place[i] for i in left]],
+        tuple(columns.names[i] for i in left),
+        None,
+        None,
+        tuple(clock),
+        found[:, place[numbers[0]]] if numbers else None,
+        texts,
+    )
+    if columns.points is not None:
+        return table
+    return _sorted_out(table, left, columns, findings)
+
+
+def _sorted_out(table: _Table, left: list[int], columns: Columns, findings: Findings) -> _Table:
+    """Return a table with either its markers or its channels."""
+    place = {column: k for k, column in enumerate(left)}
+    markers = columns.markers
+    if markers and 3 * len(markers) >= _MARKERS_SHARE * len(left):
+        used = [i for axes in markers.values() for i in axes]
+        others = [columns.names[i] for i in left if i not in set(used)]
+        if others:
+            findings.leave_out(others)
+            findings.note(f"{len(others)} columns that are no markers left out")
+        if columns.doubled:
+            findings.warn(
+                f"the same name more than once: {', '.join(columns.doubled[:5])}; the first one "
+                "is used"
+            )
+        units = {columns.units[i] for i in used if columns.units[i]}
+        unit = named_unit(units.pop()) if len(units) == 1 else None
+        values = table.values[:, [place[i] for i in used]].copy()
+        return replace(table, values=values, channels=(), markers=tuple(markers), unit_m=unit)
+    values = table.values.copy()
+    said = [columns.units[i] for i in left]
+    for k, text in enumerate(said):
+        values[:, k] *= angle_factor(text) or named_unit(text) or 1.0
+    reach = np.nanmax(np.abs(values), initial=0.0)
+    if not any(said) and reach > 2 * _TURN:
+        findings.note(
+            f"the columns reach up to {reach:.4g} and are taken as radians and metres; if they are "
+            "degrees or millimetres, write (deg) or (mm) behind their names"
+        )
+    return replace(table, values=values)
+
+
+def _counts(values: FloatArray) -> bool:
+    """Whether a column holds numbers of frames: whole, and never going back."""
+    return bool(
+        not np.isnan(values).any()
+        and (values == np.rint(values)).all()
+        and (np.diff(values) >= 0).all()
+    )
+
+
+def _of_day(path: Path, texts: list[str]) -> FloatArray:
+    """Return times that are written with a date, or as hours, minutes and seconds [s]."""
+    times = []
+    for row, text in enumerate(texts, start=1):
+        try:
+            if text[:4].isdigit():
+                times.append(datetime.fromisoformat(text.replace("/", "-")).timestamp())
+            else:
+                parts = [float(part) for part in text.split(":")]
+                times.append(sum(p * 60.0**k for k, p in enumerate(reversed(parts))))
+        except (ValueError, OverflowError) as error:
+            raise bad_file(
+                path,
+                f"row {row} holds the time {text[:40]!r}",
+                "a number, or hours:minutes:seconds",
+            ) from error
+    return np.array(times, dtype=np.float64)
+
+
+def _by_points(path: Path, table: _Table, columns: Columns) -> _Table:
+    """Return a table with a row for each point as one with a row for each frame."""
+    keys = table.numbers if table.numbers is not None else None
+    if keys is None and table.times:
+        keys = table.times[0][0]
+    if keys is None or np.isnan(keys).any():
+        raise bad_file(path, "a row for each point, without frames or times", "a column 'frame'")
+    frames, first, row = np.unique(keys, return_index=True, return_inverse=True)
+    names = list(dict.fromkeys(table.texts["point"]))
+    if len(frames) * len(names) > 4 * len(keys) + 1000:
+        raise bad_file(path, f"{len(names)} points in {len(frames)} frames", "most points in each")
+    column = {name: k for k, name in enumerate(names)}
+    points = np.full((len(frames), len(names), 3), np.nan)
+    axes = [[n.lower() for n in table.channels].index(axis) for axis in "xyz"]
+    which = np.array([column[name] for name in table.texts["point"]], dtype=np.int64)
+    points[row, which] = table.values[:, axes]
+    unit = next((columns.units[i] for i, n in enumerate(columns.names) if n.lower() == "x"), "")
+    if all(name.isdecimal() for name in names) and len(names) == len(MEDIAPIPE_POSE):
+        order = sorted(names, key=lambda name: float(name))
+        known = dict(zip(order, MEDIAPIPE_POSE, strict=True))
+        names = [known[name] for name in names]
+    texts = {name: [values[i] for i in first] for name, values in table.texts.items()}
+    del texts["point"]
+    return _Table(
+        points.reshape(len(frames), -1),
+        (),
+        tuple(names),
+        named_unit(unit),
+        tuple((times[first], unit_s) for times, unit_s in table.times),
+        None if table.numbers is None else table.numbers[first],
+        texts,
+    )
+
+
+def _person(path: Path, table: _Table) -> str:
+    people = sorted(set(table.texts.get("person", [""])))
+    if len(people) > 1:
+        raise bad_file(path, f"several persons: {', '.join(people[:5])}", "one person a file")
+    return people[0]
+
+
+def _clock(path: Path, table: _Table, hints: Hints, findings: Findings) -> tuple[float, Clock]:
+    """Return the rate, and where the rows lie on an even clock."""
+    times = [_in_seconds(values, unit, findings) for values, unit in table.times]
+    if len(times) > 1 and not all(_same_steps(times[0], other) for other in times[1:]):
+        raise bad_file(path, "several columns of times", "one")
+    if times:
+        clock = even_clock(path, times[0])
+        if clock.jitters:
+            findings.note(f"times jitter: resampled to an even {clock.rate_hz:.6g} Hz")
+    elif table.numbers is not None and len(table.values) > 1:
+        clock = _by_numbers(path, table.numbers)
+    else:
+        clock = Clock(np.nan, np.arange(len(table.values), dtype=np.float64), False)
+    rate_hz = hints.rate_hz or clock.rate_hz
+    if not 0 < rate_hz < np.inf:
+        raise bad_file(path, "no rate", f"a column 'time' [s], or {option('rate_hz')}")
+    return rate_hz, clock
+
+
+def _by_numbers(path: Path, numbers: FloatArray) -> Clock:
+    """Return where rows lie by the numbers of their frames, which have a usual step."""
+    steps = np.diff(numbers)
+    usual = float(np.median(steps))
+    places = (numbers - numbers[0]) / (usual or 1.0)
+    off = (places != np.rint(places)) | (np.concatenate([[1.0], steps]) <= 0)
+    if off.any() or places[-1] > 10 * len(numbers) + 1000:
+        row = int(np.argmax(off))
+        raise bad_file(path, f"frame {numbers[row]:g} in row {row + 1}", "evenly numbered frames")
+    return Clock(np.nan, places, False)
+
+
+def _in_seconds(times: FloatArray, unit_s: float | None, findings: Findings) -> FloatArray:
+    if unit_s is not None:
+        return times * unit_s
+    if len(times) < 2 or np.isnan(times).any():
+        return times
+    step = float(np.median(np.diff(times)))
+    for unit, name, least in _FINER:
+        if least <= step < 500.0 * least:
+            findings.note(f"times are taken as {name}: their steps are {step:.6g}")
+            return times * unit
+    return times
+
+
+def _same_steps(one: FloatArray, other: FloatArray) -> bool:
+    if len(one) < 2:
         return False
-    return True
+    steps, others = np.diff(one), np.diff(other)
+    return bool(abs(others.sum() - steps.sum()) <= _SAME_STEP * abs(steps.sum()))
+
+
+def _warn_of_pictures(points: FloatArray, names: tuple[str, ...], findings: Findings) -> None:
+    """Warn of landmarks in a picture: MediaPipe gives shares of its width and height too."""
+    if len(set(names) & set(MEDIAPIPE_POSE)) < len(MEDIAPIPE_POSE) // 2:
+        return
+    flat = points[..., :2]
+    inside = (flat > -0.2) & (flat < 1.2)
+    if np.mean(inside[~np.isnan(flat)]) > 0.99 and np.nanmin(flat) > -0.2:
+        findings.warn(
+            "these look like landmarks in a picture (shares of its width and height), whose depth "
+            "and size mean little: world landmarks [m] are needed"
+        )
 
 
 def _segments(

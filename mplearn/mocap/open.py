@@ -18,7 +18,10 @@ from .csv_table import CSVReader
 from .files import bad_file, is_file, is_folder, stem
 from .g1_csv import G1CSVReader
 from .labels import labels_beside
+from .motive import MotiveReader
 from .mvnx import MVNXReader
+from .nexus import NexusReader
+from .qualisys import QualisysReader
 from .reader import Hints, Reader, joined
 from .registry import reader_for, reader_of, register_reader, suffixes
 from .resample import resample
@@ -30,6 +33,9 @@ from .ui_prmd import UIPRMDReader
 for _reader in (
     CSVReader(),
     G1CSVReader(),
+    NexusReader(),
+    QualisysReader(),
+    MotiveReader(),
     TRCReader(),
     BVHReader(),
     AMCReader(),

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..recording import FloatArray
-from .anatomy import LINKS_M, place_of
+from .part_names import LINKS_M, place_of
 
 UNITS_M = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 """Length of the units that files name [m]."""

@@ -18,6 +18,7 @@ from .vertical import find_vertical
 
 _FARTHEST_M = 100.0  # no capture volume is larger
 _SMALLEST_M = 0.02  # all markers of a body within less: not a body
+_FEW = 3  # markers; about fewer the file alone can tell
 _BODY_EXTENT_M = (0.4, 3.0)  # largest extent of a person's skeleton, from a toddler's on
 
 
@@ -150,7 +151,8 @@ def _settled_up(
             f"{found.up} is taken as the vertical axis, by feet, head and floor; {said} {space.up} "
             f"({option('up_axis')} sets it)"
         )
-    if found.doubtful and not (space.says_up and not found.contradicts):
+    told = space.says_up and not found.contradicts
+    if found.doubtful and not told and len(names) >= _FEW:
         findings.warn(f"whether {found.up} points up is in doubt; {option('up_axis')} settles it")
     return found.up
 

@@ -3,7 +3,7 @@
 Each of the six directions of the axes earns evidence [nat]; the names of the points are one kind of
 it, and hints only:
 
-* names: the parts that sit higher on a body (`anatomy.HEIGHTS`) lie farther along it;
+* names: the parts that sit higher on a body (`part_names.HEIGHTS`) lie farther along it;
 * floor: the lowest points stay at one level, and most laboratories put zero there;
 * contact: what is lowest stands still more often than what is highest;
 * stature: a person is mostly taller than wide.
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..recording import BoolArray, FloatArray
-from .anatomy import HEIGHTS, place_of
+from .part_names import HEIGHTS, place_of
 
 DIRECTIONS = ("x", "-x", "y", "-y", "z", "-z")
 

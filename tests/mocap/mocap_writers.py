@@ -251,6 +251,117 @@ def write_csv(
     return path
 
 
+def y_up(points: np.ndarray) -> np.ndarray:
+    """Return points with z up in the axes of tools with y up and x forward."""
+    return np.stack([points[..., 0], points[..., 2], -points[..., 1]], axis=-1)
+
+
+def cells_of(frame: np.ndarray, form: str = ".6f") -> list[str]:
+    return ["" if np.isnan(x) else format(x, form) for x in frame.ravel()]
+
+
+def write_motive(
+    path: Path,
+    points: np.ndarray | None = None,
+    *,
+    version: str = "1.23",
+    rate_hz: float = 100.0,
+    kinds: list[str] | None = None,
+    names: list[str] | None = None,
+    units: str = "Meters",
+    scale_to_file: float = 1.0,
+) -> Path:
+    """``kinds``: "Marker", "Bone", "Rigid Body" or "Unlabeled" for each point."""
+    points = person() if points is None else points
+    kinds = kinds or ["Marker"] * points.shape[1]
+    names = names or [f"Skeleton 001:M{i}" for i in range(points.shape[1])]
+    columns: list[list[str]] = [
+        ["", "", "", "", "", "Frame"],
+        ["", "", "", "", "", "Time (Seconds)"],
+    ]
+    table = [[str(i), f"{i / rate_hz:.6f}"] for i in range(len(points))]
+    for i, (kind, name) in enumerate(zip(kinds, names, strict=True)):
+        parent = "Parent" if version >= "3" else ""
+        kind_, name_ = ("Marker", f"Unlabeled {1000 + i}") if kind == "Unlabeled" else (kind, name)
+        if kind in ("Bone", "Rigid Body"):
+            for axis in "XYZW":
+                columns.append([kind_, name_, f'"{i}"', parent, "Rotation", axis])
+            for row in table:
+                row.extend(["0.0", "0.0", "0.0", "1.0"])
+        for axis in "XYZ":
+            columns.append([kind_, name_, f'"{i}"', parent, "Position", axis])
+        for row, frame in zip(table, y_up(points)[:, i] * scale_to_file, strict=True):
+            row.extend(cells_of(frame))
+        if kind == "Rigid Body":
+            columns.append([kind_, name_, f'"{i}"', parent, "Error Per Marker", ""])
+            for row in table:
+                row.append("0.0001")
+    head = [
+        "Format Version,1.23,Take Name,walk,Capture Frame Rate,"
+        f"{rate_hz:.6f},Export Frame Rate,{rate_hz:.6f},Total Exported Frames,{len(points)},"
+        f"Rotation Type,Quaternion,Length Units,{units},Coordinate Space,Global",
+        "",
+    ]
+    for row in range(6):
+        if row == 3 and version < "3":
+            continue
+        head.append(",".join(column[row] for column in columns))
+    path.write_text("\n".join([*head, *(",".join(row) for row in table)]) + "\n")
+    return path
+
+
+def write_nexus(
+    path: Path,
+    points: np.ndarray | None = None,
+    *,
+    rate_hz: float = 100.0,
+    names: list[str] | None = None,
+    before: str = "",
+    behind: str = "",
+    separator: str = ",",
+) -> Path:
+    points = person() if points is None else points
+    names = names or [f"Anna:M{i}" for i in range(points.shape[1])]
+    lines = ["Trajectories", f"{rate_hz:g}"]
+    lines.append(",," + ",".join(f"{name},," for name in names))
+    lines.append("Frame,Sub Frame," + ",".join(["X,Y,Z"] * len(names)))
+    lines.append(",," + ",".join(["mm,mm,mm"] * len(names)))
+    lines += [f"{i + 1},0," + ",".join(cells_of(p * 1000.0)) for i, p in enumerate(points)]
+    path.write_text((before + "\n".join(lines) + "\n" + behind).replace(",", separator))
+    return path
+
+
+def write_qualisys(
+    path: Path,
+    points: np.ndarray | None = None,
+    *,
+    rate_hz: float = 100.0,
+    counted: bool = False,
+    headed: bool = False,
+) -> Path:
+    points = person() if points is None else points
+    names = [f"M{i}" for i in range(points.shape[1])]
+    lines = [
+        f"NO_OF_FRAMES\t{len(points)}",
+        "NO_OF_CAMERAS\t8",
+        f"NO_OF_MARKERS\t{len(names)}",
+        f"FREQUENCY\t{rate_hz:g}",
+        "NO_OF_ANALOG\t0",
+        "DESCRIPTION\t--",
+        "TIME_STAMP\t2024-01-01, 10:00:00.000\t1.0",
+        "DATA_INCLUDED\t3D",
+        "MARKER_NAMES\t" + "\t".join(names),
+    ]
+    if headed:
+        axes = "\t".join(f"{name} {axis}" for name in names for axis in "XYZ")
+        lines += ["TRAJECTORY_TYPES" + "\tMeasured" * len(names), f"Frame\tTime\t{axes}"]
+    for i, frame in enumerate(points):
+        first = [str(i + 1), f"{i / rate_hz:.5f}"] if counted or headed else []
+        lines.append("\t".join([*first, *cells_of(1000.0 * np.nan_to_num(frame))]))
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
 def write_default_amc(path: Path) -> Path:
     write_asf(path.parent / f"{path.stem}.asf")
     return write_amc(path)
@@ -415,6 +526,9 @@ WRITERS: dict[str, tuple[str, Writer]] = {
     "G1 CSV": ("take.csv", write_g1_csv),
     "MVNX": ("take.mvnx", write_mvnx),
     "SMPL": ("take.npz", write_smpl),
+    "Motive CSV": ("take.csv", write_motive),
+    "Nexus CSV": ("take.csv", write_nexus),
+    "Qualisys TSV": ("take.tsv", write_qualisys),
 }
 """For each reader, by its format: a file name, and what writes a small valid file there."""
 

@@ -37,7 +37,10 @@ WITHOUT_ROWS = {"C3D", "MVNX", "SMPL"}
 SKELETAL = {"AMC", "BVH", "G1 CSV", "MVNX", "SMPL"}
 RATES_HZ = {"AMC": 120.0, "G1 CSV": 30.0}  # which do not say theirs
 TEXT_FORMATS = [format for format in FORMATS if format not in WITHOUT_ROWS]
-SEPARATORS = {"TRC": "\t", "CSV": ",", "UI-PRMD": ",", "G1 CSV": ","}
+SEPARATORS = {
+    **dict.fromkeys(("CSV", "G1 CSV", "UI-PRMD", "Motive CSV", "Nexus CSV"), ","),
+    **dict.fromkeys(("TRC", "Qualisys TSV"), "\t"),
+}
 
 
 @pytest.fixture(scope="module")

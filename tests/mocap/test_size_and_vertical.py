@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mplearn.demonstrator import demonstrate
-from mplearn.mocap.anatomy import place_of
+from mplearn.mocap.part_names import place_of
 from mplearn.mocap.size import CMU_UNIT_M, UNITS_M, find_unit, named_unit
 from mplearn.mocap.space import upright
 from mplearn.mocap.vertical import DIRECTIONS, find_vertical
