@@ -284,12 +284,10 @@ def write_motive(
         parent = "Parent" if version >= "3" else ""
         kind_, name_ = ("Marker", f"Unlabeled {1000 + i}") if kind == "Unlabeled" else (kind, name)
         if kind in ("Bone", "Rigid Body"):
-            for axis in "XYZW":
-                columns.append([kind_, name_, f'"{i}"', parent, "Rotation", axis])
+            columns += [[kind_, name_, f'"{i}"', parent, "Rotation", axis] for axis in "XYZW"]
             for row in table:
                 row.extend(["0.0", "0.0", "0.0", "1.0"])
-        for axis in "XYZ":
-            columns.append([kind_, name_, f'"{i}"', parent, "Position", axis])
+        columns += [[kind_, name_, f'"{i}"', parent, "Position", axis] for axis in "XYZ"]
         for row, frame in zip(table, y_up(points)[:, i] * scale_to_file, strict=True):
             row.extend(cells_of(frame))
         if kind == "Rigid Body":
