@@ -14,6 +14,7 @@ from ..errors import RecordingError
 
 _MOST_PACKED = 60  # times; tables of measured numbers pack to a half or a tenth
 _SMALL_BYTES = 4_000_000
+_LONGEST_SHOWN = 300  # characters of what a file holds
 
 
 def suffix(path: Path) -> str:
@@ -34,7 +35,8 @@ def cmu_subject(name: str) -> str:
 
 def bad_file(path: Path, found: str, expected: str) -> RecordingError:
     """Return the error of a file that does not hold what its format promises."""
-    return RecordingError(f"{path}: {found}; expected {expected}")
+    shown = found if len(found) <= _LONGEST_SHOWN else f"{found[:_LONGEST_SHOWN]}..."
+    return RecordingError(f"{path}: {shown}; expected {expected}")
 
 
 def is_file(path: Path) -> bool:

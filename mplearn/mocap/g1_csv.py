@@ -73,7 +73,7 @@ class G1CSVReader(Reader):
         """Read angles, or where the robot's joints are; see `Reader.read`."""
         findings = Findings(self.format)
         rows = [(i, s) for i, s in enumerate(read_text(path).splitlines(), 1) if s.strip()]
-        header = _cells(rows[0][1])
+        header = _cells(rows[0][1]) if rows else []
         if _plain_numbers(header) is None:
             rows = rows[1:]
         else:

@@ -15,6 +15,7 @@ from .findings import Findings
 from .kinematics import Joint, joint_positions, skeleton_of, with_axes
 from .reader import Hints
 from .space import Space, placed
+from .stature import unit_of_skeleton
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,9 @@ def skeletal_recording(
     joints = motion.joints
     names = tuple(joint.name for joint in joints)
     local = joint_positions(joints, motion.values)
-    place = placed(path, local, names, motion.rate_hz, motion.space, hints, findings)
+    parents = [joint.parent for joint in joints]
+    sized = unit_of_skeleton(local, parents, motion.space.unit_m)
+    place = placed(path, local, names, motion.rate_hz, motion.space, hints, findings, sized)
     if not positions:
         channels, frames = angle_channels(path, motion, place.axes, place.unit_m)
     elif hints.joint_axes:

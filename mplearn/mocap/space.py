@@ -7,19 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InvalidValueError, RecordingError
+from ..errors import InvalidValueError
 from ..recording import FloatArray
 from .files import bad_file
 from .findings import Findings
 from .options import option
 from .reader import Hints
-from .size import UNITS_M, find_unit
+from .size import UNITS_M, Unit, find_unit
 from .vertical import find_vertical
 
 _FARTHEST_M = 100.0  # no capture volume is larger
 _SMALLEST_M = 0.02  # all markers of a body within less: not a body
 _FEW = 3  # markers; about fewer the file alone can tell
-_BODY_EXTENT_M = (0.4, 3.0)  # largest extent of a person's skeleton, from a toddler's on
 
 
 def to_z_up(up: str, forward: str) -> FloatArray:
@@ -98,6 +97,7 @@ def placed(
     space: Space,
     hints: Hints,
     findings: Findings,
+    sized: Unit | None = None,
 ) -> Placed:
     """Return a file's points in metres, z up, x forward where that is known, never mirrored.
 
@@ -112,11 +112,12 @@ def placed(
         space: What the file or its format says.
         hints: What the caller says.
         findings: Where to tell what was found.
+        sized: The unit by the size of the person, where the caller knows better than `find_unit`.
 
     Raises:
         RecordingError: No person can be meant by the points.
     """
-    unit = hints.unit_m or _settled_unit(points, names, space, findings)
+    unit = hints.unit_m or _settled_unit(points, names, space, findings, sized)
     metres = checked_markers(path, points * unit, names)
     up = hints.up_axis or _settled_up(metres, names, rate_hz, space, findings)
     turn = to_z_up(up, space.forward) if up == space.up else upright(up)
@@ -124,9 +125,13 @@ def placed(
 
 
 def _settled_unit(
-    points: FloatArray, names: tuple[str, ...], space: Space, findings: Findings
+    points: FloatArray,
+    names: tuple[str, ...],
+    space: Space,
+    findings: Findings,
+    sized: Unit | None,
 ) -> float:
-    found = find_unit(points, names, space.unit_m)
+    found = sized or find_unit(points, names, space.unit_m)
     if found.contradicts:
         said = unit_text(space.unit_m)
         tell = findings.warn if space.says_unit else findings.note
@@ -194,26 +199,6 @@ def checked_markers(path: Path, points: FloatArray, names: tuple[str, ...]) -> F
                 f"({option('unit_m')} sets it)",
             )
     return points
-
-
-def check_skeleton(path: Path, rest: FloatArray, unit: float) -> None:
-    """Check that a skeleton at rest, joints at (J, 3) [m], has the size of a person.
-
-    Raises:
-        RecordingError: It has not; the message tells which unit of length would fit.
-    """
-    extent = float(np.ptp(rest, axis=0).max())
-    low, high = _BODY_EXTENT_M
-    if low <= extent <= high:
-        return
-    fits = [
-        f"{m:g}" for m in (1.0, 0.01, 0.001, 0.0254, 0.056444) if low <= extent / unit * m <= high
-    ]
-    raise RecordingError(
-        f"{path}: the skeleton measures {extent:.3g} m with a unit of {unit:g} m; expected "
-        f"{low:g} to {high:g} m. {option('unit_m')} sets the unit"
-        + (f": {' or '.join(fits)} would fit" if fits else "")
-    )
 
 
 def _axis(name: str) -> FloatArray:

@@ -75,6 +75,8 @@ class UIPRMDReader(Reader):
         """Read one repetition; see `Reader.read`."""
         match = _match(path)
         rows = [line.split(",") for line in read_text(path).splitlines() if line.strip()]
+        if not rows:
+            raise bad_file(path, "no frames", "a row for each")
         values = numbers(path, rows, 3 * len(PLUG_IN_GAIT_MARKERS), range(1, len(rows) + 1))
         points = values.reshape(len(rows), -1, 3)
         points[(points == 0.0).all(axis=2)] = np.nan
