@@ -13,6 +13,7 @@ from typing import Annotated
 
 import numpy as np
 
+from mplearn.maths.rigid_fit import fit_similarity
 from mplearn.recording import FloatArray
 from mplearn.state import Array, Range
 
@@ -69,23 +70,18 @@ def axes_changed(now: FloatArray, before: FloatArray) -> Axes | None:
     for _ in range(4):
         if len(seen) < enough:
             return None
-        a, b = now[seen], before[seen]
-        middle, target = a.mean(axis=0), b.mean(axis=0)
-        a, b = a - middle, b - target
-        spread = float((a**2).sum())
-        if not 0 < spread < np.inf:
+        if np.ptp(now[seen], axis=0).max() == 0.0:
             return None
-        u, s, vt = np.linalg.svd(b.T @ a)
-        signs = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-        size, turn = float((s * signs).sum() / spread), (u * signs) @ vt
-        if not SMALLEST < size < LARGEST:
+        fit = fit_similarity(now[seen], before[seen])
+        if not SMALLEST < fit.size < LARGEST:
             return None
-        round_size = 10.0 ** round(math.log10(size))
+        size, round_size = fit.size, 10.0 ** round(math.log10(fit.size))
         if abs(size / round_size - 1.0) < SAME:
             size = round_size
         elif LIKE_PEOPLE < size < 1.0 / LIKE_PEOPLE:
             return None
-        found = Axes(size, turn, target - size * turn @ middle)
+        shift = before[seen].mean(axis=0) - size * fit.rotation @ now[seen].mean(axis=0)
+        found = Axes(size, fit.rotation, shift)
         off = np.linalg.norm(found.undo(now[seen]) - before[seen], axis=1)
         near = off <= max(2.5 * float(np.median(off)), NEAR_M)
         if near.all():

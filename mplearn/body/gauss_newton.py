@@ -17,10 +17,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from mplearn.maths.solvers import bounded_solve, inverse_diagonal
+from mplearn.maths.tree_solvers import bounded_solve, inverse_diagonal
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
-from .kinematics import integrate, point_jacobian
+from .kinematics import integrate
 from .linkage import Linkage, locate
 
 
@@ -74,7 +74,7 @@ def solve_frame(
     pos, mat = np.empty((n_bodies, 3)), np.empty((n_bodies, 3, 3))
     axes, anchors = np.empty((n, 3)), np.empty((n, 3))
     points = np.empty_like(markers)
-    jacobian = np.zeros((len(markers), 3, dofs))
+    moments, motions = np.empty((n_bodies, 16)), np.empty((dofs, 6))
     normal, gradient = np.empty((dofs, dofs)), np.empty(dofs)
     moved, step = np.zeros(dofs), np.empty(dofs)  # since the last frame; in this iteration
     iteration = 0
@@ -88,21 +88,23 @@ def solve_frame(
             )
         if iteration == max_iterations:
             break
-        point_jacobian(
-            points,
-            bodies,
-            pos[0],
-            mat[0],
-            axes,
-            anchors,
-            linkage.slides,
-            linkage.parent,
-            linkage.first,
-            jacobian,
-        )
         c = outlier_m * widening if iteration == 0 else outlier_m
         normal_equations(
-            jacobian, markers, points, residuals, bodies, weights, c, linkage, normal, gradient
+            q,
+            markers,
+            points,
+            residuals,
+            bodies,
+            weights,
+            c,
+            linkage,
+            mat,
+            axes,
+            anchors,
+            moments,
+            motions,
+            normal,
+            gradient,
         )
         for i in range(dofs):
             if i >= 6 and normal[i, i] > 0.0:
@@ -111,7 +113,7 @@ def solve_frame(
                 gradient[i] -= pull * q[i + 1]
             normal[i, i] += 1.0 / variance[i]
             gradient[i] -= moved[i] / variance[i]
-        bounded_solve(normal, gradient, low - moved, high - moved, free, step)
+        bounded_solve(normal, gradient, low - moved, high - moved, free, linkage.above, step)
         longest = np.max(np.abs(step))
         if longest > largest_step:
             step *= largest_step / longest
@@ -120,13 +122,13 @@ def solve_frame(
         iteration += 1
         if longest < tolerance:
             break
-    inverse_diagonal(normal, free, variance)
+    inverse_diagonal(normal, free, linkage.above, variance)
     return iteration
 
 
 @njit(cache=True)
 def normal_equations(
-    jacobian: FloatArray,
+    q: FloatArray,
     markers: FloatArray,
     points: FloatArray,
     residuals: FloatArray,
@@ -134,37 +136,95 @@ def normal_equations(
     weights: FloatArray,
     c: float,
     linkage: Linkage,
+    mat: FloatArray,
+    axes: FloatArray,
+    anchors: FloatArray,
+    moments: FloatArray,
+    motions: FloatArray,
     normal: FloatArray,
     gradient: FloatArray,
 ) -> None:
-    """Fill J'WJ (lower triangle) and J'W(error); only the joints above a marker have a part."""
-    normal[:] = 0.0
-    gradient[:] = 0.0
-    chain = np.empty(len(gradient), dtype=np.int64)
+    """Fill J'WJ, where one unknown is above the other (lower triangle), and J'W(error).
+
+    No Jacobian is formed: a marker at p moves by v + w x p with an unknown, so that all markers
+    that it carries come in by their weight, its first and second moments, and the sums of the
+    weighted errors and their moments. These are added up from the leaves to the base, as composite
+    rigid bodies are [Featherstone2008, 6.2].
+    """
+    parent, above = linkage.parent, linkage.above
+    moments[:] = 0.0
+    x0, y0, z0 = q[0], q[1], q[2]
     for m in range(len(markers)):
         if np.isnan(residuals[m]) or weights[m] == 0.0:
             continue
-        weight = weights[m] / (1.0 + (residuals[m] / c) ** 2)
-        e0 = weight * (markers[m, 0] - points[m, 0])
-        e1 = weight * (markers[m, 1] - points[m, 1])
-        e2 = weight * (markers[m, 2] - points[m, 2])
-        length = 0
-        b = bodies[m]
-        while b >= 0:
-            for j in range(linkage.first[b + 1] - 1, linkage.first[b] - 1, -1):
-                chain[length] = 6 + j
-                length += 1
-            b = linkage.parent[b]
-        for k in range(5, -1, -1):
-            chain[length] = k
-            length += 1
-        for a in range(length):
-            i = chain[a]
-            x, y, z = jacobian[m, 0, i], jacobian[m, 1, i], jacobian[m, 2, i]
-            gradient[i] += x * e0 + y * e1 + z * e2
-            x, y, z = weight * x, weight * y, weight * z
-            for d in range(a, length):
-                j = chain[d]
-                normal[i, j] += (
-                    x * jacobian[m, 0, j] + y * jacobian[m, 1, j] + z * jacobian[m, 2, j]
-                )
+        w = weights[m] / (1.0 + (residuals[m] / c) ** 2)
+        x, y, z = points[m, 0] - x0, points[m, 1] - y0, points[m, 2] - z0
+        ex = w * (markers[m, 0] - points[m, 0])
+        ey = w * (markers[m, 1] - points[m, 1])
+        ez = w * (markers[m, 2] - points[m, 2])
+        s = moments[bodies[m]]
+        s[0] += w
+        s[1] += w * x
+        s[2] += w * y
+        s[3] += w * z
+        s[4] += w * (y * y + z * z)
+        s[5] += w * (x * x + z * z)
+        s[6] += w * (x * x + y * y)
+        s[7] -= w * x * y
+        s[8] -= w * x * z
+        s[9] -= w * y * z
+        s[10] += ex
+        s[11] += ey
+        s[12] += ez
+        s[13] += y * ez - z * ey
+        s[14] += z * ex - x * ez
+        s[15] += x * ey - y * ex
+    for b in range(len(parent) - 1, 0, -1):
+        for k in range(16):
+            moments[parent[b], k] += moments[b, k]
+    # each unknown's motion: (wx, wy, wz, vx, vy, vz), v that of the point at the base's place
+    motions[:6] = 0.0
+    for k in range(3):
+        motions[k, 3 + k] = 1.0
+        for i in range(3):
+            motions[3 + k, i] = mat[0, i, k]
+    for j in range(len(axes)):
+        ax, ay, az = axes[j, 0], axes[j, 1], axes[j, 2]
+        t = motions[6 + j]
+        if linkage.slides[j]:
+            t[0], t[1], t[2], t[3], t[4], t[5] = 0.0, 0.0, 0.0, ax, ay, az
+            continue
+        x, y, z = anchors[j, 0] - x0, anchors[j, 1] - y0, anchors[j, 2] - z0
+        t[0], t[1], t[2] = ax, ay, az
+        t[3], t[4], t[5] = y * az - z * ay, z * ax - x * az, x * ay - y * ax
+    for j in range(len(axes)):
+        b = linkage.joint_body[j]
+        _row(6 + j, motions[6 + j], moments[b], motions, above, normal, gradient)
+    for k in range(6):
+        _row(k, motions[k], moments[0], motions, above, normal, gradient)
+
+
+@njit(cache=True)
+def _row(
+    k: int,
+    t: FloatArray,
+    s: FloatArray,
+    motions: FloatArray,
+    above: IntArray,
+    normal: FloatArray,
+    gradient: FloatArray,
+) -> None:
+    """Fill a row of the normal equations from an unknown's motion and the moments it carries."""
+    wx, wy, wz, vx, vy, vz = t[0], t[1], t[2], t[3], t[4], t[5]
+    fx = s[0] * vx + wy * s[3] - wz * s[2]
+    fy = s[0] * vy + wz * s[1] - wx * s[3]
+    fz = s[0] * vz + wx * s[2] - wy * s[1]
+    nx = s[2] * vz - s[3] * vy + s[4] * wx + s[7] * wy + s[8] * wz
+    ny = s[3] * vx - s[1] * vz + s[7] * wx + s[5] * wy + s[9] * wz
+    nz = s[1] * vy - s[2] * vx + s[8] * wx + s[9] * wy + s[6] * wz
+    i = k
+    while i >= 0:
+        r = motions[i]
+        normal[k, i] = r[0] * nx + r[1] * ny + r[2] * nz + r[3] * fx + r[4] * fy + r[5] * fz
+        i = above[i]
+    gradient[k] = wx * s[13] + wy * s[14] + wz * s[15] + vx * s[10] + vy * s[11] + vz * s[12]

@@ -163,7 +163,9 @@ class BodyIdentity:
         if 3 * np.count_nonzero((seen == seen).any(axis=0)) < seen.shape[1]:
             return None
         middle = _middle(seen)
-        scores = self.bodies.scores(middle)
+        swing = 1.4826 * _middle(np.abs(seen - middle))
+        noise = 0.5 * np.pi * swing**2 / np.maximum((seen == seen).sum(axis=0), 1)
+        scores = self.bodies.scores(middle, noise)
         if self.person >= 0:
             own = max(scores[self.person], self._unchanged(seen, middle))
             scores[self.person] = own + self.config.loyalty

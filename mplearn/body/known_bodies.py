@@ -122,18 +122,23 @@ class KnownBodies:
         own += share * step
         self.blocks[person] += 1
 
-    def scores(self, mean: FloatArray) -> FloatArray:
-        """Return how well each known person, and last somebody new, explains what is seen."""
+    def scores(self, mean: FloatArray, noise: FloatArray | float = 0.0) -> FloatArray:
+        """Return how well each known person, and last somebody new, explains what is seen.
+
+        Args:
+            mean: Distances, shape (K,) [m].
+            noise: How much they vary because of what measured them, shape (K,) [m^2].
+        """
         scores = np.zeros(self.n_people + 1)
         variance = self._squares / self._counts
         for person in range(self.n_people):
             doubt = 1.0 + 4.0 / max(self.blocks[person], 1.0)
             scores[person] = self.fit(
-                mean, self._means[person], doubt * variance, self.config.slips
+                mean, self._means[person], doubt * variance + noise, self.config.slips
             )
         people = self._means[: self.n_people]
         usual = np.nanmean(people, axis=0) if self.n_people else mean
-        scores[-1] = self.fit(mean, usual, self.anybody(usual) + variance, 0.5)
+        scores[-1] = self.fit(mean, usual, self.anybody(usual) + variance + noise, 0.5)
         return scores
 
     def fit(

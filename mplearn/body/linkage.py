@@ -14,7 +14,7 @@ from .tree import KinematicTree
 
 
 class Linkage(NamedTuple):
-    """The arrays of a tree that the kernel needs; see `KinematicTree`."""
+    """The arrays of a tree that kernels need; see `KinematicTree`, `first_joints` and `_above`."""
 
     parent: IntArray
     offset: FloatArray
@@ -24,6 +24,7 @@ class Linkage(NamedTuple):
     axis: FloatArray
     anchor: FloatArray
     first: IntArray
+    above: IntArray
 
     @classmethod
     def of(cls, tree: KinematicTree) -> Linkage:
@@ -37,7 +38,23 @@ class Linkage(NamedTuple):
             tree.axis,
             tree.anchor,
             first_joints(tree.joint_body, len(tree.parent)),
+            _above(tree),
         )
+
+
+def _above(tree: KinematicTree) -> IntArray:
+    """Return the next degree of freedom above each, shape (6 + n,); -1 for the first of the base.
+
+    Above a joint are those that carry it: others of its body, its parents', and the base's.
+    """
+    last = np.full(len(tree.parent), 5)  # degree of freedom nearest to each body
+    above = np.arange(-1, 5 + len(tree.joint_body))
+    for b, parent in enumerate(tree.parent):
+        if parent >= 0:
+            last[b] = last[parent]
+        for j in np.flatnonzero(tree.joint_body == b):
+            above[6 + j], last[b] = last[b], 6 + j
+    return above
 
 
 @njit(cache=True)

@@ -1,11 +1,11 @@
-"""Small least squares in compiled loops: damped, or between bounds; Cholesky for both."""
+"""Small least squares in compiled loops, damped, by Cholesky."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from ..recording import BoolArray, FloatArray
+from ..recording import FloatArray
 
 
 @njit(cache=True)
@@ -41,82 +41,6 @@ def solve_damped(jacobian: FloatArray, rows: FloatArray, damping: float) -> Floa
     cholesky(normal)
     cholesky_solve(normal, x)
     return x
-
-
-@njit(cache=True)
-def bounded_solve(
-    normal: FloatArray,
-    gradient: FloatArray,
-    low: FloatArray,
-    high: FloatArray,
-    free: BoolArray,
-    step: FloatArray,
-) -> None:
-    """Minimise the quadratic model between bounds by an active set.
-
-    What runs into a bound is fixed there. Once nothing does, what a bound holds against its own
-    slope is released, each unknown at most twice, so that the search ends.
-
-    Args:
-        normal: Symmetric positive definite, its lower triangle, shape (d, d).
-        gradient: Descent direction at zero, shape (d,).
-        low: Lower bounds, shape (d,).
-        high: Upper bounds, shape (d,).
-        free: Unknowns that may move at all, shape (d,).
-        step: The solution, shape (d,), filled.
-
-    Example:
-        >>> step, bound = np.empty(2), np.array([1.0, 1.0])
-        >>> bounded_solve(np.eye(2), np.array([0.5, 3.0]), -bound, bound, bound > 0, step)
-        >>> step
-        array([0.5, 1. ])
-    """
-    d = len(gradient)
-    fixed = ~free
-    releases = np.zeros(d, dtype=np.int64)
-    step[:] = 0.0
-    factor = np.empty_like(normal)
-    solution = np.empty(d)
-    while True:
-        for i in range(d):
-            solution[i] = step[i]
-            if fixed[i]:
-                factor[i, :i] = 0.0
-                factor[i, i] = 1.0
-                continue
-            value = gradient[i]
-            for j in range(d):
-                if fixed[j]:
-                    value -= (normal[i, j] if j < i else normal[j, i]) * step[j]
-                    if j < i:
-                        factor[i, j] = 0.0
-                elif j <= i:
-                    factor[i, j] = normal[i, j]
-            solution[i] = value
-        cholesky(factor)
-        cholesky_solve(factor, solution)
-        hit = False
-        for i in range(d):
-            if not fixed[i] and not low[i] <= solution[i] <= high[i]:
-                solution[i] = min(max(solution[i], low[i]), high[i])
-                fixed[i] = True
-                hit = True
-        step[:] = solution
-        if hit:
-            continue
-        worst, released = 0.0, -1
-        for i in range(d):
-            if fixed[i] and free[i] and releases[i] < 2:
-                slope = gradient[i]
-                for j in range(d):
-                    slope -= (normal[i, j] if j <= i else normal[j, i]) * step[j]
-                inward = -slope if step[i] >= high[i] else slope
-                if inward > worst and low[i] < high[i]:
-                    worst, released = inward, i
-        if released < 0:
-            return
-        fixed[released] = False
-        releases[released] += 1
 
 
 @njit(cache=True)
@@ -158,31 +82,3 @@ def cholesky_solve(factor: FloatArray, x: FloatArray) -> None:
         x[i] /= factor[i, i]
         for k in range(i):
             x[k] -= factor[i, k] * x[i]
-
-
-@njit(cache=True)
-def inverse_diagonal(normal: FloatArray, free: BoolArray, out: FloatArray) -> None:
-    """Fill the diagonal of the inverse of the free part of a matrix, given its lower triangle.
-
-    Example:
-        >>> out = np.zeros(2)
-        >>> inverse_diagonal(np.diag([4.0, 2.0]), np.array([True, True]), out)
-        >>> out
-        array([0.25, 0.5 ])
-    """
-    rows = np.flatnonzero(free)
-    factor = np.empty((len(rows), len(rows)))
-    for i in range(len(rows)):
-        for j in range(i + 1):
-            factor[i, j] = normal[rows[i], rows[j]]
-    cholesky(factor)
-    column = np.empty(len(rows))
-    for k in range(len(rows)):  # the inverse's diagonal: squared columns of L^-1
-        for i in range(k, len(rows)):
-            value = 1.0 if i == k else 0.0
-            for j in range(k, i):
-                value -= factor[i, j] * column[j]
-            column[i] = value / factor[i, i]
-        out[rows[k]] = 0.0
-        for i in range(k, len(rows)):
-            out[rows[k]] += column[i] ** 2

@@ -8,10 +8,10 @@ from scipy.spatial.transform import Rotation
 from mplearn.body import IKConfig, InverseKinematics, human_body, marker_set, robot_body
 from mplearn.body.calibration import Calibration
 from mplearn.body.follower import follower
-from mplearn.body.gauss_newton import solve_frame
+from mplearn.body.gauss_newton import normal_equations, solve_frame
 from mplearn.body.inverse_kinematics import FollowedState
 from mplearn.body.kinematics import integrate
-from mplearn.body.linkage import Linkage
+from mplearn.body.linkage import Linkage, locate
 from mplearn.errors import BodyError, FrameError, InvalidValueError
 from mplearn.mocap import GapTracker
 
@@ -126,6 +126,39 @@ def test_a_frame_is_solved_to_scipys_optimum(body, outlier_m):
     # the kernel sums its base rotation's steps; the difference is of second order in them
     np.testing.assert_allclose(q, best, atol=2e-3)
     assert np.isnan(residuals[3]) and residuals[7] > (0.3 if np.isfinite(outlier_m) else 0.1)
+
+
+@pytest.mark.parametrize("body", [human_body(), robot_body()], ids=["human", "robot"])
+def test_the_normal_equations_are_those_of_the_jacobian(body):
+    rng = np.random.default_rng(8)
+    tree = follower(body).tree
+    linkage, n = Linkage.of(tree), len(tree.joint_names)
+    bodies, offsets = marker_set("plug_in_gait39").attach(tree)
+    q = tree.rest
+    q[:3] += rng.normal(size=3)
+    q[3:7] = rng.normal(size=4)
+    q[3:7] /= np.linalg.norm(q[3:7])
+    q[7:] = rng.uniform(-1, 1, n) * np.where(tree.slides, 0.05, 1.0)
+    points = tree.points(q, bodies, offsets)
+    markers = points + rng.normal(0, 0.05, points.shape)
+    markers[5] = np.nan
+    residuals, weights = np.linalg.norm(markers - points, axis=1), rng.uniform(0, 2, 39)
+    mat, axes, anchors = (np.empty(s) for s in ((len(tree.parent), 3, 3), (n, 3), (n, 3)))
+    pos, at = np.empty((len(tree.parent), 3)), np.empty((39, 3))
+    locate(q, linkage, bodies, offsets, pos, mat, axes, anchors, at)
+    normal, gradient = np.full((6 + n, 6 + n), np.nan), np.full(6 + n, np.nan)
+    normal_equations(
+        q, markers, points, residuals, bodies, weights, 0.06, linkage, mat, axes, anchors,
+        np.empty((len(tree.parent), 16)), np.empty((6 + n, 6)), normal, gradient,
+    )  # fmt: skip
+    seen = np.isfinite(residuals)
+    jacobian = tree.jacobian(q, bodies[seen], offsets[seen]).reshape(-1, 6 + n)
+    weight = np.repeat(weights[seen] / (1 + (residuals[seen] / 0.06) ** 2), 3)
+    expected = jacobian.T @ (weight[:, None] * jacobian)
+    np.testing.assert_allclose(gradient, jacobian.T @ (weight * (markers - points)[seen].ravel()))
+    filled = np.isfinite(normal)
+    np.testing.assert_allclose(normal[filled], expected[filled], atol=1e-9)
+    assert not expected[~(filled | filled.T)].any()
 
 
 def test_known_bodies_are_followed_exactly():

@@ -1,11 +1,13 @@
 """Small and banded systems against whole matrices of numpy."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mplearn.maths.banded import factorise, multiply, solve
-from mplearn.maths.solvers import bounded_solve, inverse_diagonal, solve_damped
+from mplearn.maths.solvers import solve_damped
+from mplearn.maths.tree_solvers import bounded_solve, inverse_diagonal
 
 
 def test_damped_least_squares_is_numpys():
@@ -16,7 +18,8 @@ def test_damped_least_squares_is_numpys():
     np.testing.assert_allclose(solve_damped(a, b, 0.1), expected, atol=1e-9)
 
 
-def test_bounded_least_squares_satisfies_the_optimality_conditions():
+@pytest.mark.parametrize("dense", [True, False])
+def test_bounded_least_squares_satisfies_the_optimality_conditions(dense):
     rng = np.random.default_rng(6)
     for _ in range(300):
         d = int(rng.integers(2, 12))
@@ -24,7 +27,13 @@ def test_bounded_least_squares_satisfies_the_optimality_conditions():
         normal, gradient = a.T @ a, rng.normal(size=d) * 3
         low, high = -rng.uniform(0, 1, d), rng.uniform(0, 1, d)
         free, step = rng.random(d) > 0.2, np.empty(d)
-        bounded_solve(np.tril(normal), gradient, low, high, free, step)
+        above = np.arange(-1, d - 1) if dense else np.array([rng.integers(-1, i) for i in range(d)])
+        if not dense:  # nothing but between an unknown and those above it
+            on_path = np.eye(d, dtype=bool)
+            for i in range(d):
+                on_path[i] |= on_path[above[i]] if above[i] >= 0 else False
+            normal = np.where(on_path | on_path.T, normal, 0.0) + 10.0 * d * np.eye(d)
+        bounded_solve(np.tril(normal), gradient, low, high, free, above, step)
         assert ((low <= step) & (step <= high)).all() and not step[~free].any()
         slope = gradient - normal @ step
         inner = free & (step > low) & (step < high)
@@ -32,7 +41,7 @@ def test_bounded_least_squares_satisfies_the_optimality_conditions():
         assert (slope[free & (step <= low)] <= 1e-8).all()
         assert (slope[free & (step >= high)] >= -1e-8).all()
         out = np.empty(d)
-        inverse_diagonal(np.tril(normal), free, out)
+        inverse_diagonal(np.tril(normal), free, above, out)
         np.testing.assert_allclose(
             out[free], np.diag(np.linalg.inv(normal[np.ix_(free, free)])), rtol=1e-6
         )
