@@ -7,6 +7,7 @@ performed.
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from mplearn.errors import BodyError
 from mplearn.maths.yaw_roll_pitch import roll_pitch_of, yaw_roll_pitch_quaternion
@@ -75,3 +76,17 @@ def posture_of(
     q[..., 3:7] = np.stack(turn, axis=-1)
     q[..., 7 + body.driven] = features[..., 3:]
     return q
+
+
+@njit(cache=True)
+def join_angles(angles: FloatArray, last: float) -> float:
+    """Move angles by full turns, in place, so that each is near the one before; return the last.
+
+    Args:
+        angles: Shape (T,) [rad].
+        last: The one before the first [rad].
+    """
+    for t in range(len(angles)):
+        angles[t] += 2 * np.pi * np.round((last - angles[t]) / (2 * np.pi))
+        last = angles[t]
+    return last

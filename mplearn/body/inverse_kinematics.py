@@ -21,12 +21,10 @@ from mplearn.state import Array, SharedState, require, validated
 from .body import Body
 from .calibration import Calibration, fit
 from .follower import follower
-from .gauss_newton import solve_frame
+from .following import FEWEST_MARKERS as FEWEST_MARKERS
+from .following import FollowRules, follow_frames
 from .linkage import Linkage
 from .markers import MarkerSet, find_marker_set
-
-FEWEST_MARKERS = 3  # fewer do not say where a body is: the posture is held
-LARGEST_M = 3.5  # no person's markers span more along an axis
 
 
 @dataclass(frozen=True)
@@ -135,6 +133,15 @@ class InverseKinematics:
         self._bodies, _ = selected.attach(self._follower.tree)
         n = len(self._follower.tree.joint_names)
         self._drift = np.array([self.config.base_drift] * 3 + [self.config.joint_drift] * (3 + n))
+        reach = np.array([self.config.base_speed] * 3 + [self.config.joint_speed] * (3 + n))
+        self._rules = FollowRules(
+            reach=reach / self.rate_hz,
+            drift=self._drift**2 / self.rate_hz,
+            most_uncertain=self.config.most_uncertain**2,
+            outlier_m=self.config.outlier_m,
+            max_iterations=self.config.max_iterations,
+            tolerance=self.config.tolerance,
+        )
         self._weights = np.full(len(self._used), self.config.marker_sigma_m**-2)
         self.calibration: Calibration | None = None
         self.iterations = 0
@@ -166,7 +173,8 @@ class InverseKinematics:
         self._linkage = Linkage.of(self._tree)
         self._posture = calibration.posture.copy()
         self._variance = np.full(self._tree.n_dofs, self.config.most_uncertain**2)
-        self._fresh = True
+        self._fresh = np.ones(1, dtype=np.bool_)
+        self._limits = np.concatenate((np.tile((-np.inf, np.inf), (6, 1)), self._tree.limits))
         self.q = self._on_body()
 
     def update(self, markers: FloatArray) -> FloatArray:
@@ -183,61 +191,52 @@ class InverseKinematics:
             BodyError: `calibrate` was not called.
             FrameError: The frame has another shape, or holds infinite values.
         """
-        if self.calibration is None:
-            raise BodyError("calibrate before the first update: the person's size is not known")
         frame = np.asarray(markers, dtype=np.float64)
         if frame.shape != (len(self.marker_names), 3):
             raise FrameError(
                 f"a frame must have shape ({len(self.marker_names)}, 3), not {frame.shape}"
             )
-        frame = frame[self._used]
-        if np.isinf(frame).any():
+        return np.asarray(self.update_many(frame[None])[0])
+
+    def update_many(self, frames: FloatArray) -> FloatArray:
+        """Take many frames, (T, M, 3) to (T, 7 + n): bit-identical to `update` in a loop.
+
+        Raises:
+            BodyError: `calibrate` was not called.
+            FrameError: The frames have another shape, or hold infinite values.
+        """
+        if self.calibration is None:
+            raise BodyError("calibrate before the first update: the person's size is not known")
+        frames = np.asarray(frames, dtype=np.float64)
+        if frames.ndim != 3 or frames.shape[1:] != (len(self.marker_names), 3) or not len(frames):
+            raise FrameError(
+                f"frames must have shape (T, {len(self.marker_names)}, 3), not {frames.shape}"
+            )
+        if np.isinf(frames).any():
             raise FrameError("a frame holds infinite values; a missing marker is NaN")
-        config, dt = self.config, 1.0 / self.rate_hz
-        self._variance += self._drift**2 * dt
-        np.minimum(self._variance, config.most_uncertain**2, out=self._variance)
-        residuals = np.full(len(frame), np.nan)
-        self.iterations = 0
-        frame = _of_one_person(frame)
-        if np.isfinite(frame).all(axis=1).sum() >= FEWEST_MARKERS:
-            self.iterations = self._solve(frame, residuals, dt)
+        residuals = np.empty(len(self._used))
+        postures, self.iterations = follow_frames(
+            np.ascontiguousarray(frames[:, self._used]),
+            self._posture,
+            self._variance,
+            self._fresh,
+            self._bodies,
+            self.calibration.offsets,
+            self._weights,
+            self._linkage,
+            self._limits,
+            self._follower.free,
+            self._follower.rest_weight,
+            self._rules,
+            residuals,
+        )
         self.residual_m = np.full(len(self.marker_names), np.nan)
         self.residual_m[self._used] = residuals
-        self.q = self._on_body()
-        return self.q
-
-    def _solve(self, frame: FloatArray, residuals: FloatArray, dt: float) -> int:
-        config = self.config
-        angles, limits = self._posture[7:], self._tree.limits
-        reach = np.full(self._tree.n_dofs, config.joint_speed * dt)
-        reach[:3] = config.base_speed * dt
-        if self._fresh:
-            reach[:] = np.inf
-            self._fresh = False
-        low, high = -reach, reach
-        low[6:] = np.maximum(low[6:], limits[:, 0] - angles)
-        high[6:] = np.minimum(high[6:], limits[:, 1] - angles)
-        return int(
-            solve_frame(
-                self._posture,
-                self._variance,
-                frame,
-                self._bodies,
-                self.calibration.offsets,  # type: ignore[union-attr]
-                self._weights,
-                self._linkage,
-                low,
-                high,
-                self._follower.free,
-                self._follower.rest_weight,
-                config.outlier_m,
-                3.0,
-                0.5,
-                config.max_iterations,
-                config.tolerance,
-                residuals,
-            )
-        )
+        q: FloatArray = postures[:, self._follower.own]
+        q[:, 2] -= self.calibration.floor_m
+        q[:, :3] *= self.calibration.scale
+        self.q = q[-1]
+        return q
 
     def _on_body(self) -> FloatArray:
         """Return the posture in the body's own size, standing where the person's floor is."""
@@ -262,7 +261,7 @@ class InverseKinematics:
         if self.calibration is None:
             return None
         return FollowedState(
-            self.calibration, self._posture.copy(), self._variance.copy(), self._fresh
+            self.calibration, self._posture.copy(), self._variance.copy(), bool(self._fresh[0])
         )
 
     def load_state(self, state: FollowedState | None) -> None:
@@ -277,7 +276,7 @@ class InverseKinematics:
         self.check_fits(state)
         self._start(state.calibration)
         self._posture, self._variance = state.posture.copy(), state.variance.copy()
-        self._fresh = state.fresh
+        self._fresh[0] = state.fresh
         self.q = self._on_body()
 
     def check_fits(self, state: FollowedState) -> None:
@@ -296,13 +295,3 @@ class InverseKinematics:
             ("variance", state.variance, self._drift.shape),
         ):
             require(array.shape == wanted, place, f"must have shape {wanted}, not {array.shape}")
-
-
-def _of_one_person(frame: FloatArray) -> FloatArray:
-    """Return the markers (M, 3), NaN where they are too far from most others for a person."""
-    with np.errstate(invalid="ignore"):
-        span = np.fmax.reduce(frame) - np.fmin.reduce(frame)
-    if not (span > LARGEST_M).any():
-        return frame
-    far = np.abs(frame - np.nanmedian(frame, axis=0)) > LARGEST_M / 2  # (M, 3)
-    return np.where(far.any(axis=1, keepdims=True), np.nan, frame)

@@ -15,7 +15,7 @@ from mplearn.state import Array, Count, State, require, validated, within
 
 from .axes import Axes, axes_changed
 from .body import Body
-from .features import feature_channels, features_of
+from .features import feature_channels, features_of, join_angles
 from .identity import NOBODY, BodyIdentity, IdentityConfig, IdentityState
 from .inverse_kinematics import FEWEST_MARKERS, FollowedState, IKConfig
 from .resuming import ResumingKinematics
@@ -414,13 +414,9 @@ class MotionObserver:
         if wrong is None:
             wrong = np.zeros(len(frames), dtype=np.bool_)
         frames = np.where(wrong[:, None, None], np.nan, frames)
-        filled = frames
-        if self._gaps is not None:
-            filled = np.array([self._gaps.update(markers) for markers in frames])
-        features = features_of(np.array([self.ik.update(markers) for markers in filled]), self.body)
-        for row in features:  # the pitch is an angle of the whole circle: keep it continuous
-            row[2] += 2 * np.pi * np.round((self._last_pitch - row[2]) / (2 * np.pi))
-            self._last_pitch = float(row[2])
+        filled = frames if self._gaps is None else self._gaps.update_many(frames)
+        features = features_of(self.ik.update_many(filled), self.body)
+        self._last_pitch = float(join_angles(features[:, 2], self._last_pitch))
         unseen = np.isfinite(frames).all(axis=2).sum(axis=1) < FEWEST_MARKERS
         return Watched(features, unseen, why=why if wrong.any() else UNSEEN)
 

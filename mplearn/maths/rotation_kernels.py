@@ -132,3 +132,25 @@ def rotation_error(wanted: FloatArray, actual: FloatArray) -> FloatArray:
         return sine
     sine *= np.arctan2(s, cosine) / s
     return sine
+
+
+@njit(cache=True)
+def nearest_rotation(matrix: FloatArray) -> FloatArray:
+    """Return the rotation R, shape (3, 3), that is most like a matrix: tr(R' M) is largest.
+
+    Of ``M = sum target source'`` it carries the source points onto the target's best [Kabsch1976].
+
+    Example:
+        >>> nearest_rotation(np.diag([3.0, 2.0, 1.0])).round().astype(int)
+        array([[1, 0, 0],
+               [0, 1, 0],
+               [0, 0, 1]])
+    """
+    left, _, right = np.linalg.svd(matrix)
+    out = np.empty((3, 3))
+    handed = np.linalg.det(left) * np.linalg.det(right)
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = left[i, 0] * right[0, j] + left[i, 1] * right[1, j]
+            out[i, j] += handed * left[i, 2] * right[2, j]
+    return out

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, NamedTuple
 
 import numpy as np
+from numba import njit
 
 from ..errors import FrameError, InvalidValueError
-from ..recording import BoolArray, FloatArray, IntArray
+from ..recording import FloatArray, IntArray
 from ..state import Array, State, require, validated, within
-from .rigidity import RigidityState, RigidNeighbours
+from .rigidity import LookRules, Neighbours, RigidityState, predict, see_neighbours
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class GapTracker:
     """
 
     def __init__(self, n_markers: int, rate_hz: float, config: GapConfig | None = None) -> None:
-        from filterpy.gh import GHFilter, critical_damping_parameters
+        from filterpy.gh import critical_damping_parameters
 
         if n_markers < 1:
             raise InvalidValueError(f"n_markers must be at least 1, not {n_markers}")
@@ -88,14 +89,18 @@ class GapTracker:
         self.config = config or GapConfig()
         dt = 1.0 / rate_hz
         g, h = critical_damping_parameters(float(np.exp(-dt / self.config.memory_s)))
-        self._filter: Any = GHFilter(
-            x=np.full((n_markers, 3), np.nan), dx=np.zeros((n_markers, 3)), dt=dt, g=g, h=h
+        self._rules = GapRules(
+            dt=dt,
+            g=float(g),
+            h=float(h),
+            fade=float(np.exp(-dt / self.config.coast_s)),
+            reach_m=self.config.max_speed_m_s * dt,
+            noise_m=self.config.noise_m,
+            max_gap_frames=max(1, round(self.config.max_gap_s * rate_hz)),
         )
-        self._fade = float(np.exp(-dt / self.config.coast_s))
-        self._max_gap_frames = max(1, round(self.config.max_gap_s * rate_hz))
-        self._neighbours = RigidNeighbours(n_markers, rate_hz)
-        self._last = np.full((n_markers, 3), np.nan)  # the last believed measurement; NaN: no track
-        self._unseen_frames: IntArray = np.zeros(n_markers, np.int64)
+        self._looks = LookRules.at(rate_hz)
+        self._tracks = Tracks.empty(n_markers)
+        self._neighbours = Neighbours.empty(n_markers)
 
     def update(self, markers: FloatArray) -> FloatArray:
         """Take one frame and return it with its gaps filled.
@@ -109,43 +114,30 @@ class GapTracker:
         Raises:
             FrameError: The shape is wrong, or a position is infinite.
         """
-        measured = np.asarray(markers, dtype=np.float64)
-        if measured.shape != (self.n_markers, 3):
-            raise FrameError(f"markers must have shape ({self.n_markers}, 3), not {measured.shape}")
-        seen = np.isfinite(measured).all(axis=1)
-        if not seen.all() and np.isinf(measured).any():
+        frame = np.asarray(markers, dtype=np.float64)
+        if frame.shape != (self.n_markers, 3):
+            raise FrameError(f"markers must have shape ({self.n_markers}, 3), not {frame.shape}")
+        return np.asarray(self.update_many(frame[None])[0])
+
+    def update_many(self, frames: FloatArray) -> FloatArray:
+        """Take many frames, shape (T, M, 3): bit-identical to `update` in a loop.
+
+        Raises:
+            FrameError: The shape is wrong, or a position is infinite.
+        """
+        frames = np.ascontiguousarray(frames, dtype=np.float64)
+        if frames.shape[1:] != (self.n_markers, 3):
+            raise FrameError(f"frames must have shape (T, {self.n_markers}, 3), not {frames.shape}")
+        if np.isinf(frames).any():
             raise FrameError("a marker's position is infinite; a missing one is NaN")
-
-        tracked = ~np.isnan(self._last[:, 0])
-        seen &= ~tracked | self._within_reach(measured)
-        begun, held = seen & ~tracked, tracked & ~seen
-        filled = np.where(seen[:, None], measured, np.nan)
-        guesses = self._neighbours.update(filled, held)
-        state = self._filter
-        state.x[begun], state.dx[begun] = measured[begun], 0.0
-        if held.any():
-            filled[held] = guesses
-            blind = held & ~(tracked & self._within_reach(filled))
-            state.dx[blind] *= self._fade
-            filled[blind] = state.x[blind] + state.dx[blind] * state.dt
-        state.update(filled)
-
-        self._last[seen] = measured[seen]
-        self._unseen_frames = np.where(seen, 0, self._unseen_frames + 1)
-        lost = self._unseen_frames > self._max_gap_frames
-        if lost.any():
-            self._last[lost], filled[lost] = np.nan, np.nan
-        return filled
+        return np.asarray(
+            fill_gaps(frames, self._tracks, self._neighbours, self._rules, self._looks)
+        )
 
     def state(self) -> GapsState:
         """Return the whole state; `load_state` resumes bit for bit."""
-        return GapsState(
-            position=self._filter.x.copy(),
-            velocity=self._filter.dx.copy(),
-            last=self._last.copy(),
-            unseen_frames=self._unseen_frames.copy(),
-            neighbours=self._neighbours.state(),
-        )
+        copies = {name: each.copy() for name, each in self._tracks._asdict().items()}
+        return GapsState(**copies, neighbours=self._neighbours.state())
 
     def load_state(self, state: GapsState) -> None:
         """Resume from what `state` returned.
@@ -157,13 +149,104 @@ class GapTracker:
         n = len(state.last)
         require(n == self.n_markers, "last", f"is of {n} markers, not of {self.n_markers}")
         with within("neighbours"):
-            self._neighbours.load_state(state.neighbours)
-        self._filter.x, self._filter.dx = state.position.copy(), state.velocity.copy()
-        self._last, self._unseen_frames = state.last.copy(), state.unseen_frames.copy()
+            self._neighbours = Neighbours.from_state(state.neighbours, n)
+        self._tracks = Tracks(
+            state.position.copy(),
+            state.velocity.copy(),
+            state.last.copy(),
+            state.unseen_frames.copy(),
+        )
 
-    def _within_reach(self, positions: FloatArray) -> BoolArray:
-        """Whether a person can have moved each marker here since it was last seen, shape (M,)."""
-        reach_m = self.config.max_speed_m_s / self.rate_hz * (self._unseen_frames + 1)
-        way = positions - self._last
-        near: BoolArray = (way * way).sum(axis=1) <= (reach_m + self.config.noise_m) ** 2
-        return near
+
+class Tracks(NamedTuple):
+    """The markers' tracks, for kernels, which change them in place; see `GapsState`."""
+
+    position: FloatArray
+    velocity: FloatArray
+    last: FloatArray
+    unseen_frames: IntArray
+
+    @classmethod
+    def empty(cls, m: int) -> Tracks:
+        """Return those of m markers that were never seen."""
+        nowhere = np.full((m, 3), np.nan)
+        return cls(nowhere, np.zeros((m, 3)), nowhere.copy(), np.zeros(m, dtype=np.int64))
+
+
+class GapRules(NamedTuple):
+    """What a marker can do, for kernels.
+
+    Attributes:
+        dt: Time between frames [s].
+        g: Share of its error by which the filter corrects a position.
+        h: The same of a velocity, over dt.
+        fade: What is left of a velocity after a frame in which nothing is seen.
+        reach_m: How far a marker comes in a frame at most [m].
+        noise_m: How far apart two measurements of a resting marker can lie [m].
+        max_gap_frames: Frames after which an unseen marker is given up.
+    """
+
+    dt: float
+    g: float
+    h: float
+    fade: float
+    reach_m: float
+    noise_m: float
+    max_gap_frames: int
+
+
+@njit(cache=True)
+def fill_gaps(
+    frames: FloatArray, tracks: Tracks, neighbours: Neighbours, rules: GapRules, looks: LookRules
+) -> FloatArray:
+    """Return frames, shape (T, M, 3), with their gaps filled; see `GapTracker`."""
+    out = np.empty_like(frames)
+    n_markers = frames.shape[1]
+    seen, held = np.empty(n_markers, dtype=np.bool_), np.empty(n_markers, dtype=np.bool_)
+    for t in range(len(frames)):
+        filled = out[t]
+        for m in range(n_markers):
+            at = frames[t, m]
+            tracked = tracks.last[m, 0] == tracks.last[m, 0]
+            seen[m] = at[0] == at[0] and at[1] == at[1] and at[2] == at[2]
+            if seen[m] and tracked:
+                seen[m] = _within_reach(at, m, tracks, rules)
+            held[m] = tracked and not seen[m]
+            if not seen[m]:
+                filled[m] = np.nan
+                continue
+            filled[m] = at
+            if not tracked:
+                tracks.position[m] = at
+                tracks.velocity[m] = 0.0
+        see_neighbours(filled, held, neighbours, looks)
+        for m in range(n_markers):
+            if held[m]:  # what is seen of the frame is `before` by now
+                filled[m] = predict(m, neighbours.before, neighbours)
+                if not _within_reach(filled[m], m, tracks, rules):
+                    for i in range(3):
+                        tracks.velocity[m, i] *= rules.fade
+                        filled[m, i] = tracks.position[m, i] + tracks.velocity[m, i] * rules.dt
+            for i in range(3):
+                ahead = tracks.position[m, i] + tracks.velocity[m, i] * rules.dt
+                error = filled[m, i] - ahead
+                tracks.position[m, i] = ahead + rules.g * error
+                tracks.velocity[m, i] += rules.h * error / rules.dt
+            if seen[m]:
+                tracks.last[m] = frames[t, m]
+                tracks.unseen_frames[m] = 0
+                continue
+            tracks.unseen_frames[m] += 1
+            if tracks.unseen_frames[m] > rules.max_gap_frames:
+                tracks.last[m] = np.nan
+                filled[m] = np.nan
+    return out
+
+
+@njit(cache=True)
+def _within_reach(at: FloatArray, m: int, tracks: Tracks, rules: GapRules) -> bool:
+    """Say whether a person can have moved a marker here since it was last seen."""
+    way = 0.0
+    for i in range(3):
+        way += (at[i] - tracks.last[m, i]) ** 2
+    return bool(way <= (rules.reach_m * (tracks.unseen_frames[m] + 1) + rules.noise_m) ** 2)

@@ -9,11 +9,12 @@ motion [Kabsch1976], and the marker with them.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
+from numba import njit
 
-from ..maths.rigid_fit import fit_rigid
+from ..maths.rotation_kernels import nearest_rotation
 from ..recording import BoolArray, FloatArray, IntArray
 from ..state import Array, Count, State, require
 
@@ -44,87 +45,151 @@ class RigidityState(State):
     as_last_seen: Annotated[FloatArray, Array("m", "m", 3, nan=True)]
 
 
-class RigidNeighbours:
-    """Follows the distances between markers, and predicts one marker from the others.
+class Neighbours(NamedTuple):
+    """What is known of the distances between markers, for kernels, which change it in place.
 
-    Args:
-        n_markers: Number M of markers.
-        rate_hz: Frames per second [1/s].
+    Attributes are those of `RigidityState`; ``frames`` has shape (1,).
     """
 
-    def __init__(self, n_markers: int, rate_hz: float) -> None:
-        self.n_markers = n_markers
-        self.rate_hz = rate_hz
-        self._every_frames = max(1, round(_STEP_S * rate_hz))
-        self._forget = 1.0 - float(np.exp(-self._every_frames / rate_hz / _MEMORY_S))
-        square = (n_markers, n_markers)
-        self._mean = np.zeros(square)
-        self._variance = np.zeros(square)
-        self._looks: IntArray = np.zeros(square, np.int64)
-        self._frames = 0
-        self._before = np.full((n_markers, 3), np.nan)
-        self._as_last_seen = np.full((*square, 3), np.nan)
+    mean: FloatArray
+    variance: FloatArray
+    looks: IntArray
+    frames: IntArray
+    before: FloatArray
+    as_last_seen: FloatArray
 
-    def update(self, positions: FloatArray, lost: BoolArray) -> FloatArray:
-        """Take one frame, and predict the markers that are lost in it.
-
-        Args:
-            positions: What is seen, shape (M, 3) [m]; NaN elsewhere.
-            lost: Which of the unseen markers to predict, shape (M,).
-
-        Returns:
-            Positions of the lost markers, shape (K, 3) [m]; NaN where fewer than three others help.
-        """
-        before, self._before = self._before, positions.copy()
-        if self._frames % self._every_frames == 0:
-            self._look(positions)
-        self._frames += 1
-        if not lost.any():
-            return np.empty((0, 3))
-        self._as_last_seen[lost & ~np.isnan(before[:, 0])] = before
-        return self._predict(np.flatnonzero(lost), positions)
+    @classmethod
+    def empty(cls, m: int) -> Neighbours:
+        """Return what is known of m markers before the first frame."""
+        return cls(
+            mean=np.zeros((m, m)),
+            variance=np.zeros((m, m)),
+            looks=np.zeros((m, m), dtype=np.int64),
+            frames=np.zeros(1, dtype=np.int64),
+            before=np.full((m, 3), np.nan),
+            as_last_seen=np.full((m, m, 3), np.nan),
+        )
 
     def state(self) -> RigidityState:
         """Return the whole state."""
         return RigidityState(
-            mean=self._mean.copy(),
-            variance=self._variance.copy(),
-            looks=self._looks.copy(),
-            frames=self._frames,
-            before=self._before.copy(),
-            as_last_seen=self._as_last_seen.copy(),
+            mean=self.mean.copy(),
+            variance=self.variance.copy(),
+            looks=self.looks.copy(),
+            frames=int(self.frames[0]),
+            before=self.before.copy(),
+            as_last_seen=self.as_last_seen.copy(),
         )
 
-    def load_state(self, state: RigidityState) -> None:
-        """Resume from what `state` returned.
+    @classmethod
+    def from_state(cls, state: RigidityState, m: int) -> Neighbours:
+        """Return what `state` returned.
 
         Raises:
             StateError: It is of another number of markers.
         """
-        m = self.n_markers
         require(len(state.mean) == m, "mean", f"must be of {m} markers, not {len(state.mean)}")
-        self._mean, self._variance = state.mean.copy(), state.variance.copy()
-        self._looks, self._frames = state.looks.copy(), state.frames
-        self._before, self._as_last_seen = state.before.copy(), state.as_last_seen.copy()
+        return cls(
+            state.mean.copy(),
+            state.variance.copy(),
+            state.looks.copy(),
+            np.array([state.frames], dtype=np.int64),
+            state.before.copy(),
+            state.as_last_seen.copy(),
+        )
 
-    def _look(self, positions: FloatArray) -> None:
-        """Follow mean and variance of all distances, in exponential memory."""
-        distances = np.linalg.norm(positions[:, None] - positions[None], axis=2)
-        known = ~np.isnan(distances)
-        self._looks += known
-        share = np.where(known, np.maximum(self._forget, 1.0 / np.maximum(self._looks, 1)), 0.0)
-        change = np.where(known, distances - self._mean, 0.0)
-        self._mean += share * change
-        self._variance = (1.0 - share) * (self._variance + share * change**2)
 
-    def _predict(self, which: IntArray, positions: FloatArray) -> FloatArray:
-        then = self._as_last_seen[which]  # (K, M, 3)
-        helps = ~np.isnan(then[:, :, 0]) & ~np.isnan(positions[None, :, 0])  # (K, M)
-        own = then[np.arange(len(which)), which]  # (K, 3)
-        doubt = self._variance[which] + _UNKNOWN_M**2 / np.maximum(self._looks[which], 1)
-        weights = np.where(helps, (doubt + _NOISE_M**2) ** -2.0, 0.0)
-        enough = helps.sum(axis=1) >= 3
-        fit = fit_rigid(then[enough], positions, weights[enough])
-        predicted = np.full((len(which), 3), np.nan)
-        predicted[enough] = fit.apply(own[enough][:, None])[:, 0]
-        return predicted
+class LookRules(NamedTuple):
+    """How distances are followed, for kernels: every so many frames, forgetting such a share."""
+
+    every_frames: int
+    forget: float
+
+    @classmethod
+    def at(cls, rate_hz: float) -> LookRules:
+        """Return the rules at a frame rate."""
+        every_frames = max(1, round(_STEP_S * rate_hz))
+        return cls(every_frames, 1.0 - float(np.exp(-every_frames / rate_hz / _MEMORY_S)))
+
+
+@njit(cache=True)
+def see_neighbours(
+    positions: FloatArray, held: BoolArray, known: Neighbours, rules: LookRules
+) -> None:
+    """Take up a frame.
+
+    Args:
+        positions: What is seen, shape (M, 3) [m]; NaN elsewhere.
+        held: Which of the unseen markers will be predicted, shape (M,).
+        known: What is known of the distances; changed in place.
+        rules: How they are followed.
+    """
+    if known.frames[0] % rules.every_frames == 0:
+        _look(positions, known, rules.forget)
+    known.frames[0] += 1
+    for m in range(len(positions)):
+        if held[m] and known.before[m, 0] == known.before[m, 0]:
+            known.as_last_seen[m] = known.before
+    known.before[:] = positions
+
+
+@njit(cache=True)
+def _look(positions: FloatArray, known: Neighbours, forget: float) -> None:
+    """Follow mean and variance of all distances, in exponential memory."""
+    for i in range(len(positions)):
+        for j in range(len(positions)):
+            square = 0.0
+            for axis in range(3):
+                square += (positions[i, axis] - positions[j, axis]) ** 2
+            if square != square:
+                continue
+            known.looks[i, j] += 1
+            share = max(forget, 1.0 / known.looks[i, j])
+            change = np.sqrt(square) - known.mean[i, j]
+            known.mean[i, j] += share * change
+            known.variance[i, j] = (1.0 - share) * (known.variance[i, j] + share * change**2)
+
+
+@njit(cache=True)
+def predict(m: int, positions: FloatArray, known: Neighbours) -> FloatArray:
+    """Return where an unseen marker must be, shape (3,) [m].
+
+    Args:
+        m: The marker.
+        positions: What is seen, shape (M, 3) [m]; NaN elsewhere.
+        known: What is known of the distances.
+
+    Returns:
+        NaN where fewer than three others help.
+    """
+    then = known.as_last_seen[m]
+    weights = np.zeros(len(positions))
+    helping, total = 0, 0.0
+    middle_then, middle_now = np.zeros(3), np.zeros(3)
+    for k in range(len(positions)):
+        if then[k, 0] != then[k, 0] or positions[k, 0] != positions[k, 0]:
+            continue
+        doubt = known.variance[m, k] + _UNKNOWN_M**2 / max(known.looks[m, k], 1)
+        weights[k] = (doubt + _NOISE_M**2) ** -2.0
+        helping += 1
+        total += weights[k]
+        for i in range(3):
+            middle_then[i] += weights[k] * then[k, i]
+            middle_now[i] += weights[k] * positions[k, i]
+    if helping < 3:
+        return np.full(3, np.nan)
+    middle_then /= total
+    middle_now /= total
+    spread = np.zeros((3, 3))
+    for k in range(len(positions)):
+        if weights[k] > 0.0:
+            for i in range(3):
+                part = weights[k] / total * (positions[k, i] - middle_now[i])
+                for j in range(3):
+                    spread[i, j] += part * (then[k, j] - middle_then[j])
+    turn = nearest_rotation(spread)
+    out = middle_now.copy()
+    for i in range(3):
+        for j in range(3):
+            out[i] += turn[i, j] * (then[m, j] - middle_then[j])
+    return out
