@@ -12,6 +12,7 @@ from mplearn.errors import InvalidValueError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from mplearn.anatomy import Bodies
     from mplearn.mocap import Hints, Takes
     from mplearn.recording import Recording
 
@@ -26,6 +27,12 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--rate", type=float, help="frames per second in the files [1/s]")
     group.add_argument(
         "--skeleton", type=Path, metavar="ASF", help="the skeleton that belongs to AMC files"
+    )
+    group.add_argument(
+        "--map",
+        type=Path,
+        metavar="FILE",
+        help="which point is which place of the body, a line each: LeftUpLeg = hip_l",
     )
     parser.add_argument(
         "--strict", action="store_true", help="refuse all if one take is refused; else leave it out"
@@ -71,6 +78,19 @@ def say_takes(console: Console, takes: Takes) -> None:
         for line in remarks(recording):
             said.setdefault(line, []).append(recording.name)
     for line, names in said.items():  # what is said of many takes is said once
+        console.print(f"{_listed(names)}: {line}", markup=False, highlight=False)
+
+
+def say_bodies(console: Console, bodies: Bodies) -> None:
+    """Say what was recognised in the takes: what is left out, what is in doubt."""
+    said: dict[str, list[str]] = {}
+    for name, body in bodies.maps.items():
+        for line in (f"warning: {text}" for text in body.warnings):
+            said.setdefault(line, []).append(name)
+        left = f"; left out: {_listed(body.left_out)}" if body.left_out else ""
+        line = f"a body by {len(body.places)} places{left}"
+        said.setdefault(line, []).append(name)
+    for line, names in said.items():
         console.print(f"{_listed(names)}: {line}", markup=False, highlight=False)
 
 

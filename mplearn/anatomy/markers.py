@@ -14,6 +14,7 @@ import numpy as np
 from ..body import MarkerSet, find_marker_set, human_body, marker_set
 from ..body.markers import plain_name
 from ..errors import BodyError
+from ..mocap.options import option
 from ..recording import FloatArray, Recording
 from .body_map import BodyMap
 from .labels import landmarks_of, names_joints
@@ -66,7 +67,7 @@ def recognise_markers(recording: Recording, names: Mapping[str, str] | None = No
         raise BodyError(
             f"the markers of {recording.name!r} belong to no known set, and of their labels "
             f"({', '.join(labels[:6])}, ...) {len(found)} are known; a map file says which marker "
-            "sits where (--map)"
+            f"sits where ({option('names')})"
         )
     return _map(labels, found, warnings=tuple(warnings))
 
@@ -186,7 +187,8 @@ def _drop_odd(
             return
         worst = max(odd, key=lambda label: odd[label])
         warnings.append(
-            f"{worst!r} is left out: it does not lie where {found[worst]!r} does (--map settles it)"
+            f"{worst!r} is left out: it does not lie where {found[worst]!r} does "
+            f"({option('names')} settles it)"
         )
         del found[worst]
 

@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..recording import FloatArray
+from ..recording import BoolArray, FloatArray
 
 BENT = 0.03  # how much of its length a bone may seem to lose by bending
+STRAIGHT_DEG, STIFF = 2.0, 3.0  # a joint that bends less is hardly a knee or a wrist: what it costs
 STRANGE = 12.0  # what a limb costs that no person has
 
 
@@ -51,15 +52,27 @@ def fit_limb(chain: FloatArray, law: LimbLaw) -> Limb:
     """
     n = chain.shape[1]
     bones = np.median(np.linalg.norm(np.diff(chain, axis=1), axis=2), axis=0)  # (n - 1,)
+    stiff = _never_bends(chain)
     along = np.concatenate(([0.0], np.cumsum(bones)))
     best = Limb((0, 1, 2), np.inf)
     for first, middle, last in combinations(range(n), 3):
         if first == 0 and n > 3:
             continue
         cost = _cost(chain, along, (first, middle, last), law)
+        cost += STIFF * float(stiff[middle] + stiff[last])
         if cost < best.cost:
             best = Limb((first, middle, last), cost)
     return best
+
+
+def _never_bends(chain: FloatArray) -> BoolArray:
+    """Return which joints of a chain are straight in every frame, shape (n,); not its ends."""
+    bones = np.diff(chain, axis=1)
+    bones /= np.maximum(np.linalg.norm(bones, axis=2, keepdims=True), 1e-9)
+    cosines = (bones[:, :-1] * bones[:, 1:]).sum(axis=2).min(axis=0)
+    stiff = np.zeros(chain.shape[1], dtype=np.bool_)
+    stiff[1:-1] = cosines > np.cos(np.radians(STRAIGHT_DEG))
+    return stiff
 
 
 def _cost(

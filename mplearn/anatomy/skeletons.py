@@ -9,6 +9,7 @@ of the file enters, so the order and the axes of its rotations do not matter.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -17,9 +18,11 @@ import numpy as np
 from ..body.marker_tables import TABLES
 from ..errors import BodyError
 from ..mocap.kinematics import AXIS_MARK
+from ..mocap.options import option
 from ..recording import FloatArray, IntArray, Recording, Skeleton
 from .body_map import BodyMap
 from .joint_tree import JointTree
+from .markers import recognise_markers
 from .name_hints import left_of_pair
 from .plan import LimbPair, Plan, find_plan
 from .sides import facing_votes
@@ -38,12 +41,13 @@ _PEOPLE_M = (0.7, 2.3)  # statures
 _UNITS_M = (1.0, 0.1, 0.01, 0.001, 0.0254, 0.3048, 0.0254 / 0.45)
 
 
-def recognise_skeleton(recording: Recording) -> BodyMap:
+def recognise_skeleton(recording: Recording, names: Mapping[str, str] | None = None) -> BodyMap:
     """Find the body in a recording of joint positions.
 
     Args:
         recording: Joint positions with their skeleton, best with the joints' axes
             (`Hints.joint_axes`).
+        names: Place of the body by joint, for what is known better; "" leaves a joint out.
 
     Raises:
         BodyError: There is no body in it, or left and right cannot be told apart, with the reason.
@@ -58,14 +62,16 @@ def recognise_skeleton(recording: Recording) -> BodyMap:
         raise BodyError(f"recording {recording.name!r} has no frame in which all joints are known")
     tree = JointTree.of(body, some[:, : len(body)])
     plan = find_plan(tree)
-    names = ", ".join(skeleton.names[:6])
     if plan is None or plan.legs is None or plan.arms is None:
+        if names:
+            return recognise_markers(recording, names)
+        some_names = ", ".join(skeleton.names[:6])
         raise BodyError(
-            f"no body in the skeleton of {recording.name!r} ({len(body)} joints: {names}, ...): "
-            f"two legs and two arms were not found among its branches; a map file says which joint "
-            f"is which (--map, or recognise(..., names=...))"
+            f"no body in the skeleton of {recording.name!r} ({len(body)} joints: {some_names}, "
+            "...): two legs and two arms were not found among its branches; "
+            f"{option('names')} says which joint is which"
         )
-    everything = skeleton.names, skeleton.offsets
+    everything = skeleton.names, skeleton.offsets, dict(names or {})
     return _Builder(recording.name, body, axes, some, tree, plan, *everything).build()
 
 
@@ -96,6 +102,7 @@ class _Builder:
     plan: Plan
     all_names: tuple[str, ...]  # with the points that show axes
     all_offsets: FloatArray
+    told: dict[str, str]  # what a user says: place by joint
     used: dict[str, tuple[int, ...]] = field(default_factory=dict)
     rows: dict[str, dict[int, float]] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
@@ -110,6 +117,7 @@ class _Builder:
         for side in "lr":
             self._hand(side)
             self._foot(side)
+        self._as_told()
         return self._map()
 
     # ---- who is where
@@ -118,20 +126,23 @@ class _Builder:
         """Order both pairs left first."""
         legs, arms = self.plan.legs, self.plan.arms
         assert legs is not None and arms is not None
+        told = self._told_left(legs) or self._told_left(arms)
         votes = facing_votes(self.tree, self.plan)
         facing = sum(value for _, value in votes) / max(1.0, np.sqrt(len(votes)))
         said = left_of_pair(*self._names(legs))
-        if abs(facing) > 0.3 and said and np.sign(facing) != said:
+        if told:
+            said = told
+        elif abs(facing) > 0.3 and said and np.sign(facing) != said:
             seen = ", ".join(f"{why} {value:+.1f}" for why, value in votes)
             raise BodyError(
                 f"{self.name!r} is mirrored: its names call the one side left, and by the way it "
                 f"faces it is the right one ({seen}); is an axis turned round, or are the names "
-                "exchanged? A map file says which joint is which (--map)"
+                f"exchanged? {option('names')} says which joint is which"
             )
-        if abs(facing) <= 0.3 and not said:
+        elif abs(facing) <= 0.3 and not said:
             raise BodyError(
                 f"cannot tell left from right in {self.name!r}: nothing points ahead clearly, and "
-                "the names do not say; a map file does (--map)"
+                f"the names do not say; {option('names')} does"
             )
         left_first = (said or np.sign(facing)) > 0
         hips = self._between(legs) * (1.0 if left_first else -1.0)
@@ -139,13 +150,38 @@ class _Builder:
         same = float(np.median((hips * shoulders).sum(axis=1)))
         arm_said = left_of_pair(*self._names(arms))
         arms_left_first = same > 0
-        if arm_said and (arm_said > 0) != arms_left_first:
+        if not told and arm_said and (arm_said > 0) != arms_left_first:
             raise BodyError(
                 f"the arms of {self.name!r} are called left and right the other way round than its "
-                "legs; a map file says which joint is which (--map)"
+                f"legs; {option('names')} says which joint is which"
             )
         self.legs = legs if left_first else _exchanged(legs)
         self.arms = arms if arms_left_first else _exchanged(arms)
+
+    def _told_left(self, pair: LimbPair) -> int:
+        """Return 1 if a user calls a joint of the first limb left, -1 of the second, 0 neither."""
+        for sign, nodes, inner, outer in zip(
+            (1, -1), pair.nodes, pair.inner, pair.outer, strict=True
+        ):
+            for name in (n for node in (*nodes, *inner, *outer) for n in self.tree.names[node]):
+                side = self.told.get(name, "")[-2:]
+                if side in ("_l", "_r"):
+                    return sign if side == "_l" else -sign
+        return 0
+
+    def _as_told(self) -> None:
+        """Put places where a user says they are, and leave out what is to be left out."""
+        for name, place in self.told.items():
+            if name not in self.skeleton.names:
+                continue
+            joint = self.skeleton.names.index(name)
+            if place:
+                self.rows[place] = {joint: 1.0}
+                node = next(n for n, group in enumerate(self.tree.joints) if joint in group)
+                self.used[place] = (node,)
+            else:
+                for other in [p for p, row in self.rows.items() if joint in row]:
+                    del self.rows[other]
 
     def _names(self, pair: LimbPair) -> tuple[list[str], list[str]]:
         sides = [(*inner, *nodes) for inner, nodes in zip(pair.inner, pair.nodes, strict=True)]
@@ -195,12 +231,12 @@ class _Builder:
             if not fitting:
                 raise BodyError(
                     f"the person in {self.name!r} would be {self.stature_m:.3g} m tall; is the "
-                    "unit of length right? (--unit, or Hints(unit_m=...))"
+                    f"unit of length right? ({option('unit_m')} sets it)"
                 )
             self.factor = min(fitting, key=lambda f: abs(np.log(f * self.stature_m / 1.7)))
             self.warnings.append(
                 f"the person would be {self.stature_m:.3g} m tall: all lengths are multiplied by "
-                f"{self.factor:.4g} (--unit settles it)"
+                f"{self.factor:.4g} ({option('unit_m')} settles it)"
             )
         # relative to the reference, in the recording's unit
         self.size = float(measured / expected)
@@ -258,7 +294,7 @@ class _Builder:
             self.turn = np.diag((1.0, -1.0, -1.0)) @ self.turn
         self.warnings.append(
             f"the person stands along {'-' if sign < 0 else ''}{'xyz'[axis]}, so that was taken "
-            "for up (--up settles it)"
+            f"for up ({option('up_axis')} settles it)"
         )
 
     def _neutral(self, joint: int) -> FloatArray | None:

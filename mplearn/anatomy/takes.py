@@ -44,17 +44,23 @@ def recognise(recording: Recording, *, names: Mapping[str, str] | None = None) -
         BodyError: There is no body in it, with the reason, and the option that would settle it.
     """
     if recording.skeleton is not None and recording.is_markers:
-        return recognise_skeleton(recording)
+        return recognise_skeleton(recording, names)
     return recognise_markers(recording, names)
 
 
-def as_bodies(recordings: Sequence[Recording], *, strict: bool = False) -> Bodies:
+def as_bodies(
+    recordings: Sequence[Recording],
+    *,
+    names: Mapping[str, str] | None = None,
+    strict: bool = False,
+) -> Bodies:
     """Recognise the body in each take, and join takes by the places of the body.
 
     Takes of another kind than most (markers among skeletons) are refused: their points differ.
 
     Args:
         recordings: Markers, or joint positions with their skeleton (`Hints.joint_axes`).
+        names: Place of the body by point, for what is known better; see `recognise`.
         strict: Whether a take in which nobody is recognised is an error; otherwise it is refused as
             long as another one is recognised.
 
@@ -66,7 +72,7 @@ def as_bodies(recordings: Sequence[Recording], *, strict: bool = False) -> Bodie
     found: list[Recording] = []
     for recording in recordings:
         try:
-            body = recognise(recording)
+            body = recognise(recording, names=names)
             found.append(body.apply(recording))
         except MPLearnError as error:
             if strict or len(recordings) == 1:

@@ -11,7 +11,9 @@ _COMMAND_LINE = {
     "up_axis": "--up",
     "rate_hz": "--rate",
     "skeleton": "--skeleton",
+    "names": "--map",
 }
+_PYTHON = {"names": "names={...}"}  # what is no hint
 _on_command_line: ContextVar[bool] = ContextVar("_on_command_line", default=False)
 
 
@@ -34,4 +36,4 @@ def option(hint: str, value: str = "...") -> str:
     """
     if _on_command_line.get():
         return _COMMAND_LINE[hint] + ("" if value == "..." else f" {value}")
-    return f"Hints({hint}={value})"
+    return _PYTHON.get(hint, f"Hints({hint}={value})")

@@ -9,7 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mplearn.errors import MPLearnError, RecordingError
-from mplearn_agents.reading import add_reading_arguments, hints_of, say_left_out, say_takes
+from mplearn_agents.reading import (
+    add_reading_arguments,
+    hints_of,
+    say_bodies,
+    say_left_out,
+    say_takes,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -112,12 +118,14 @@ def _of_one_kind(
     args: argparse.Namespace, recordings: tuple[Recording, ...], console: Console
 ) -> tuple[Recording, ...]:
     """Return the takes with the same channels: as bodies, or joined by the names they share."""
-    from mplearn.anatomy import as_bodies
+    from mplearn.anatomy import as_bodies, read_map
     from mplearn.mocap import join_by_name
 
     refused: Mapping[str, MPLearnError]
     if args.observe == "robot" and any(recording.is_markers for recording in recordings):
-        bodies = as_bodies(recordings, strict=args.strict)
+        names = None if args.map is None else read_map(args.map)
+        bodies = as_bodies(recordings, names=names, strict=args.strict)
+        say_bodies(console, bodies)
         refused, recordings = bodies.refused, bodies.recordings
     else:
         joined = join_by_name(recordings)
