@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from known_person import Truth
 from rigs import NAMES, RIGS, Rig, write_rig
 
 from mplearn.anatomy import recognise
@@ -98,8 +99,6 @@ def test_people_of_other_proportions(tmp_path, seed):
     body = human_body(float(rng.uniform(1.0, 2.0)), longer)
     path = write_rig(tmp_path / "rig.bvh", body, shown.posture.frames, 25.0, Rig(fingers=True))
     recording = open_recording(path, positions=True, hints=Hints(joint_axes=True))
-    from conftest import Truth
-
     angles, points = Truth(body, shown.posture.frames, shown.recording).errors(
         recognise(recording).apply(recording)
     )

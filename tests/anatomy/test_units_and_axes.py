@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Truth
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from known_person import Truth
 from rigs import RIGS, Rig, write_rig
 
 from mplearn.body import human_body
