@@ -8,6 +8,7 @@ from label_sets import SETS, labelled
 
 from mplearn.anatomy import recognise
 from mplearn.errors import BodyError
+from mplearn.mocap import command_line
 from mplearn.recording import marker_channels
 
 
@@ -46,7 +47,9 @@ def test_labels_that_nobody_knows_are_refused_with_the_option(truth):
     unknown = replace(
         recording, channels=marker_channels(tuple(f"M{i:03d}" for i in range(len(SETS["cast"]))))
     )
-    with pytest.raises(BodyError, match="--map"):
+    with pytest.raises(BodyError, match="names="):
+        recognise(unknown)
+    with command_line(), pytest.raises(BodyError, match="--map"):
         recognise(unknown)
     told = dict(zip(unknown.marker_names, SETS["cast"].values(), strict=True))
     body = recognise(unknown, names=told)

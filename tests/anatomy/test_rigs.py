@@ -73,7 +73,7 @@ def test_a_mirrored_recording_is_refused_with_the_option(tmp_path, truth):
         frames=flipped.reshape(len(recording), -1),
         skeleton=replace(recording.skeleton, offsets=recording.skeleton.offsets * (1, -1, 1)),
     )
-    with pytest.raises(BodyError, match=r"mirrored.*--map"):
+    with pytest.raises(BodyError, match=r"mirrored.*names="):
         recognise(mirrored)
 
 
