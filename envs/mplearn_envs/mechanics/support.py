@@ -9,6 +9,7 @@ from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray, IntArray
 
 GRAVITY = 9.81
+_SLANT = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
 def convex_hull(points: FloatArray) -> FloatArray:
@@ -28,9 +29,11 @@ def convex_hull(points: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def _chain(points: FloatArray) -> FloatArray:
-    """Andrew's monotone chain: sort by x, then make the lower and the upper half."""
-    order = np.argsort(points[:, 1], kind="mergesort")
-    order = order[np.argsort(points[order, 0], kind="mergesort")]
+    """Andrew's monotone chain: sort along a line, then make the lower and the upper half.
+
+    The line is aslant, for of two soles side by side four corners share their x but for rounding.
+    """
+    order = np.argsort(points[:, 0] + _SLANT * points[:, 1])
     n = points.shape[0]
     hull = np.empty((2 * n + 2, 2))
     size = 0

@@ -41,6 +41,20 @@ def test_margins_of_a_rectangle():
     np.testing.assert_allclose(support_margin(hull, points), [1.0, 0.5, -1.0, np.nan])
 
 
+@pytest.mark.parametrize("yaw", [0.0, 0.3, -1.2])
+def test_rounding_of_soles_side_by_side_costs_no_corner(yaw):
+    rng = np.random.default_rng(0)
+    sole = np.array([[0.15, 0.05], [0.15, -0.05], [-0.1, -0.05], [-0.1, 0.05]])
+    aside = np.array([0.0, 0.1])
+    corners = np.concatenate((sole + aside, sole - aside))
+    turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+    for _ in range(200):
+        seen = (corners + rng.uniform(-1, 1, corners.shape) * 1e-17) @ turn.T
+        seen += rng.uniform(-1, 1, corners.shape) * 1e-16
+        margin = support_margin(convex_hull(rng.permutation(seen)), np.zeros(2))
+        assert margin == pytest.approx(0.1, abs=1e-9)
+
+
 def test_points_without_a_polygon_are_refused():
     with pytest.raises(InvalidValueError, match="no polygon"):
         convex_hull(np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]))
