@@ -15,6 +15,10 @@ from ..errors import RecordingError
 _MOST_PACKED = 60  # times; tables of measured numbers pack to a half or a tenth
 _SMALL_BYTES = 4_000_000
 _LONGEST_SHOWN = 300  # characters of what a file holds
+_LARGE_BYTES = 8_000_000
+# characters that a line, and a cell, of a large table has at least: more lines of nothing than
+# memory holds are no measurement
+_LEAST_LINE, _LEAST_CELL = 12, 1.6
 
 
 def suffix(path: Path) -> str:
@@ -110,6 +114,13 @@ def read_text(path: Path) -> str:
     data = read_bytes(path)
     if b"\0" in data:
         raise bad_file(path, "the file is binary", f"the text of a {suffix(path)} recording")
+    if len(data) > _LARGE_BYTES:
+        n_lines = data.count(b"\n")
+        n_cells = n_lines + sum(map(data.count, (b",", b";", b"\t")))
+        if len(data) < max(_LEAST_LINE * n_lines, _LEAST_CELL * n_cells):
+            raise bad_file(
+                path, f"{n_lines} lines of hardly any characters", "lines of measured values"
+            )
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:

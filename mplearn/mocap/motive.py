@@ -70,7 +70,7 @@ def _block(sheet: Sheet, findings: Findings) -> Block:
         "name": above[kinds + 1],
         "property": [cell.lower() for cell in above[axes - 1]],
     }
-    kind, name, what = (row + [""] * (width - len(row)) for row in rows.values())
+    kind, name, what = ((row + [""] * width)[:width] for row in rows.values())
     for wanted in _WANTED:
         kept = [
             kind[i] in wanted and what[i] in ("position", "") and bool(name[i])

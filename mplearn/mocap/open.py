@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
+import numpy as np
+
 from ..errors import RecordingError, RecordingWarning
 from ..recording import ReadReport, Recording
 from .amc import AMCReader
@@ -200,7 +202,9 @@ def _read(
 ) -> Recording:
     parts = []
     for file in take.files:
-        part = take.reader.read(file, hints or Hints(), positions=positions)
+        # numbers that no one measured overflow: what comes of them is checked, and refused
+        with np.errstate(over="ignore", invalid="ignore"):
+            part = take.reader.read(file, hints or Hints(), positions=positions)
         if not part.labels:
             part = replace(part, labels=labels_beside(file, part))
         if part.report is None:

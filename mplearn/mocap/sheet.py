@@ -19,8 +19,6 @@ _UNIT = re.compile(
     r"[\[(]?(mm|cm|m|meters?|millimeters?|s|sec|seconds|ms|deg|degrees|°|rad)[\])]?", re.I
 )
 _LOOK = 40  # lines
-_MANY_CELLS = 4_000_000
-_EMPTY = 1.6  # characters a cell, separator included: hardly any cell holds a number
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,19 +39,12 @@ class Sheet:
 
     @classmethod
     def of(cls, path: Path, text: str, separators: str = ",;\t") -> Sheet:
-        """Return a text as a table; what separates its cells is found out.
-
-        Raises:
-            RecordingError: Hardly any cell of a large table holds a number.
-        """
+        """Return a text as a table; what separates its cells is found out."""
         lines = text.splitlines()
         some = [line for line in lines[:_LOOK] if line.strip()]
         # the first line that has any tells: names hold no separators, numbers may hold commas
         telling = next((line for line in some if any(s in line for s in separators)), "")
         separator = max(separators, key=telling.count) if telling else ""
-        n_cells = text.count(separator) if separator else 0
-        if n_cells > _MANY_CELLS and len(text) < _EMPTY * n_cells:
-            raise bad_file(path, f"{n_cells} cells, hardly one with a number", "measured values")
         sheet = cls(path, lines, separator, False)
         cells = [cell for i in range(min(len(lines), _LOOK)) for cell in sheet.cells(i)]
         commas = sum(bool(_DECIMAL_COMMA.fullmatch(cell)) for cell in cells)
