@@ -98,6 +98,10 @@ def _frames(
     if not starts or starts[0] != 0:
         raise bad_file(path, f"starts with {lines[0][0][:40] if lines else ''!r}", _EXPECTED)
     height = starts[1] if len(starts) > 1 else len(lines)
+    if len(starts) > 1 and len(lines) < starts[-1] + height:
+        findings.warn(f"the last frame, {lines[starts[-1]][0][:12]}, is cut off: left out")
+        cut = starts.pop()
+        del lines[cut:], places[cut:]
     if height == 1 or len(lines) != height * len(starts) or any(np.diff(starts) != height):
         wrong = next((i for i, s in enumerate(starts) if s != i * height), len(starts))
         raise bad_file(path, f"frame {wrong} has another number of bones than the first", _EXPECTED)
@@ -116,9 +120,8 @@ def _frames(
         rows = lines[row::height]
         for frame, words in enumerate(rows):
             if words[0] != bone:
-                raise bad_file(
-                    path, f"bone {words[0]!r} in frame {count[frame]}", f"{bone!r}, as before"
-                )
+                number = lines[starts[frame]][0]
+                raise bad_file(path, f"bone {words[0]!r} in frame {number}", f"{bone!r}, as before")
         layout.append((bone, len(cells)))
         where = places[row::height]
         tables.append(numbers(path, [words[1:] for words in rows], len(cells), where))

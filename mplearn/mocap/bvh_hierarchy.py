@@ -152,6 +152,8 @@ class _Parser:
         where = f"OFFSET of {name}"
         words = list(self._until(*_KEYWORDS))
         cells = [cell for word in words for cell in split_glued(word.rstrip(",").replace(",", "."))]
+        if len(cells) == 6:  # SOMA adds how the joint is turned at rest; its channels say so too
+            cells = cells[:3]
         if len(cells) != 3:
             raise bad_file(self.path, f"{where} has {len(cells)} numbers", "three")
         values = [missing_or_number(cell) for cell in cells]

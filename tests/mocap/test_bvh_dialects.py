@@ -77,6 +77,9 @@ DIALECTS: dict[str, tuple[Callable[[str], str], str]] = {
     "channels miscounted": (
         lambda s: s.replace("CHANNELS 1 Xrotation", "CHANNELS 3 Xrotation"), "1 channels, not 3",
     ),
+    "offsets with rotations": (
+        lambda s: re.sub(r"(OFFSET \S+ \S+ \S+)", r"\1 90.0 0.5 -90.0", s), "",
+    ),
     "channels before the offset": (
         lambda s: s.replace(
             "    OFFSET 9 -2 0\n    CHANNELS 1 Xrotation", "CHANNELS 1 Xrotation\nOFFSET 9 -2 0"

@@ -512,6 +512,14 @@ def test_amc_says_what_it_left_out(tmp_path: Path) -> None:
     path.write_text(text)
     with pytest.warns(RecordingWarning, match="12 frames that stand twice"):
         assert np.array_equal(open_recording(path, positions=True).frames, usual.frames)
+    path.write_text(text.replace("larm", "wing").replace("wing", "larm", 23))
+    with pytest.raises(RecordingError, match="'wing' in frame 12"):
+        open_recording(path)
+    path = write_amc(tmp_path / "take.amc", values)
+    path.write_text(path.read_text().rpartition("\ntrunk")[0])
+    with pytest.warns(RecordingWarning, match="the last frame, 12, is cut off"):
+        cut = open_recording(path, positions=True)
+    assert np.array_equal(cut.frames, usual.frames[:-1])
     bones = {name: count for name, count in AMC_BONES.items() if name != "larm"}
     path = write_amc(tmp_path / "take.amc", values[:, :-2], bones)
     with pytest.warns(RecordingWarning, match="bones larm have no numbers"):
