@@ -7,7 +7,7 @@ A missing measurement is NaN. Lengths are metres, angles radians, the vertical a
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from .errors import InvalidValueError, RecordingError
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
 BoolArray: TypeAlias = NDArray[np.bool_]
+Cause: TypeAlias = Literal["", "rest", "dip", "turn", "return", "state", "length", "end"]
+CAUSES: tuple[Cause, ...] = get_args(Cause)
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,11 @@ class Segment:
         confidence: How sure the segmenter is of the boundary at ``end``, in [0, 1].
         decided_at: The frame at which the boundary was decided; ``decided_at - end`` is its delay.
         still: True where nothing moved: a pause, which no tree should learn as a motion.
+        cause: What made the boundary at ``end``: ``"rest"``, a pause begins or ends; ``"dip"``, the
+            speed falls far between two peaks; ``"turn"``, the main motion turns round and the
+            posture comes back; ``"return"``, the posture comes back, whatever moves; ``"state"``,
+            the density of the motion changes; ``"length"``, the segment was too long to go on;
+            ``"end"``, that of the stream; empty where not known.
     """
 
     start: int
@@ -36,6 +43,7 @@ class Segment:
     confidence: float = 1.0
     decided_at: int = -1
     still: bool = False
+    cause: Cause = ""
 
     def __post_init__(self) -> None:
         if not 0 <= self.start < self.end:

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..graph import TransitionGraph
-from ..recording import BoolArray, FloatArray, IntArray, Segment
+from ..recording import CAUSES, BoolArray, FloatArray, IntArray, Segment
 from ..state import Array, Count, SharedState, State, require
 from ..tree import ROOT, Change, Placement
 from .events import Anomaly, Event, TransitionSeen
@@ -36,6 +36,7 @@ class LinksState(SharedState):
     confidence: Annotated[FloatArray, Array("n", low=-1.0, high=1.0)]
     decided_at: Annotated[IntArray, Array("n", low=-1)]
     still: Annotated[BoolArray, Array("n")]
+    cause: Annotated[IntArray, Array("n", low=0, high=len(CAUSES) - 1)]
     nearest: Annotated[IntArray, Array("n", low=-1)]
     like: Annotated[IntArray, Array("n", low=-1)]
 
@@ -60,15 +61,27 @@ class LinksState(SharedState):
                 number,
                 None if primitive < 0 else primitive,
                 follows,
-                Segment(*segment),
+                Segment(start, end, confidence, decided_at, still, CAUSES[cause]),
                 None if nearest < 0 else nearest,
                 None if like < 0 else like,
             )
-            for number, primitive, follows, *segment, nearest, like in zip(*columns, strict=True)
+            for (
+                number,
+                primitive,
+                follows,
+                start,
+                end,
+                confidence,
+                decided_at,
+                still,
+                cause,
+                nearest,
+                like,
+            ) in zip(*columns, strict=True)
         ]
 
 
-_DTYPES = ("i8", "i8", "?", "i8", "i8", "f8", "i8", "?", "i8", "i8")
+_DTYPES = ("i8", "i8", "?", "i8", "i8", "f8", "i8", "?", "i8", "i8", "i8")
 
 
 def _plain(link: Link) -> tuple[Any, ...]:
@@ -77,7 +90,8 @@ def _plain(link: Link) -> tuple[Any, ...]:
     primitive, nearest, like = ids
     segment = link.segment
     ends = segment.start, segment.end, segment.confidence, segment.decided_at, segment.still
-    return (link.number, primitive, link.follows, *ends, nearest, like)
+    cause = CAUSES.index(segment.cause)
+    return (link.number, primitive, link.follows, *ends, cause, nearest, like)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,10 +3,29 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from numba import njit
 
 from ..recording import FloatArray
+
+
+class Smooth(NamedTuple):
+    """What the filter keeps of each channel, and what it made of the newest frame; each (D,).
+
+    Attributes:
+        delay_1: First delay line of the filter.
+        delay_2: Second delay line.
+        place: The newest frame, filtered.
+        velocity: Its velocity.
+        weights: How much each channel counts in the speed, and in distances.
+    """
+
+    delay_1: FloatArray
+    delay_2: FloatArray
+    place: FloatArray
+    velocity: FloatArray
+    weights: FloatArray
 
 
 @njit(cache=True)
@@ -19,29 +38,38 @@ def all_finite(frame: FloatArray) -> bool:
 
 
 @njit(cache=True)
-def smooth_velocity(frame: FloatArray, c: FloatArray, memory: FloatArray, first: bool) -> float:
-    """Filter one frame, leave its velocity in ``memory[3]`` and return its norm, the speed.
+def smooth_velocity(frame: FloatArray, c: FloatArray, smooth: Smooth, first: bool) -> float:
+    """Filter one frame, and return the norm of its velocity, the speed.
 
     Args:
         frame: The new measurement, shape (D,).
         c: ``b0, b1, b2, a1, a2`` of the filter and the frame rate [1/s], shape (6,).
-        memory: Two delay lines, the last filtered frame, the velocity, and how much each channel
-            counts in the speed, shape (5, D).
+        smooth: What the filter keeps; receives the filtered frame and its velocity.
         first: Whether this is the first frame; the filter starts as if it had always been there.
     """
     b0, b1, b2, a1, a2, rate = c[0], c[1], c[2], c[3], c[4], c[5]
+    delay_1, delay_2, place, velocity, weights = smooth
     total = 0.0
     for i in range(frame.shape[0]):
         x = frame[i]
         if first:
-            memory[0, i] = (1.0 - b0) * x
-            memory[1, i] = (b2 - a2) * x
-            memory[2, i] = x
-        y = b0 * x + memory[0, i]
-        memory[0, i] = b1 * x - a1 * y + memory[1, i]
-        memory[1, i] = b2 * x - a2 * y
-        v = (y - memory[2, i]) * rate
-        memory[2, i] = y
-        memory[3, i] = v
-        total += memory[4, i] * v * v
+            delay_1[i] = (1.0 - b0) * x
+            delay_2[i] = (b2 - a2) * x
+            place[i] = x
+        y = b0 * x + delay_1[i]
+        delay_1[i] = b1 * x - a1 * y + delay_2[i]
+        delay_2[i] = b2 * x - a2 * y
+        v = (y - place[i]) * rate
+        place[i] = y
+        velocity[i] = v
+        total += weights[i] * v * v
+    return math.sqrt(total)
+
+
+@njit(cache=True)
+def distance(a: FloatArray, b: FloatArray, weights: FloatArray) -> float:
+    """Return the weighted Euclidean distance between two frames, shape (D,) each."""
+    total = 0.0
+    for i in range(a.shape[0]):
+        total += weights[i] * (a[i] - b[i]) ** 2
     return math.sqrt(total)

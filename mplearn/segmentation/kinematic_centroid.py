@@ -9,14 +9,25 @@ decided as soon as the distance has fallen by a share of itself.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from ..recording import FloatArray
 from .base import check_positive, check_share
-from .speed import ZeroVelocityConfig, all_low, close, readiness, running_speed, take_speed
+from .kernels import distance
+from .speed import (
+    LENGTH,
+    RETURN,
+    Watched,
+    ZeroVelocityConfig,
+    all_low,
+    close,
+    readiness,
+    running_speed,
+    take_speed,
+)
 from .speed_segmenter import SpeedSegmenter
 
 
@@ -39,62 +50,65 @@ class KinematicCentroidConfig:
         check_positive(self, "reach_s")
 
 
-@njit(cache=True)
-def _distance(a: FloatArray, b: FloatArray, weights: FloatArray) -> float:
-    total = 0.0
-    for i in range(a.shape[0]):
-        total += weights[i] * (a[i] - b[i]) ** 2
-    return float(np.sqrt(total))
+FARTHEST = np.dtype([("away", "f8"), ("frame", "i8")])
+
+
+class Places(NamedTuple):
+    """Filtered frames, shape (D,) each, and how far apart they are.
+
+    Attributes:
+        first: Where the open segment began.
+        farthest: Where it was farthest from there.
+        reach: How far that was, and when, shape (1,).
+    """
+
+    first: FloatArray
+    farthest: FloatArray
+    reach: Any
 
 
 @njit(cache=True)
 def _step(
-    frame: FloatArray,
-    watcher: Any,
-    drop: float,
-    reach_s: float,
-    places: FloatArray,
-    farthest: FloatArray,
-    out: FloatArray,
+    frame: FloatArray, watched: Watched, drop: float, reach_s: float, places: Places, out: Any
 ) -> int:
     """Take one frame.
 
     Args:
         frame: Shape (D,).
-        watcher: As bundled by `SpeedSegmenter`.
+        watched: As bundled by `SpeedSegmenter`.
         drop: As in the configuration.
         reach_s: As in the configuration.
-        places: The filtered frame where the segment began, and the farthest, shape (2, D).
-        farthest: The greatest distance and its frame, shape (2,).
+        places: What is kept of the open segment.
         out: Receives the segment.
     """
-    filter_, settings, memory, state, speeds = watcher
-    m, p = state[0], settings[0]
-    if take_speed(frame, filter_, memory, m, p, speeds) < 0.0:
+    if take_speed(frame, watched) < 0.0:
         return -1
+    m, p = watched.state[0], watched.settings[0]
+    place, weights = watched.smooth.place, watched.smooth.weights
     t = m.frames - 1
+    reach = places.reach[0]
     if t == 0:
-        places[0] = memory[2]
-    away = _distance(memory[2], places[0], memory[4])
-    if away >= farthest[0]:
-        farthest[0], farthest[1] = away, t
-        places[1] = memory[2]
-    end, confidence = -1, 0.0
+        places.first[:] = place
+    away = distance(place, places.first, weights)
+    if away >= reach.away:
+        reach.away, reach.frame = away, t
+        places.farthest[:] = place
+    end, confidence, cause = -1, 0.0, LENGTH
     needed = reach_s * running_speed(m) / readiness(m, p)
-    far_enough = farthest[0] > needed and farthest[1] - m.start >= p.shortest
-    if far_enough and away < (1.0 - drop) * farthest[0]:
-        end, confidence = int(farthest[1]), 1.0 - needed / farthest[0]
+    far_enough = reach.away > needed and reach.frame - m.start >= p.shortest
+    if far_enough and away < (1.0 - drop) * reach.away:
+        end, confidence, cause = reach.frame, 1.0 - needed / reach.away, RETURN
     elif t - m.start >= p.longest:
         end = t
-        places[1] = memory[2]
+        places.farthest[:] = place
     if end < 0:
         return 0
     low = p.still_share * running_speed(m)
-    n = close(m, p, end, confidence, all_low(m, end, low, speeds), out)
-    places[0] = places[1]
-    farthest[0] = _distance(memory[2], places[0], memory[4])
-    farthest[1] = t
-    places[1] = memory[2]
+    n = close(m, p, end, confidence, all_low(m, end, low, watched.speeds), cause, out, 0)
+    places.first[:] = places.farthest
+    reach.away = distance(place, places.first, weights)
+    reach.frame = t
+    places.farthest[:] = place
     return int(n)
 
 
@@ -119,11 +133,14 @@ class KinematicCentroid(SpeedSegmenter):
 
     def _new_arrays(self) -> dict[str, Any]:
         arrays = super()._new_arrays()
-        arrays["places"] = np.zeros((2, self.n_channels))
-        arrays["farthest"] = np.zeros(2)
-        return arrays
+        width = self.n_channels
+        places = Places(np.zeros(width), np.zeros(width), np.zeros(1, dtype=FARTHEST))
+        return arrays | places._asdict()
+
+    def _bind(self) -> None:
+        super()._bind()
+        self._places = self._bound(Places)
 
     def _step(self, frame: FloatArray) -> int:
-        a, c = self._arrays, self.config
-        places, farthest = a["places"], a["farthest"]
-        return int(_step(frame, self._watcher, c.drop, c.reach_s, places, farthest, self._out))
+        c = self.config
+        return int(_step(frame, self._watched, c.drop, c.reach_s, self._places, self._out))

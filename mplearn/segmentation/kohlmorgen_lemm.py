@@ -8,7 +8,8 @@ after [Janus2006].
 What the densities are taken over decides what is found. Over *postures*, as the paper has it, the
 distribution changes most in the middle of a movement. Over the *direction of motion*, a unit
 vector, it changes where people see a boundary: at the turn. There a change of state is taken as
-evidence, and the boundary is set, and confirmed, by the minimum of the speed.
+evidence, and the boundary is set, and confirmed, by the minimum of the speed; or, where the speed
+has none, by a turn of the motion (`turns`).
 """
 
 from __future__ import annotations
@@ -22,13 +23,23 @@ from ..errors import InvalidValueError
 from ..recording import FloatArray
 from .base import check_positive, check_share, frames_of
 from .envelope import ROWS
-from .kohlmorgen_lemm_steps import ENVELOPE, EXACT, PLAIN, step_direction, step_posture
+from .kohlmorgen_lemm_steps import (
+    ENVELOPE,
+    EXACT,
+    PLAIN,
+    SCALES,
+    States,
+    step_direction,
+    step_posture,
+)
 from .speed import ZeroVelocityConfig
-from .speed_segmenter import SpeedSegmenter
-from .viterbi import path_arrays
-from .windows import window_arrays
+from .speed_segmenter import SpeedSegmenter, check_record
+from .turns import Trail, TurnConfig, new_trail, turn_settings
+from .viterbi import Path, new_path
+from .windows import Windows, new_windows
 
 Density = Literal["direction", "posture"]
+TRAIL_S = 3.0  # how long the latest frames are kept to look at again
 START_COST_S = 0.05  # C until the envelope has been seen
 
 
@@ -56,6 +67,7 @@ class KohlmorgenLemmConfig:
             ``zero_velocity.hysteresis`` holds.
         tolerance_s: How far from the minimum the change of state may lie [s].
         zero_velocity: How the speed is watched.
+        turns: For directions: how turns of a motion that never rests are found.
     """
 
     density: Density = "direction"
@@ -73,6 +85,7 @@ class KohlmorgenLemmConfig:
     zero_velocity: ZeroVelocityConfig = field(
         default_factory=lambda: ZeroVelocityConfig(hysteresis=0.25)
     )
+    turns: TurnConfig = field(default_factory=TurnConfig)
 
     def __post_init__(self) -> None:
         if self.density not in ("direction", "posture"):
@@ -155,6 +168,7 @@ class KohlmorgenLemm(SpeedSegmenter):
         settings["mode"] = EXACT if config.exact else PLAIN
         if config.switch_cost_s is None:
             settings["mode"] = ENVELOPE
+        self._turns = turn_settings(config.turns, rate_hz, config.tolerance_s)
         self._step_kernel = step_direction if config.density == "direction" else step_posture
         self._reset()
 
@@ -166,29 +180,38 @@ class KohlmorgenLemm(SpeedSegmenter):
         self._model["every"] = every = -(-size // ROWS)
         shape = {PLAIN: (1, 1), EXACT: (size, size), ENVELOPE: (size // every + 1, size)}[mode]
         arrays = super()._new_arrays()
-        arrays |= window_arrays(embedding * self.n_channels, length, count) | path_arrays(size)
+        arrays |= new_windows(embedding * self.n_channels, length, count)._asdict()
+        arrays |= new_path(size)._asdict()
+        arrays |= new_trail(self.n_channels, frames_of(TRAIL_S, self.rate_hz))._asdict()
         arrays["history"] = np.zeros(((embedding - 1) * delay + 1, self.n_channels))
-        arrays["spread"] = np.zeros(4)  # running mean, mean root; the sigma, the C in use
+        arrays["scales"] = np.zeros(1, dtype=SCALES)
         arrays["matrix"] = np.zeros(shape)
         arrays["speeds"] = np.zeros(len(arrays["speeds"]) + size)  # postures are judged late
         return arrays
 
     def _bind(self) -> None:
         super()._bind()
-        a = self._arrays
-        windows = (a["points"], a["kernel_rows"], a["row_sums"], a["self_sums"], a["squared"])
-        path = (a["costs"], a["entered"], a["best_costs"], a["best_entered"], a["switch_costs"])
-        self._kit = (windows, a["distances"], path, a["matrix"])
+        a, bound = self._arrays, self._bound
+        self._states = States(bound(Windows), bound(Path), a["matrix"], a["history"], a["scales"])
+        self._trail = bound(Trail)
+
+    def _check_loaded(self, arrays: dict[str, Any]) -> None:
+        super()._check_loaded(arrays)
+        frames = arrays["state"]["frames"][0]
+        times = ("anchor", "far_frame", "away_frame", "candidate", "before")
+        lengths = ("pace", "far", "away", "apart", "along", "energy")
+        ranges = dict.fromkeys(times, (-1, frames)) | dict.fromkeys(lengths, (0.0, np.inf))
+        check_record("turning", arrays["turning"][0], ranges)
 
     def _step(self, frame: FloatArray) -> int:
         return int(
             self._step_kernel(
                 frame,
-                self._watcher,
+                self._watched,
                 self._model,
-                self._kit,
-                self._arrays["history"],
-                self._arrays["spread"],
+                self._states,
+                self._turns,
+                self._trail,
                 self._out,
             )
         )

@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from ..recording import FloatArray, IntArray
 from .envelope import keep_row, switching_cost
-from .speed import all_low, close, readiness, running_speed, take_speed
-from .viterbi import exact_changes, extend_path, last_changes
+from .speed import (
+    CHANGE,
+    LENGTH,
+    STILL,
+    Watched,
+    all_low,
+    close,
+    readiness,
+    running_speed,
+    take_speed,
+)
+from .turns import Trail, drop_candidate, follow_axis, look_for_turn, near_turn
+from .viterbi import Path, exact_changes, extend_path, last_changes
 from .watch import watch
-from .windows import push_point
+from .windows import Windows, push_point
 
 N_CHANGES = 16
 PLAIN, EXACT, ENVELOPE = 0, 1, 2
@@ -24,13 +35,43 @@ def _oldest(t: int, length: int, size: int) -> int:
     return max(length - 1, t - size + length + 1)
 
 
+SCALES = np.dtype(
+    [
+        ("mean", "f8"),  # forgetful means of the distance to nearest neighbours, and of its root
+        ("mean_root", "f8"),
+        ("sigma", "f8"),  # in use; 0 before it is known
+        ("cost", "f8"),  # C that the envelope chose; 0 before it is known
+    ]
+)
+
+
+class States(NamedTuple):
+    """Windows of the stream as states.
+
+    Attributes:
+        windows: The windows, and the distances between them.
+        path: The best sequence of states.
+        matrix: Distances as the exact path or the envelope need them.
+        history: The latest frames, a ring, that postures are embedded from.
+        scales: Shape (1,), of `SCALES`.
+    """
+
+    windows: Windows
+    path: Path
+    matrix: FloatArray
+    history: FloatArray
+    scales: Any
+
+
 @njit(cache=True)
-def _observe(x: FloatArray, t: int, q: Any, sigma: float, weights: FloatArray, kit: Any) -> None:
+def _observe(
+    x: FloatArray, t: int, q: Any, sigma: float, weights: FloatArray, states: States
+) -> None:
     """Add a point; keep its distances where the exact path or the envelope will need them."""
-    windows, distances, _, matrix = kit
-    points, kernel_rows, row_sums, self_sums, squared = windows
-    push_point(x, weights, t, sigma, points, kernel_rows, row_sums, self_sums, squared, distances)
-    size = points.shape[1]
+    windows, matrix = states.windows, states.matrix
+    distances = windows.distances
+    push_point(x, weights, t, sigma, windows)
+    size = distances.shape[0]
     if t < q.window - 1:
         return
     if q.mode == EXACT:
@@ -42,72 +83,70 @@ def _observe(x: FloatArray, t: int, q: Any, sigma: float, weights: FloatArray, k
 
 
 @njit(cache=True)
-def _changes(t: int, q: Any, ready: float, kit: Any, spread: FloatArray, changes: IntArray) -> int:
+def _changes(t: int, q: Any, ready: float, states: States, changes: IntArray) -> int:
     """Extend the best path by window t and write when it changes state, latest first."""
-    _, distances, path, matrix = kit
-    costs, entered, best_costs, best_entered, switch_costs = path
+    distances, path, matrix = states.windows.distances, states.path, states.matrix
+    scales = states.scales[0]
     size = distances.shape[0]
     oldest = _oldest(t, q.window, size)
+    cost = q.cost
     if q.mode == ENVELOPE:
         if t % (8 * q.every) == 0 and t >= size:
             found = switching_cost(matrix, oldest, t, q.every)
             if found > 0.0:
-                known = spread[3] > 0.0
-                spread[3] = spread[3] ** 0.8 * found**0.2 if known else found
-        cost = spread[3] if spread[3] > 0.0 else q.cost
-    else:
-        cost = q.cost
-    switch_costs[t % size] = cost / ready
+                scales.cost = scales.cost**0.8 * found**0.2 if scales.cost > 0.0 else found
+        if scales.cost > 0.0:
+            cost = scales.cost
+    path.switch_costs[t % size] = cost / ready
     if q.mode == EXACT:
-        return exact_changes(matrix, switch_costs, oldest, t, changes)
-    extend_path(
-        t,
-        q.window - 1,
-        oldest,
-        switch_costs,
-        distances,
-        costs,
-        entered,
-        best_costs,
-        best_entered,
-    )
-    return last_changes(t, oldest, best_entered, changes)
+        return exact_changes(matrix, path.switch_costs, oldest, t, changes)
+    extend_path(t, q.window - 1, oldest, distances, path)
+    return last_changes(t, oldest, path.best_entered, changes)
 
 
 @njit(cache=True)
 def step_direction(
     frame: FloatArray,
-    watcher: Any,
+    watched: Watched,
     model: Any,
-    kit: Any,
-    history: FloatArray,
-    spread: FloatArray,
-    out: FloatArray,
+    states: States,
+    turns: Any,
+    trail: Trail,
+    out: Any,
 ) -> int:
-    """Take one frame; densities over the direction of motion support the minima of the speed."""
-    filter_, settings, memory, state, speeds = watcher
-    m, p, q = state[0], settings[0], model[0]
-    s = take_speed(frame, filter_, memory, m, p, speeds)
+    """Take one frame; densities over the direction of motion support minima and turns."""
+    s = take_speed(frame, watched)
     if s < 0.0:
         return -1
+    m, p, q, r = watched.state[0], watched.settings[0], model[0], turns[0]
+    smooth = watched.smooth
     t = m.frames - 1
     slow = q.still_direction * running_speed(m)
     norm = math.sqrt(s * s + slow * slow)
-    x = memory[3] / norm if norm > 0.0 else np.zeros(frame.shape[0])
-    _observe(x, t, q, q.sigma, memory[4], kit)
+    x = smooth.velocity / norm if norm > 0.0 else np.zeros(frame.shape[0])
+    _observe(x, t, q, q.sigma, smooth.weights, states)
     ready = readiness(m, p)
     hysteresis = q.hysteresis
     if t >= q.window - 1:
         changes = np.empty(N_CHANGES, dtype=np.int64)
-        n = _changes(t, q, ready, kit, spread, changes)
+        n = _changes(t, q, ready, states, changes)
         for j in range(n):
             if abs(changes[j] - q.window // 2 - m.valley_frame) <= q.tolerance:
                 hysteresis = q.hysteresis_turned
-    return int(watch(m, p, s, min(0.95, hysteresis * ready), speeds, out))
+    follow_axis(t, s, smooth, r, trail)
+    if near_turn(m.valley_frame, r, trail):
+        hysteresis = max(hysteresis, r.hysteresis)
+    start, mode = m.start, m.mode
+    n = watch(m, p, s, min(0.95, hysteresis * ready), watched.speeds, out)
+    if m.start != start or m.mode != mode:
+        drop_candidate(m.start, t, smooth.weights, trail)
+    elif m.mode != STILL:
+        n = look_for_turn(m, p, r, ready, smooth, watched.speeds, trail, out)
+    return int(n)
 
 
 @njit(cache=True)
-def _update_sigma(q: Any, t: int, squared: FloatArray, spread: FloatArray) -> bool:
+def _update_sigma(q: Any, t: int, squared: FloatArray, scales: Any) -> bool:
     """Take point t into the running distance to nearest neighbours; True if sigma has to change.
 
     The running distance is averaged as `running_speed` is, so that pauses hardly lower it.
@@ -125,84 +164,85 @@ def _update_sigma(q: Any, t: int, squared: FloatArray, spread: FloatArray) -> bo
     for i in range(n):
         mean += math.sqrt(nearest[i])
     mean /= n
-    if spread[2] > 0.0:
-        mean = min(mean, 20.0 * spread[2] / q.sigma)  # a jump of the signal is no spread
+    if scales.sigma > 0.0:
+        mean = min(mean, 20.0 * scales.sigma / q.sigma)  # a jump of the signal is no spread
     weight = max(q.forget, 1.0 / t)
-    spread[0] += weight * (mean - spread[0])
-    spread[1] += weight * (math.sqrt(mean) - spread[1])
-    if spread[1] <= 0.0:
+    scales.mean += weight * (mean - scales.mean)
+    scales.mean_root += weight * (math.sqrt(mean) - scales.mean_root)
+    if scales.mean_root <= 0.0:
         return False
-    wanted = q.sigma * (spread[0] / spread[1]) ** 2
-    if spread[2] > 0.0 and 0.8 * spread[2] < wanted < 1.25 * spread[2]:
+    wanted = q.sigma * (scales.mean / scales.mean_root) ** 2
+    if scales.sigma > 0.0 and 0.8 * scales.sigma < wanted < 1.25 * scales.sigma:
         return False
-    spread[2] = wanted
+    scales.sigma = wanted
     return True
 
 
 @njit(cache=True)
-def _replay(t: int, q: Any, sigma: float, weights: FloatArray, kit: Any) -> None:
+def _replay(t: int, q: Any, sigma: float, weights: FloatArray, states: States) -> None:
     """Compute everything anew with another sigma, from the points that are kept."""
-    points, kernel_rows, row_sums, _, _ = kit[0]
-    size = points.shape[1]
-    kernel_rows[:] = 0.0
-    row_sums[:] = 0.0
-    x = np.empty(points.shape[0])
+    windows = states.windows
+    size = windows.points.shape[1]
+    windows.kernel_rows[:] = 0.0
+    windows.row_sums[:] = 0.0
+    x = np.empty(windows.points.shape[0])
     for u in range(max(0, t - size + 1), t + 1):
-        x[:] = points[:, u % size]
-        _observe(x, u, q, sigma, weights, kit)
+        x[:] = windows.points[:, u % size]
+        _observe(x, u, q, sigma, weights, states)
 
 
 @njit(cache=True)
 def step_posture(
     frame: FloatArray,
-    watcher: Any,
+    watched: Watched,
     model: Any,
-    kit: Any,
-    history: FloatArray,
-    spread: FloatArray,
-    out: FloatArray,
+    states: States,
+    turns: Any,
+    trail: Trail,
+    out: Any,
 ) -> int:
     """Take one frame; a change of state between densities of embedded postures is a boundary."""
-    filter_, settings, memory, state, speeds = watcher
-    m, p, q = state[0], settings[0], model[0]
-    if take_speed(frame, filter_, memory, m, p, speeds) < 0.0:
+    if take_speed(frame, watched) < 0.0:
         return -1
+    m, p, q = watched.state[0], watched.settings[0], model[0]
+    weights, history, scales = watched.smooth.weights, states.history, states.scales[0]
     t = m.frames - 1
     span, width = history.shape
     if t == 0:
         history[:] = frame
     history[t % span] = frame
-    x = np.empty(kit[0][0].shape[0])
+    x = np.empty(states.windows.points.shape[0])
     for k in range(x.shape[0] // width):
         x[k * width : (k + 1) * width] = history[(t - k * q.delay) % span]
-    _observe(x, t, q, max(spread[2], 1e-150), memory[4], kit)
-    if _update_sigma(q, t, kit[0][4], spread):
-        _replay(t, q, spread[2], memory[4], kit)
-    end, confidence = -1, 0.0
+    _observe(x, t, q, max(scales.sigma, 1e-150), weights, states)
+    if _update_sigma(q, t, states.windows.squared, scales):
+        _replay(t, q, scales.sigma, weights, states)
+    end, confidence, cause = -1, 0.0, LENGTH
     if t >= q.window - 1:
         changes = np.empty(N_CHANGES, dtype=np.int64)
         shift = q.window // 2 + (span - 1) // 2 - p.lag
-        n = _changes(t, q, readiness(m, p), kit, spread, changes)
+        n = _changes(t, q, readiness(m, p), states, changes)
         for j in range(n):  # the earliest that is settled and long enough after the last
             if changes[j] <= t - 2 * q.window and changes[j] - shift - m.start >= p.shortest:
                 end = changes[j] - shift
-                confidence = _certainty(t, changes[j], q, kit[2])
+                confidence = _certainty(t, changes[j], q, states.path)
+                cause = CHANGE
     if end < 0 and t - m.start >= p.longest:
         end = t
     if end < 0:
         return 0
     low = p.still_share * running_speed(m)
-    return int(close(m, p, end, confidence, all_low(m, end, low, speeds), out))
+    still = all_low(m, end, low, watched.speeds)
+    return int(close(m, p, end, confidence, still, cause, out, 0))
 
 
 @njit(cache=True)
-def _certainty(t: int, change: int, q: Any, path: Any) -> float:
+def _certainty(t: int, change: int, q: Any, path: Path) -> float:
     """How much dearer the best path without this change is, as a share of C."""
-    costs, entered, best_costs, _, switch_costs = path
-    size = costs.shape[0]
+    size = path.costs.shape[0]
     without = math.inf
     for s in range(_oldest(t, q.window, size), t + 1):
-        if entered[s % size] < change:
-            without = min(without, costs[s % size])
-    excess = (without - best_costs[t % size]) / switch_costs[change % size]
+        if path.entered[s % size] < change:
+            without = min(without, path.costs[s % size])
+    excess = (without - path.best_costs[t % size]) / path.switch_costs[change % size]
     return float(min(1.0, max(0.0, excess)))

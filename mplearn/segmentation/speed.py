@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -16,7 +16,7 @@ from numba import njit
 from ..errors import InvalidValueError
 from ..recording import FloatArray
 from .base import check_positive, check_share, frames_of
-from .kernels import all_finite, smooth_velocity
+from .kernels import Smooth, all_finite, smooth_velocity
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,19 @@ class ZeroVelocityConfig:
 
 
 MOVING, STILL, OPENING = 0, 1, 2
+REST, DIP, TURN, RETURN, CHANGE, LENGTH = range(1, 7)  # places in `CAUSES`
+
+CUT = np.dtype(
+    [
+        ("start", "i8"),  # of the segment that closed, in frames of the stream
+        ("end", "i8"),
+        ("confidence", "f8"),
+        ("decided_at", "i8"),
+        ("still", "?"),
+        ("cause", "i8"),
+    ]
+)
+MOST_CUTS = 2  # segments that one frame can close
 
 STATE = np.dtype(
     [
@@ -85,6 +98,24 @@ SETTINGS = np.dtype(
         ("trust", "f8"),
     ]
 )
+
+
+class Watched(NamedTuple):
+    """What all segmenters that watch the speed work on.
+
+    Attributes:
+        low_pass: The filter's coefficients, see `smooth_velocity`.
+        settings: Shape (1,), of `SETTINGS`.
+        smooth: The filter.
+        state: Shape (1,), of `STATE`.
+        speeds: The latest speeds, a ring.
+    """
+
+    low_pass: FloatArray
+    settings: Any
+    smooth: Smooth
+    state: Any
+    speeds: FloatArray
 
 
 def settings_of(config: ZeroVelocityConfig, rate_hz: float, lag_frames: float) -> Any:
@@ -133,13 +164,13 @@ def readiness(m: Any, p: Any) -> float:
 
 
 @njit(cache=True)
-def take_speed(
-    frame: FloatArray, filter_: FloatArray, memory: FloatArray, m: Any, p: Any, speeds: FloatArray
-) -> float:
+def take_speed(frame: FloatArray, watched: Watched) -> float:
     """Filter and count a frame, keep its speed in the ring `speeds`; -1 if it is not finite."""
+    low_pass, settings, smooth, state, speeds = watched
+    m, p = state[0], settings[0]
     if not all_finite(frame):
         return -1.0
-    s = smooth_velocity(frame, filter_, memory, m.frames == 0)
+    s = smooth_velocity(frame, low_pass, smooth, m.frames == 0)
     see_speed(m, p, s)
     speeds[(m.frames - 1) % speeds.shape[0]] = s
     return float(s)
@@ -156,14 +187,24 @@ def all_low(m: Any, end: int, low: float, speeds: FloatArray) -> bool:
 
 
 @njit(cache=True)
-def close(m: Any, p: Any, end: int, confidence: float, still: bool, out: FloatArray) -> int:
-    """Write the open segment, closed at filtered frame `end`, into `out`; the next starts there."""
+def close(
+    m: Any, p: Any, end: int, confidence: float, still: bool, cause: int, out: Any, row: int
+) -> int:
+    """Close the open segment at filtered frame `end`; the next starts there.
+
+    Filtered time runs `lag` frames behind the stream's.
+
+    Returns:
+        How many rows of `out` are written now.
+    """
     first = max(m.start - p.lag, 0)
     last = max(min(end - p.lag, m.frames), first + 1)
-    out[0, 0] = first
-    out[0, 1] = last
-    out[0, 2] = confidence
-    out[0, 3] = m.frames - 1
-    out[0, 4] = still
+    cut = out[row]
+    cut.start = first
+    cut.end = last
+    cut.confidence = confidence
+    cut.decided_at = m.frames - 1
+    cut.still = still
+    cut.cause = cause
     m.start = last + p.lag
-    return 1
+    return row + 1

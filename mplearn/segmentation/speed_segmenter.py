@@ -4,23 +4,38 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import Any
+from collections.abc import Callable, Mapping
+from inspect import signature
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..errors import FrameError, InvalidValueError
 from ..maths.filters import butterworth
-from ..recording import FloatArray, Segment
+from ..recording import CAUSES, FloatArray, Segment
 from ..state import LARGEST, require, validated
 from .base import Segmenter, SegmenterState
-from .speed import STILL, ZeroVelocityConfig, all_low, initial_state, running_speed, settings_of
+from .kernels import Smooth
+from .speed import (
+    CUT,
+    MOST_CUTS,
+    STILL,
+    Watched,
+    ZeroVelocityConfig,
+    all_low,
+    initial_state,
+    running_speed,
+    settings_of,
+)
+
+Bundle = TypeVar("Bundle")
 
 
 class SpeedSegmenter(Segmenter):
     """A segmenter whose state is a set of arrays, and whose step is one compiled call.
 
-    A subclass advances `_arrays` in `_step`, which returns how many rows ``start, end, confidence,
-    decided_at, still`` it wrote to `_out` (-1: the frame is not finite, nothing has changed).
+    A subclass advances `_arrays` in `_step`, which returns how many rows it wrote to `_out` (-1:
+    the frame is not finite, nothing has changed).
 
     Args:
         n_channels: Width D of a frame.
@@ -42,10 +57,9 @@ class SpeedSegmenter(Segmenter):
         self.rate_hz = rate_hz
         gain, a1, a2, delay = butterworth(min(speed.cutoff_hz, 0.4 * rate_hz), rate_hz)
         self._filter = np.array([gain, 2.0 * gain, gain, a1, a2, rate_hz])
-        self._settings = settings_of(
-            speed, rate_hz, delay + 0.5
-        )  # a difference is half a frame late
-        self._out = np.zeros((1, 5))
+        late = delay + 0.5  # a difference is half a frame late
+        self._settings = settings_of(speed, rate_hz, late)
+        self._out = np.zeros(MOST_CUTS, dtype=CUT)
 
     def _reset(self) -> None:
         """Return to the state before the first frame."""
@@ -54,18 +68,20 @@ class SpeedSegmenter(Segmenter):
 
     def _new_arrays(self) -> dict[str, Any]:
         """Allocate the state before the first frame; a subclass adds arrays of its own."""
-        arrays = {
-            "memory": np.zeros((5, self.n_channels)),
-            "state": initial_state(),
-            "speeds": np.zeros(int(self._settings["longest"][0]) + 1),
-        }
-        arrays["memory"][4] = 1.0
-        return arrays
+        smooth = Smooth(*(np.zeros(self.n_channels) for _ in Smooth._fields))
+        smooth.weights[:] = 1.0
+        speeds = np.zeros(int(self._settings["longest"][0]) + 1)
+        return {**smooth._asdict(), "state": initial_state(), "speeds": speeds}
 
     def _bind(self) -> None:
         """Bundle the arrays as the kernels take them; a subclass bundles its own, too."""
         a = self._arrays
-        self._watcher = (self._filter, self._settings, a["memory"], a["state"], a["speeds"])
+        smooth = self._bound(Smooth)
+        self._watched = Watched(self._filter, self._settings, smooth, a["state"], a["speeds"])
+
+    def _bound(self, kind: Callable[..., Bundle]) -> Bundle:
+        """Bundle the arrays that carry the names of a tuple's fields."""
+        return kind(*(self._arrays[name] for name in signature(kind).parameters))
 
     @abstractmethod
     def _step(self, frame: FloatArray) -> int:
@@ -93,8 +109,15 @@ class SpeedSegmenter(Segmenter):
                 f"{bad[0]}: {frame[bad[0]]}); fill gaps before segmenting"
             )
         return [
-            Segment(int(row[0]), int(row[1]), float(row[2]), int(row[3]), bool(row[4]))
-            for row in self._out[:n]
+            Segment(
+                int(cut["start"]),
+                int(cut["end"]),
+                float(cut["confidence"]),
+                int(cut["decided_at"]),
+                bool(cut["still"]),
+                CAUSES[cut["cause"]],
+            )
+            for cut in self._out[:n]
         ]
 
     def scaffold(self, weights: FloatArray | None = None, ending: float = 0.5) -> None:
@@ -109,7 +132,7 @@ class SpeedSegmenter(Segmenter):
         if not (np.isfinite(counts).all() and (counts >= 0).all() and counts.any()):
             raise InvalidValueError("weights must be finite, at least 0, and not all 0")
         self._arrays["state"]["ending"] = ending
-        self._arrays["memory"][4] = counts / counts.mean()
+        self._arrays["weights"][:] = counts / counts.mean()
 
     def flush(self) -> list[Segment]:
         """Close what is open, as at the end of a stream, and start afresh at frame 0."""
@@ -120,7 +143,7 @@ class SpeedSegmenter(Segmenter):
         self._reset()
         if start >= end:
             return []
-        return [Segment(start, end, confidence=0.0, decided_at=end - 1, still=still)]
+        return [Segment(start, end, 0.0, end - 1, still, "end")]
 
     def state(self) -> SegmenterState:
         """Return the whole state; `load_state` resumes bit for bit."""
@@ -156,9 +179,38 @@ class SpeedSegmenter(Segmenter):
         for name, column in wanted.items():
             _check(state.arrays[name], column, f"arrays.{name}")
             column[...] = state.arrays[name]
-        _check_watch(loaded["state"][0])
+        self._check_loaded(loaded)
         self._arrays = loaded
         self._bind()
+
+    def _check_loaded(self, arrays: dict[str, Any]) -> None:
+        """Check what was stored beyond its shapes; a subclass checks arrays of its own, too."""
+        state = arrays["state"][0]
+        frames = state["frames"]
+        check_record(
+            "state",
+            state,
+            {
+                "frames": (0, np.inf),
+                "mode": (0, 2),
+                "start": (0, frames + 1),
+                "ending": (0.0, 1.0),
+                "valley_frame": (-1, frames),
+                "dip_frame": (-1, frames),
+                "rest_frames": (0, frames),
+                **dict.fromkeys(("peak", "valley", "mean", "mean_root", "rest"), (0.0, np.inf)),
+            },
+        )
+
+
+def check_record(name: str, record: Any, ranges: Mapping[str, tuple[float, float]]) -> None:
+    """Check that fields of a stored record lie in their ranges."""
+    for field, (low, high) in ranges.items():
+        require(
+            low <= record[field] <= high,
+            f"arrays.{name}.{field}",
+            f"must lie in [{low:g}, {high:g}], not {record[field]:g}",
+        )
 
 
 def _columns(name: str, array: Any) -> dict[str, Any]:
@@ -178,23 +230,3 @@ def _check(value: Any, own: Any, place: str) -> None:
     least = -1 if own.dtype.kind == "i" else -LARGEST
     fine = bool(((value >= least) & (value <= LARGEST)).all())  # NaN fails too
     require(fine, place, f"must hold numbers in [{least:g}, {LARGEST:g}]")
-
-
-def _check_watch(state: Any) -> None:
-    """Check the record of the watch over the speed."""
-    frames = state["frames"]
-    for name, low, high in (
-        ("frames", 0, np.inf),
-        ("mode", 0, 2),
-        ("start", 0, frames + 1),
-        ("ending", 0.0, 1.0),
-        ("valley_frame", -1, frames),
-        ("dip_frame", -1, frames),
-        ("rest_frames", 0, frames),
-        *((each, 0.0, np.inf) for each in ("peak", "valley", "mean", "mean_root", "rest")),
-    ):
-        require(
-            low <= state[name] <= high,
-            f"arrays.state.{name}",
-            f"must lie in [{low:g}, {high:g}], not {state[name]:g}",
-        )

@@ -2,12 +2,11 @@
 
 Every window is a state. Being in state s while window t is observed costs d(s, t); a change of
 state costs C. With eq. 3-4 of [Kulic2012], C = 2 zeta^2 ln k; nothing else of zeta and k matters.
-Times and states share one ring of P slots: time t, and the state born at t, lie at ``t % P``.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -15,29 +14,32 @@ from numba import njit
 from ..recording import FloatArray, IntArray
 
 
-def path_arrays(size: int) -> dict[str, Any]:
+class Path(NamedTuple):
+    """The best sequences of states, in a ring of P: time t, and the state born then, at ``t % P``.
+
+    Attributes:
+        costs: c_s(t), of the best path that ends in state s, shape (P,).
+        entered: When that path changed into s, shape (P,); -1: before the FIFO.
+        best_costs: o(t), the least of the costs at time t, shape (P,).
+        best_entered: `entered` of the state that is best at time t, shape (P,).
+        switch_costs: C, as it was at time t, shape (P,).
+    """
+
+    costs: FloatArray
+    entered: IntArray
+    best_costs: FloatArray
+    best_entered: IntArray
+    switch_costs: FloatArray
+
+
+def new_path(size: int) -> Path:
     """Allocate what `extend_path` works on, for a ring of `size` slots."""
-    return {
-        "costs": np.zeros(size),  # c_s(t), of the best path that ends in state s
-        "entered": np.full(size, -1),  # when that path changed into s; -1: before the FIFO
-        "best_costs": np.zeros(size),  # o(t), the least of the costs at time t
-        "best_entered": np.full(size, -1),  # `entered` of the state that is best at time t
-        "switch_costs": np.zeros(size),  # C, as it was at time t
-    }
+    never = np.full(size, -1)
+    return Path(np.zeros(size), never, np.zeros(size), never.copy(), np.zeros(size))
 
 
 @njit(cache=True)
-def extend_path(
-    t: int,
-    first: int,
-    oldest: int,
-    switch_costs: FloatArray,
-    distances: FloatArray,
-    costs: FloatArray,
-    entered: IntArray,
-    best_costs: FloatArray,
-    best_entered: IntArray,
-) -> None:
+def extend_path(t: int, first: int, oldest: int, distances: FloatArray, path: Path) -> None:
     """Add window t, at once an observation and a state, to the best paths.
 
     The on-line recursion of Kohlmorgen and Lemm (2001): the new state first runs over the past, and
@@ -48,13 +50,10 @@ def extend_path(
         t: Time of the new window.
         first: Time of the first window of the stream.
         oldest: Oldest state that is still kept.
-        switch_costs: C at each time, shape (P,); that of t is set.
         distances: d(s, t), shape (P,).
-        costs: As in `path_arrays`.
-        entered: As in `path_arrays`.
-        best_costs: As in `path_arrays`.
-        best_entered: As in `path_arrays`.
+        path: The best paths; C of time t is set.
     """
+    costs, entered, best_costs, best_entered, switch_costs = path
     size = distances.shape[0]
     base = best_costs[(oldest - 1) % size] if oldest > first else 0.0
     running, since = base, -1

@@ -11,7 +11,7 @@ from typing import Any
 from numba import njit
 
 from ..recording import FloatArray
-from .speed import MOVING, OPENING, STILL, close, running_speed
+from .speed import DIP, LENGTH, MOVING, OPENING, REST, STILL, close, running_speed
 
 
 @njit(cache=True)
@@ -40,8 +40,20 @@ def _dip_middle(m: Any, level: float, speeds: FloatArray) -> int:
 
 
 @njit(cache=True)
+def begin(m: Any, speeds: FloatArray) -> None:
+    """Look at the motion that has just begun as far as it has come."""
+    size, t = speeds.shape[0], m.frames - 1
+    m.dip_frame = -1
+    m.peak = 0.0
+    for u in range(max(m.start, t - size + 1), t + 1):
+        m.peak = max(m.peak, speeds[u % size])
+    m.valley = speeds[t % size]
+    m.valley_frame = t
+
+
+@njit(cache=True)
 def _watch_motion(
-    m: Any, p: Any, s: float, low: float, hysteresis: float, speeds: FloatArray, out: FloatArray
+    m: Any, p: Any, s: float, low: float, hysteresis: float, speeds: FloatArray, out: Any
 ) -> int:
     """Look for the reversal or the pause that ends a motion."""
     t = m.frames - 1
@@ -59,7 +71,7 @@ def _watch_motion(
     n = 0
     if m.dip_frame >= 0 and t - m.dip_frame >= p.still:
         if m.dip_frame - m.start >= p.shortest:
-            n = close(m, p, m.dip_frame, 1.0 - m.valley / low, False, out)
+            n = close(m, p, m.dip_frame, 1.0 - m.valley / low, False, REST, out, 0)
         m.mode = STILL
         m.rest = 0.5 * low
         m.rest_frames = p.still
@@ -68,8 +80,7 @@ def _watch_motion(
         if m.valley_frame - m.start >= p.shortest:
             sure = 1.0 - m.valley / (hysteresis * m.peak)
             level = max(m.valley / hysteresis, low)
-            n = close(m, p, _dip_middle(m, level, speeds), sure, False, out)
-            m.peak = s
+            n = close(m, p, _dip_middle(m, level, speeds), sure, False, DIP, out, 0)
             m.mode = MOVING
         m.valley = s
         m.valley_frame = t
@@ -77,7 +88,7 @@ def _watch_motion(
 
 
 @njit(cache=True)
-def _watch_pause(m: Any, p: Any, s: float, low: float, out: FloatArray) -> int:
+def _watch_pause(m: Any, p: Any, s: float, low: float, out: Any) -> int:
     """Look for the rise that ends a pause."""
     t = m.frames - 1
     if m.mode == OPENING:  # no motion has been seen yet: the rest itself is the only measure
@@ -91,17 +102,13 @@ def _watch_pause(m: Any, p: Any, s: float, low: float, out: FloatArray) -> int:
         m.dip_frame = t
     if s <= max(2.0 * low, 4.0 * m.rest) or m.dip_frame - m.start < p.still:
         return 0
-    n = close(m, p, m.dip_frame, 1.0 - low / s, True, out)
+    n = close(m, p, m.dip_frame, 1.0 - low / s, True, REST, out, 0)
     m.mode = MOVING
-    m.peak = s
-    m.valley = s
-    m.valley_frame = t
-    m.dip_frame = -1
     return n
 
 
 @njit(cache=True)
-def watch(m: Any, p: Any, s: float, hysteresis: float, speeds: FloatArray, out: FloatArray) -> int:
+def watch(m: Any, p: Any, s: float, hysteresis: float, speeds: FloatArray, out: Any) -> int:
     """Judge speed `s` of the frame that `take_speed` has counted.
 
     Args:
@@ -110,7 +117,7 @@ def watch(m: Any, p: Any, s: float, hysteresis: float, speeds: FloatArray, out: 
         s: Speed.
         hysteresis: A minimum is a reversal if it lies below this share of the peaks around it.
         speeds: The speeds before it, a ring.
-        out: Receives ``start, end, confidence, decided_at, still`` of what closes, shape (n, 5).
+        out: Receives what closes, of `CUT`.
 
     Returns:
         How many segments closed, 0 or 1.
@@ -125,9 +132,8 @@ def watch(m: Any, p: Any, s: float, hysteresis: float, speeds: FloatArray, out: 
         end = m.frames - 1
         if m.mode != STILL and m.valley_frame - m.start >= p.shortest:
             end = m.valley_frame
-        n = close(m, p, end, 0.0, m.mode == STILL or m.peak <= low, out)
+        n = close(m, p, end, 0.0, m.mode == STILL or m.peak <= low, LENGTH, out, 0)
         m.dip_frame = -1
-        m.peak = s
-        m.valley = s
-        m.valley_frame = m.frames - 1
+    if n > 0 and m.mode != STILL:
+        begin(m, speeds)
     return n

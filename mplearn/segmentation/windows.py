@@ -16,7 +16,7 @@ R_i(t) = sum_v k(i, t - v) follow from R_i(t - 1), and G(s, t) is a sliding sum 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -24,20 +24,31 @@ from numba import njit
 from ..recording import FloatArray
 
 
-def window_arrays(n_dims: int, length: int, count: int) -> dict[str, Any]:
-    """Allocate what `push_point` works on, for `count` windows of `length` points.
+class Windows(NamedTuple):
+    """Sliding windows of W points, in a ring of P: time t lies at slot ``t % P``.
 
-    A ring of P = count + length points: the point and the window of time t lie at slot ``t % P``.
+    Attributes:
+        points: The latest points, shape (n, P).
+        kernel_rows: k(i, u) for the last W times u, shape (W, P).
+        row_sums: R_i, shape (P,).
+        self_sums: G(s, s), shape (P,).
+        squared: |x_i - x_t|^2, shape (P,).
+        distances: d(s, t), valid for the windows in the ring, shape (P,).
     """
+
+    points: FloatArray
+    kernel_rows: FloatArray
+    row_sums: FloatArray
+    self_sums: FloatArray
+    squared: FloatArray
+    distances: FloatArray
+
+
+def new_windows(n_dims: int, length: int, count: int) -> Windows:
+    """Allocate what `push_point` works on, for `count` windows of `length` points."""
     size = count + length
-    return {
-        "points": np.zeros((n_dims, size)),
-        "kernel_rows": np.zeros((length, size)),  # k(i, u) for the last `length` times u
-        "row_sums": np.zeros(size),
-        "self_sums": np.zeros(size),  # G(s, s)
-        "squared": np.zeros(size),  # |x_i - x_t|^2
-        "distances": np.zeros(size),  # d(s, t), valid for the windows in the ring
-    }
+    rows = np.zeros((length, size))
+    return Windows(np.zeros((n_dims, size)), rows, *(np.zeros(size) for _ in range(4)))
 
 
 @njit(cache=True)
@@ -59,24 +70,14 @@ def squared_distances(
 
 
 @njit(cache=True)
-def push_point(
-    x: FloatArray,
-    weights: FloatArray,
-    t: int,
-    sigma: float,
-    points: FloatArray,
-    kernel_rows: FloatArray,
-    row_sums: FloatArray,
-    self_sums: FloatArray,
-    squared: FloatArray,
-    distances: FloatArray,
-) -> None:
+def push_point(x: FloatArray, weights: FloatArray, t: int, sigma: float, windows: Windows) -> None:
     """Add the point of time t, shape (n,), and write d(s, t) for all windows s into `distances`.
 
     Where the weights of the channels change, kernels keep those of their newer point.
     The windows are complete from t = W - 1 on; `distances` holds those that end in
     [max(W - 1, t - P + W), t], each at slot ``s % P``.
     """
+    points, kernel_rows, row_sums, self_sums, squared, distances = windows
     size = points.shape[1]
     length = kernel_rows.shape[0]
     slot = t % size

@@ -13,20 +13,19 @@ from typing import Any
 from numba import njit
 
 from ..recording import FloatArray
-from .speed import ZeroVelocityConfig, readiness, take_speed
+from .speed import Watched, ZeroVelocityConfig, readiness, take_speed
 from .speed_segmenter import SpeedSegmenter
 from .watch import watch
 
 
 @njit(cache=True)
-def _step(frame: FloatArray, watcher: Any, hysteresis: float, out: FloatArray) -> int:
+def _step(frame: FloatArray, watched: Watched, hysteresis: float, out: Any) -> int:
     """Take one frame; return the number of segments written to `out`, or -1 if it is not finite."""
-    filter_, settings, memory, state, speeds = watcher
-    m, p = state[0], settings[0]
-    s = take_speed(frame, filter_, memory, m, p, speeds)
+    s = take_speed(frame, watched)
     if s < 0.0:
         return -1
-    return int(watch(m, p, s, min(0.95, hysteresis * readiness(m, p)), speeds, out))
+    m, p = watched.state[0], watched.settings[0]
+    return int(watch(m, p, s, min(0.95, hysteresis * readiness(m, p)), watched.speeds, out))
 
 
 class ZeroVelocity(SpeedSegmenter):
@@ -50,4 +49,4 @@ class ZeroVelocity(SpeedSegmenter):
         self._reset()
 
     def _step(self, frame: FloatArray) -> int:
-        return int(_step(frame, self._watcher, self.config.hysteresis, self._out))
+        return int(_step(frame, self._watched, self.config.hysteresis, self._out))

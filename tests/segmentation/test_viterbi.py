@@ -15,17 +15,16 @@ from mplearn.segmentation.viterbi import (
     exact_path,
     extend_path,
     last_changes,
-    path_arrays,
+    new_path,
 )
-from mplearn.segmentation.windows import push_point, window_arrays
+from mplearn.segmentation.windows import new_windows, push_point
 
 ONE = np.ones(1)  # all channels alike
 
 
 def extend(t, first, distances, path):
     """One step of the on-line path over a ring that loses nothing."""
-    costs = [path[name] for name in ("costs", "entered", "best_costs", "best_entered")]
-    extend_path(t, first, first, path["switch_costs"], distances, *costs)
+    extend_path(t, first, first, distances, path)
 
 
 def cost_of(distances, states, cost):
@@ -66,16 +65,16 @@ def test_online_path_costs_hardly_more_than_the_exact_one():
         centres = rng.normal(size=(3, 2)) * 2
         points = centres[np.repeat(rng.integers(0, 3, 5), 10)] + rng.normal(size=(50, 2)) * 0.3
         length, cost, size = 3, 1.5, 90
-        windows, path = window_arrays(2, length, size - length), path_arrays(size)
-        path["switch_costs"][:] = cost
+        windows, path = new_windows(2, length, size - length), new_path(size)
+        path.switch_costs[:] = cost
         for t in range(len(points)):
-            push_point(points[t], ONE, t, 1.0, *windows.values())
+            push_point(points[t], ONE, t, 1.0, windows)
             if t >= length - 1:
-                extend(t, length - 1, windows["distances"], path)
+                extend(t, length - 1, windows.distances, path)
         distances = windows_of(points, length, 1.0)
         states = np.zeros(len(distances), dtype=np.int64)
         exact = exact_path(distances, np.full(len(distances), cost), states)
-        online = path["best_costs"][(len(points) - 1) % size]
+        online = path.best_costs[(len(points) - 1) % size]
         assert online >= exact - 1e-9
         same += abs(online - exact) < 1e-9
         worst = max(worst, online / exact - 1.0)
@@ -86,21 +85,21 @@ def test_online_path_costs_hardly_more_than_the_exact_one():
 def test_changes_of_a_clear_switch():
     points = np.repeat([[0.0], [5.0], [0.0]], 30, axis=0)
     length, size = 4, 100
-    windows, path = window_arrays(1, length, size - length), path_arrays(size)
+    windows, path = new_windows(1, length, size - length), new_path(size)
     matrix = np.zeros((size, size))
-    path["switch_costs"][:] = 2.0
+    path.switch_costs[:] = 2.0
     for t in range(90):
-        push_point(points[t], ONE, t, 0.5, *windows.values())
+        push_point(points[t], ONE, t, 0.5, windows)
         if t >= length - 1:
-            extend(t, length - 1, windows["distances"], path)
+            extend(t, length - 1, windows.distances, path)
             for s in range(length - 1, t + 1):
-                matrix[s, t] = matrix[t, s] = windows["distances"][s]
+                matrix[s, t] = matrix[t, s] = windows.distances[s]
     found = np.zeros(8, dtype=np.int64)
-    n = last_changes(89, length - 1, path["best_entered"], found)
+    n = last_changes(89, length - 1, path.best_entered, found)
     assert n == 2
     assert abs(found[0] - 60 - length // 2) <= 2
     assert abs(found[1] - 30 - length // 2) <= 2
-    assert exact_changes(matrix, path["switch_costs"], length - 1, 89, found) == 2
+    assert exact_changes(matrix, path.switch_costs, length - 1, 89, found) == 2
     assert abs(found[0] - 60 - length // 2) <= 2
 
 
@@ -120,11 +119,11 @@ def test_switching_mackey_glass_series_exactly():
         squared = ((points[:, None] - points[None]) ** 2).sum(axis=2)
         sigma = 1.5 * np.sqrt(np.sort(squared, axis=1)[:, 1 : m + 1]).mean()
         n = len(points)
-        windows = window_arrays(m, length, n)
+        windows = new_windows(m, length, n)
         distances = np.zeros((n, n))
         for t in range(n):
-            push_point(points[t], ONE, t, sigma, *windows.values())
-            distances[t, :t] = distances[:t, t] = windows["distances"][:t]
+            push_point(points[t], ONE, t, sigma, windows)
+            distances[t, :t] = distances[:t, t] = windows.distances[:t]
         distances = distances[length - 1 :, length - 1 :]
         states = np.zeros(len(distances), dtype=np.int64)
         exact_path(distances, np.full(len(distances), 40 * distances.mean()), states)

@@ -5,7 +5,7 @@ import pytest
 from densities import density_distance
 from scipy.integrate import dblquad, quad
 
-from mplearn.segmentation.windows import push_point, window_arrays
+from mplearn.segmentation.windows import new_windows, push_point
 
 ONE = np.ones(1)  # all channels alike
 
@@ -44,26 +44,26 @@ def test_closed_form_is_the_integral_in_two_dimensions():
 @pytest.mark.parametrize(("length", "count"), [(2, 8), (7, 40), (30, 35)])
 def test_incremental_distances_are_those_of_the_windows(length, count):
     x = np.random.default_rng(3).normal(size=(160, 3)).cumsum(axis=0) * 0.3
-    arrays = window_arrays(3, length, count)
+    windows = new_windows(3, length, count)
     size = length + count
     for t in range(len(x)):
-        push_point(x[t], ONE, t, 0.8, *arrays.values())
+        push_point(x[t], ONE, t, 0.8, windows)
         if t < length - 1 or t % 7:
             continue
         for s in range(max(length - 1, t - count + 1), t + 1):
             expected = density_distance(x[s - length + 1 : s + 1], x[t - length + 1 : t + 1], 0.8)
-            assert arrays["distances"][s % size] == pytest.approx(expected, abs=1e-12)
+            assert windows.distances[s % size] == pytest.approx(expected, abs=1e-12)
 
 
 def test_rounding_does_not_build_up():
     x = np.random.default_rng(4).normal(size=(20_000, 2))
-    arrays = window_arrays(2, 5, 50)
+    windows = new_windows(2, 5, 50)
     for t in range(len(x)):
-        push_point(x[t], ONE, t, 1.0, *arrays.values())
+        push_point(x[t], ONE, t, 1.0, windows)
     t = len(x) - 1
     for s in range(t - 49, t + 1):
         expected = density_distance(x[s - 4 : s + 1], x[t - 4 : t + 1], 1.0)
-        assert arrays["distances"][s % 55] == pytest.approx(expected, abs=1e-12)
+        assert windows.distances[s % 55] == pytest.approx(expected, abs=1e-12)
 
 
 def test_distance_is_bounded_symmetric_and_zero_for_the_same_window():
