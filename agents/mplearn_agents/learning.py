@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from mplearn.errors import MPLearnError
+from mplearn.errors import MPLearnError, RecordingError
 from mplearn.learner import (
     Event,
     FramesLost,
@@ -25,6 +25,8 @@ from mplearn.tree import Placement
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
+
+_AT_ONCE = 50  # frames, after which the bar moves
 
 
 @dataclass
@@ -143,15 +145,18 @@ def learn(
             begin = time.perf_counter()
             n = 0
             try:
-                for n, events in enumerate(learner.learn_recording(recording), start=1):
+                lost = log.n_lost
+                for events in learner.learn_recording(recording, _AT_ONCE):
+                    n = min(n + _AT_ONCE, len(recording))
                     for event in events:
                         log.note(event)
-                    if n % 50 == 0:
-                        now = time.perf_counter()
-                        log.learning_s += now - begin
-                        begin = now
-                        log.watched_s = before_s + min(n, len(recording)) / recording.rate_hz
-                        _show(progress, bar, log)
+                    now = time.perf_counter()
+                    log.learning_s += now - begin
+                    begin = now
+                    log.watched_s = before_s + n / recording.rate_hz
+                    _show(progress, bar, log)
+                if log.n_lost - lost == len(recording):
+                    raise RecordingError(f"{recording.name}: {log.lost[-1].reason}")
             except MPLearnError as error:
                 if strict or len(log.refused) + 1 == len(recordings):
                     raise
@@ -159,7 +164,7 @@ def learn(
                 for event in learner.end_stream():
                     log.note(event)
             log.learning_s += time.perf_counter() - begin
-            log.watched_s = before_s + min(n, len(recording)) / recording.rate_hz
+            log.watched_s = before_s + n / recording.rate_hz
             _show(progress, bar, log)
     return log
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..body import BodyView, MotionObserver, Watched, view_of
-from ..errors import StateError
+from ..errors import InvalidValueError, StateError
 from ..graph import TransitionGraph
 from ..library import MotionNovelty, PrimitiveLibrary
 from ..people import PeopleTree
@@ -45,6 +45,7 @@ STILL_M = (
     0.02  # a segment in which no part of the body, and no joint's lever, goes farther: a pause
 )
 BRIDGED_S = 0.3  # a motion goes on through what is lost, if it is no longer
+BLOCK_FRAMES = 128  # that the stages hand on at once, at most
 ABSURD = "a value is not finite, or far beyond all that was seen"
 
 FILES = FileFormat("mplearn-learner", "learner", StateError, compression=1)
@@ -132,20 +133,28 @@ class MotionLearner:
         """
         return self._watch(self._checks.frames(frames))
 
-    def learn_recording(self, recording: Recording) -> Iterator[list[Event]]:
+    def learn_recording(self, recording: Recording, at_once: int = 1) -> Iterator[list[Event]]:
         """Learn a recording as a stream of its own; yield the events of each frame.
 
         The stream before it is ended, and so is this one after the last frame (the events of that
         come as one more item).
 
+        Args:
+            recording: The recording.
+            at_once: How many frames to take before their events are yielded; many are faster.
+
         Raises:
             FrameError: The recording has other channels, or another rate.
+            InvalidValueError: ``at_once`` is not positive.
         """
+        if at_once < 1:
+            raise InvalidValueError(f"at_once must be positive, not {at_once}")
         self._checks.recording(recording)
+        frames = self._checks.frames(recording.frames)
         if self.n_frames > self._stream_start:
             yield self.end_stream()
-        for frame in self._checks.frames(recording.frames):
-            yield self._watch(frame[None])
+        for start in range(0, len(frames), at_once):
+            yield self._watch(frames[start : start + at_once])
         yield self.end_stream()
 
     def end_stream(self) -> list[Event]:
@@ -299,7 +308,7 @@ class MotionLearner:
             return self._pass_on(held, absurd, ABSURD)
         events: list[Event] = []
         while len(frames):
-            watched = self.observer.watch(frames)
+            watched = self.observer.watch(frames[:BLOCK_FRAMES])
             events += self._take(watched)
             frames = frames[watched.taken :]
         return events

@@ -7,6 +7,7 @@ import pytest
 
 from mplearn import LearnerConfig, MotionLearner, Recording
 from mplearn.demonstrator import Demonstration
+from mplearn.errors import InvalidValueError
 from mplearn.learner import (
     AxesChanged,
     Event,
@@ -221,3 +222,27 @@ def test_what_is_far_beyond_is_believed_where_it_lasts() -> None:
     events = learner.learn_many(np.concatenate((low, high))) + learner.end_stream()
     said = [(e.start, e.end) for e in events if isinstance(e, FramesLost)]
     assert len(said) == 1 and said[0][1] == 350
+
+
+def test_many_frames_at_once_are_the_loop(four: Demonstration) -> None:
+    frames = four.recording.frames[:1400].copy()
+    for at, change in zip((20, 300, 500, 700), list(IMPOSSIBLE.values())[:4], strict=True):
+        frames[at : at + 3] = change(frames[at : at + 3])
+    frames[850:860] = np.nan
+    frames[1000:] = turned(frames[1000:])
+    one, many, odd = (MotionLearner(LearnerConfig(four.recording.channels)) for _ in range(3))
+    events = [event for frame in frames for event in one.learn_one(frame)]
+    assert many.learn_many(frames) == events
+    assert odd.learn_many(frames[:707]) + odd.learn_many(frames[707:]) == events
+    assert len([event for event in events if isinstance(event, FramesLost)]) >= 4
+    rest = four.recording.frames[1400:1600]
+    resumed = MotionLearner.from_state(many.state())
+    assert resumed.learn_many(rest) == many.learn_many(rest) == one.learn_many(rest)
+    digests = [each.snapshot().version for each in (one, many, odd)]
+    assert digests[0] == digests[1]
+    recording = Recording(frames, 100.0, four.recording.channels)
+    alike = [MotionLearner(LearnerConfig(four.recording.channels)) for _ in range(2)]
+    each, blocks = alike[0].learn_recording(recording), alike[1].learn_recording(recording, 50)
+    assert [e for events in each for e in events] == [e for events in blocks for e in events]
+    with pytest.raises(InvalidValueError, match="at_once"):
+        next(alike[0].learn_recording(recording, 0))

@@ -79,8 +79,6 @@ def run(args: argparse.Namespace) -> None:
         config = replace(config, segmenter=args.segmenter)
     learner = MotionLearner(config)
     log = learn(learner, recordings, console, strict=args.strict)
-    if log.n_lost == learner.n_frames:
-        raise RecordingError(f"nothing can be learned from {args.data}: {log.reasons}")
     for name, error in log.refused.items():
         say_left_out(console, name, error)
     library = learner.snapshot()
