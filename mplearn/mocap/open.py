@@ -30,6 +30,7 @@ from .resample import resample
 from .smpl import SMPLReader
 from .trc import TRCReader
 from .ui_prmd import UIPRMDReader
+from .xdf import XDFReader
 
 # the most general first: the latest is asked first
 for _reader in (
@@ -44,6 +45,7 @@ for _reader in (
     MVNXReader(),
     SMPLReader(),
     C3DReader(),
+    XDFReader(),
     UIPRMDReader(),
 ):
     register_reader(_reader)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import struct
 from collections.abc import Callable
 from pathlib import Path
 
@@ -513,6 +514,61 @@ def write_g1_csv(
     return path
 
 
+def xdf_chunk(tag: int, content: bytes) -> bytes:
+    length = len(content) + 2
+    width = 1 if length < 256 else 4
+    return bytes([width]) + length.to_bytes(width, "little") + struct.pack("<H", tag) + content
+
+
+def write_xdf(
+    path: Path,
+    points: np.ndarray | None = None,
+    *,
+    rate_hz: float = 100.0,
+    times: np.ndarray | None = None,
+    typed: bool = True,
+    units: str = "meters",
+    extra: bytes = b"",
+) -> Path:
+    """``typed``: channels by marker and type, as the layer's conventions have it, or by label."""
+    points = person() if points is None else points
+    times = 100.0 + np.arange(len(points)) / rate_hz if times is None else times
+    channels = ""
+    for i in range(points.shape[1]):
+        for axis in "XYZ":
+            channels += f"<channel><label>M{i}_{axis}</label>"
+            if typed:
+                channels += f"<marker>M{i}</marker><type>Position{axis}</type>"
+            channels += f"<unit>{units}</unit></channel>"
+    header = (
+        "<?xml version='1.0'?><info><name>cameras</name><type>MoCap</type>"
+        f"<channel_count>{3 * points.shape[1]}</channel_count>"
+        f"<nominal_srate>{rate_hz}</nominal_srate><channel_format>float32</channel_format>"
+        f"<desc><channels>{channels}</channels></desc></info>"
+    )
+    marks = (
+        "<?xml version='1.0'?><info><name>marks</name><type>Markers</type><channel_count>1"
+        "</channel_count><nominal_srate>0</nominal_srate><channel_format>string</channel_format>"
+        "</info>"
+    )
+    number, other = struct.pack("<I", 7), struct.pack("<I", 3)
+    data = b"XDF:" + xdf_chunk(1, b"<?xml version='1.0'?><info><version>1.0</version></info>")
+    data += xdf_chunk(2, number + header.encode()) + xdf_chunk(2, other + marks.encode())
+    data += xdf_chunk(3, other + b"\x01\x01\x08" + struct.pack("<d", times[0]) + b"\x01\x03go!")
+    for first in range(0, len(points), 7):
+        rows = b""
+        for i in range(first, min(first + 7, len(points))):
+            stamped = i == first or abs(times[i] - times[i - 1] - 1 / rate_hz) > 1e-6
+            rows += b"\x08" + struct.pack("<d", times[i]) if stamped else b"\0"
+            rows += points[i].astype("<f4").tobytes()
+        count = min(7, len(points) - first)
+        data += xdf_chunk(3, number + b"\x01" + bytes([count]) + rows)
+    data += xdf_chunk(4, number + struct.pack("<2d", times[-1], -1e-3)) + extra
+    data += xdf_chunk(6, number + b"<?xml version='1.0'?><info><sample_count/></info>")
+    path.write_bytes(data)
+    return path
+
+
 Writer = Callable[[Path], Path]
 WRITERS: dict[str, tuple[str, Writer]] = {
     "UI-PRMD": (UI_PRMD_NAME, write_ui_prmd),
@@ -527,6 +583,7 @@ WRITERS: dict[str, tuple[str, Writer]] = {
     "Motive CSV": ("take.csv", write_motive),
     "Nexus CSV": ("take.csv", write_nexus),
     "Qualisys TSV": ("take.tsv", write_qualisys),
+    "XDF": ("take.xdf", write_xdf),
 }
 """For each reader, by its format: a file name, and what writes a small valid file there."""
 

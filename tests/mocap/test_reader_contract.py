@@ -33,7 +33,7 @@ from mplearn.mocap import (
 from mplearn.recording import Recording
 
 FORMATS = sorted(WRITERS)
-WITHOUT_ROWS = {"C3D", "MVNX", "SMPL"}
+WITHOUT_ROWS = {"C3D", "MVNX", "SMPL", "XDF"}
 SKELETAL = {"AMC", "BVH", "G1 CSV", "MVNX", "SMPL"}
 RATES_HZ = {"AMC": 120.0, "G1 CSV": 30.0}  # which do not say theirs
 TEXT_FORMATS = [format for format in FORMATS if format not in WITHOUT_ROWS]

@@ -1,0 +1,61 @@
+"""XDF: what pyxdf reads is what we read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyxdf
+from mocap_writers import person, write_xdf
+
+from mplearn.errors import RecordingError, RecordingWarning
+from mplearn.mocap import open_recording
+
+
+@pytest.mark.parametrize("typed", [True, False])
+@pytest.mark.parametrize("jitter_s", [0.0, 0.003])
+def test_as_pyxdf_reads_it(tmp_path: Path, typed: bool, jitter_s: float) -> None:
+    points = person(300, 6)
+    times = 50.0 + np.arange(300) / 120.0
+    times += np.random.default_rng(0).normal(0.0, jitter_s, 300) if jitter_s else 0.0
+    times[150:] += 10.0  # the stream stood still
+    path = write_xdf(tmp_path / "a.xdf", points, rate_hz=120.0, times=times, typed=typed)
+    streams, _ = pyxdf.load_xdf(str(path), verbose=False)
+    theirs = next(s for s in streams if s["info"]["type"] == ["MoCap"])
+    recording = open_recording(path)
+    assert recording.marker_names == tuple(f"M{i}" for i in range(6))
+    assert recording.rate_hz == pytest.approx(theirs["info"]["effective_srate"], rel=2e-3)
+    seen = ~np.isnan(recording.frames).any(axis=1)
+    assert np.array_equal(recording.frames[seen], theirs["time_series"].astype(np.float64))
+    at = theirs["time_stamps"] - theirs["time_stamps"][0]
+    ours = np.flatnonzero(seen) / recording.rate_hz
+    assert np.abs(ours - at).max() < 0.03
+
+
+@pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")
+def test_millimetres_y_up_and_a_cut_file(tmp_path: Path) -> None:
+    points = person(40, 6)
+    y_up = np.stack([points[..., 0], points[..., 2], -points[..., 1]], axis=-1)
+    path = write_xdf(tmp_path / "a.xdf", 1000.0 * y_up, units="millimeters")
+    assert open_recording(path).markers == pytest.approx(points, abs=1e-4)
+    path.write_bytes(path.read_bytes()[:-400])
+    with pytest.warns(RecordingWarning, match="cut off"):
+        recording = open_recording(path)
+    assert recording.markers == pytest.approx(points[: len(recording)], abs=1e-4)
+    assert 0 < len(recording) < 40
+
+
+def test_without_markers(tmp_path: Path) -> None:
+    path = write_xdf(tmp_path / "a.xdf")
+    for old, new in (
+        (b"Position", b"Rotation"),
+        (b"float32", b"strings"),
+        (b"<info>", b"<!x><i>"),
+        (b"XDF:", b"XDF;"),
+    ):
+        broken = path.read_bytes().replace(old, new).replace(b"_X</label>", b"_R</label>")
+        other = tmp_path / "b.xdf"
+        other.write_bytes(broken)
+        with pytest.raises(RecordingError, match=r"b\.xdf.*expected"):
+            open_recording(other)
