@@ -17,6 +17,7 @@ import numpy as np
 
 from ..body.marker_tables import TABLES
 from ..errors import BodyError
+from ..maths.rotation_kernels import nearest_rotation
 from ..mocap.kinematics import AXIS_MARK
 from ..mocap.options import option
 from ..recording import FloatArray, IntArray, Recording, Skeleton
@@ -314,9 +315,7 @@ class _Builder:
         arms = self.points[:, list(self.axes[joint])] - self.points[:, [joint]]  # rows: its axes
         turned = np.einsum("tki,kj->tij", arms, np.linalg.inv(self._shown(joint)).T)
         total = np.einsum("tji,tjk->ik", turned[frames], wanted[frames])
-        u, _, vt = np.linalg.svd(total)
-        axes: FloatArray = (u * (1.0, 1.0, np.linalg.det(u @ vt))) @ vt
-        return axes
+        return np.asarray(nearest_rotation(total))
 
     def _shown(self, joint: int) -> FloatArray:
         """Return the points that show a joint's axes, in the zero pose, rows, (3, 3)."""

@@ -60,7 +60,7 @@ class ResumingKinematics(InverseKinematics):
             return q
         then = self._tree.points(q, self._bodies, self.calibration.offsets)[seen]
         fit = fit_rigid(then, frame[seen])
-        q[:3] = fit.apply(q[None, :3])[0]
+        q[:3] = fit.apply(q[:3])
         q[3:7] = quaternion_product(matrix_to_quaternion(fit.rotation), q[3:7])
         return q
 

@@ -150,6 +150,26 @@ def matrix_to_euler(order: str, matrices: FloatArray) -> FloatArray:
     return np.stack([first, middle, last], axis=-1)
 
 
+def rotation_vector_to_matrix(vectors: FloatArray) -> FloatArray:
+    """Return the rotation matrices of rotation vectors.
+
+    Args:
+        vectors: Axis times angle [rad], shape (..., 3).
+
+    Returns:
+        Shape (..., 3, 3).
+
+    Example:
+        >>> rotation_vector_to_matrix(np.array([0.0, 0.0, np.pi / 2])).round().astype(int)
+        array([[ 0, -1,  0],
+               [ 1,  0,  0],
+               [ 0,  0,  1]])
+    """
+    angles = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    share = 0.5 * np.sinc(angles / (2 * np.pi))  # sin(angle / 2) / angle, whole at zero
+    return quaternion_to_matrix(np.concatenate([np.cos(angles / 2), vectors * share], axis=-1))
+
+
 def axis_angle_to_matrix(axis: FloatArray, angles: FloatArray) -> FloatArray:
     """Return the rotation matrices about one axis (Rodrigues' formula).
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..maths.rotations import quaternion_to_matrix
+from ..maths.rotations import rotation_vector_to_matrix
 from ..recording import FloatArray, Recording
 from .files import bad_file
 from .findings import Findings
@@ -90,7 +90,7 @@ class SMPLReader(Reader):
             raise bad_file(path, f"none of {', '.join(_RATES)}", f"one, or {option('rate_hz')}")
         limbs = mean_person()
         local = np.broadcast_to(np.eye(3), (len(vectors), len(limbs.names), 3, 3)).copy()
-        turns = _rotations(vectors)
+        turns = rotation_vector_to_matrix(vectors)
         local[:, :_N_BODY] = _TO_OURS @ turns @ _TO_OURS.T
         local[:, 0] = turns[:, 0] @ _TO_OURS.T  # the root's parent is the world
         places = _places(archive, len(vectors), findings)
@@ -181,10 +181,3 @@ def _numbers(archive: NPZFile, name: str) -> FloatArray:
 
 def _first(archive: NPZFile, names: tuple[str, ...]) -> str | None:
     return next((name for name in names if name in archive), None)
-
-
-def _rotations(vectors: FloatArray) -> FloatArray:
-    """Return the rotation matrices of rotation vectors, shape (T, J, 3) to (T, J, 3, 3)."""
-    angles = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    share = 0.5 * np.sinc(angles / (2 * np.pi))  # sin(angle / 2) / angle, whole at zero
-    return quaternion_to_matrix(np.concatenate([np.cos(angles / 2), vectors * share], axis=-1))

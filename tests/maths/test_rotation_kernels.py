@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from mplearn.maths.plane import turn_in_plane, wrap_angle
 from mplearn.maths.quaternions import quaternion_product, quaternion_vector, vector_quaternion
 from mplearn.maths.rotation_kernels import (
+    nearest_rotation,
     quaternion_matrix,
     rotation_error,
     turn_about_vertical,
@@ -32,6 +33,20 @@ seeds = st.integers(0, 2**32 - 1)
 
 def random_rotation(seed):
     return Rotation.random(rng=np.random.default_rng(seed))
+
+
+@unbounded
+@given(seeds)
+def test_the_nearest_rotation_is_more_like_the_matrix_than_any_other(seed):
+    rng = np.random.default_rng(seed)
+    matrix = rng.normal(size=(3, 3))
+    nearest = nearest_rotation(matrix)
+    np.testing.assert_allclose(nearest @ nearest.T, np.eye(3), atol=1e-13)
+    assert np.linalg.det(nearest) == pytest.approx(1.0)
+    others = Rotation.random(200, rng=rng).as_matrix()
+    steps = Rotation.from_rotvec(rng.normal(size=(200, 3)) * 1e-3).as_matrix() @ nearest
+    likeness = np.einsum("kij,ij->k", np.concatenate((others, steps)), matrix)
+    assert np.trace(nearest.T @ matrix) >= likeness.max() - 1e-12
 
 
 @unbounded

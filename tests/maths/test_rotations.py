@@ -16,6 +16,7 @@ from mplearn.maths.rotations import (
     euler_to_quaternion,
     matrix_to_quaternion,
     quaternion_to_matrix,
+    rotation_vector_to_matrix,
 )
 
 ORDERS = [
@@ -86,6 +87,7 @@ def test_a_turn_about_an_axis_is_a_rotation_vector(quaternion, angle):
     axis = Rotation.from_quat(quaternion).apply([1.0, 0.0, 0.0])
     theirs = Rotation.from_rotvec(angle * axis).as_matrix()
     np.testing.assert_allclose(axis_angle_to_matrix(axis, np.array(angle)), theirs, atol=1e-14)
+    np.testing.assert_allclose(rotation_vector_to_matrix(angle * axis), theirs, atol=1e-14)
 
 
 @pytest.mark.parametrize("lead", [(), (0,), (7,), (2, 3, 1)])
@@ -96,4 +98,5 @@ def test_leading_shapes_are_kept(lead):
     assert matrix_to_quaternion(matrices).shape == (*lead, 4)
     assert euler_to_matrix("ZXY", some[..., :3]).shape == (*lead, 3, 3)
     assert euler_to_quaternion("zx", some[..., :2]).shape == (*lead, 4)
+    assert rotation_vector_to_matrix(some[..., :3]).shape == (*lead, 3, 3)
     assert axis_angle_to_matrix(np.eye(3)[0], some[..., 0]).shape == (*lead, 3, 3)
