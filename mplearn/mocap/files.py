@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import gzip
 import re
 import stat
@@ -73,7 +74,7 @@ def head(path: Path, n_bytes: int = 8192) -> bytes:
 
 def head_text(path: Path, n_bytes: int = 8192) -> str:
     """Return the start of a text file; empty if it is unreadable, or no text."""
-    data = head(path, n_bytes)
+    data = _plain(head(path, n_bytes))
     return "" if b"\0" in data else data.decode("utf-8-sig", errors="replace")
 
 
@@ -106,12 +107,12 @@ def read_bytes(path: Path) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """Return the content of a text file; older tools write Latin-1, newer ones UTF-8.
+    """Return the content of a text file: UTF-8, Latin-1 of older tools, or UTF-16 of Windows.
 
     Raises:
         RecordingError: As `read_bytes`, or the file is not text.
     """
-    data = read_bytes(path)
+    data = _plain(read_bytes(path))
     if b"\0" in data:
         raise bad_file(path, "the file is binary", f"the text of a {suffix(path)} recording")
     if len(data) > _LARGE_BYTES:
@@ -125,6 +126,13 @@ def read_text(path: Path) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
         return data.decode("latin-1")
+
+
+def _plain(data: bytes) -> bytes:
+    """Return text in UTF-16, which starts with its mark, as UTF-8; anything else as it is."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16", errors="replace").encode("utf-8", errors="replace")
+    return data
 
 
 def _opened(path: Path) -> BufferedIOBase:

@@ -86,7 +86,7 @@ class G1CSVReader(Reader):
         unit_m = _unit(path, table[:, at["z"]], 0.01 if seed else 1.0, hints, findings)
         values = np.zeros((len(table), len(BASE) + len(G1_JOINTS)))
         values[:, :3] = table[:, [at[axis] for axis in "xyz"]] * unit_m
-        values[:, 3:6] = _root_angles(table, at)
+        values[:, 3:6] = _root_angles(table, at, findings)
         joints = [name for name in G1_JOINTS if name in at]
         angles = table[:, [at[name] for name in joints]]
         if not seed and np.nanmax(np.abs(angles), initial=0.0) > 2 * np.pi:
@@ -159,14 +159,27 @@ def _columns(path: Path, header: list[str], findings: Findings) -> dict[str, int
     return at
 
 
-def _root_angles(table: FloatArray, at: dict[str, int]) -> FloatArray:
+def _root_angles(table: FloatArray, at: dict[str, int], findings: Findings) -> FloatArray:
     if "qw" in at:
-        quaternions = table[:, [at[f"q{c}"] for c in "wxyz"]]
-        size = np.linalg.norm(quaternions, axis=1, keepdims=True)
-        rotations = quaternion_to_matrix(np.where(size > 0.5, quaternions, np.nan))
+        rotations = _turned(table[:, [at[f"q{c}"] for c in "wxyz"]])
+        w_first = _turned(table[:, [at[f"q{c}"] for c in "xyzw"]])
+        if at["qx"] == 3 and _upright(rotations) < -0.5 < 0.5 < _upright(w_first):
+            findings.warn("the quaternion is taken as w, x, y, z: else the robot is on its head")
+            rotations = w_first
     else:
         rotations = euler_to_matrix("xyz", np.radians(table[:, [at[f"r{c}"] for c in "xyz"]]))
     return matrix_to_euler("ZXY", rotations)
+
+
+def _turned(quaternions: FloatArray) -> FloatArray:
+    size = np.linalg.norm(quaternions, axis=1, keepdims=True)
+    return quaternion_to_matrix(np.where(size > 0.5, quaternions, np.nan))
+
+
+def _upright(rotations: FloatArray) -> float:
+    """Return the median height of the tip of the body's upward axis, 1 for who stands."""
+    heights = rotations[:, 2, 2]
+    return float(np.median(heights[~np.isnan(heights)])) if not np.isnan(heights).all() else 0.0
 
 
 def _unit(

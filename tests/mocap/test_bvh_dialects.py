@@ -115,6 +115,14 @@ def test_latin_1_names(tmp_path: Path) -> None:
     assert recording.markers == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig"])
+def test_encodings_with_a_mark(tmp_path: Path, encoding: str) -> None:
+    text, expected = plain(tmp_path)
+    path = tmp_path / "take.bvh"
+    path.write_bytes(text.encode(encoding))
+    assert points_of(path) == pytest.approx(expected, abs=1e-12)
+
+
 def test_cells_that_are_no_numbers_are_missing_with_what_hangs_on_them(tmp_path: Path) -> None:
     values = bvh_values()
     values[3, 9] = np.nan  # the arm's rotation

@@ -225,6 +225,26 @@ def test_smpl_under_other_names(tmp_path: Path, arrays: dict[str, object]) -> No
     assert other.rate_hz == usual.rate_hz
 
 
+def test_smpl_in_a_world_that_is_y_up(tmp_path: Path) -> None:
+    vectors = smpl_poses(40).reshape(40, -1, 3)
+    upward = open_recording(
+        write_smpl(tmp_path / "a.npz", poses=vectors.reshape(40, -1), trans=np.zeros((40, 3))),
+        positions=True,
+    )
+    vectors[:, 0] = 0.0
+    path = write_smpl(tmp_path / "b.npz", poses=vectors.reshape(40, -1), trans=np.zeros((40, 3)))
+    recording = open_recording(path, positions=True)
+    assert recording.report is not None
+    assert recording.report.up == "y"
+    assert recording.markers[..., 2] == pytest.approx(upward.markers[..., 2], abs=1e-9)
+    apart = [
+        np.linalg.norm(r.markers[:, 4] - r.markers[:, 21], axis=1) for r in (recording, upward)
+    ]
+    assert apart[0] == pytest.approx(apart[1])
+    turned = np.linalg.det(recording.markers[0, 1:4] - recording.markers[0, 0])
+    assert turned == pytest.approx(np.linalg.det(upward.markers[0, 1:4] - upward.markers[0, 0]))
+
+
 def test_smpl_without_places_or_rate(tmp_path: Path) -> None:
     path = write_smpl(tmp_path / "a.npz", trans=None, mocap_framerate=None)
     with pytest.raises(RecordingError, match=r"mocap_framerate.*Hints\(rate_hz"):
@@ -426,6 +446,15 @@ def test_g1_without_some_joints_or_in_another_unit(tmp_path: Path) -> None:
     with pytest.warns(RecordingWarning, match="taken for degrees"):
         recording = open_recording(write_g1_csv(tmp_path / "c.csv", values, header))
     assert recording.frames[:, 6:] == pytest.approx(np.radians(values[:, 7:]))
+
+
+def test_g1_with_quaternions_w_first(tmp_path: Path) -> None:
+    values = g1_values()
+    plain = open_recording(write_g1_csv(tmp_path / "a.csv", values))
+    values[:, 3:7] = values[:, [6, 3, 4, 5]]
+    with pytest.warns(RecordingWarning, match="w, x, y, z"):
+        other = open_recording(write_g1_csv(tmp_path / "b.csv", values))
+    assert other.frames == pytest.approx(plain.frames, abs=1e-9)
 
 
 def test_g1_with_times(tmp_path: Path) -> None:
