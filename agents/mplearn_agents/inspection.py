@@ -58,6 +58,7 @@ class Inspection:
             "points": len(plain_points(recording)),
             "gaps": gaps(recording),
             "recognised": {} if body is None else {p: list(points) for p, points in body.parts},
+            "unseen": [] if body is None else list(body.unseen),
             "left_out": [*(report.left_out if report else ()), *(body.left_out if body else ())],
             "confidence": None if body is None else round(body.confidence, 3),
             "stature_m": _rounded(self.stature_m),

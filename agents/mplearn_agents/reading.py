@@ -88,7 +88,8 @@ def say_bodies(console: Console, bodies: Bodies) -> None:
         for line in (f"warning: {text}" for text in body.warnings):
             said.setdefault(line, []).append(name)
         left = f"; left out: {_listed(body.left_out)}" if body.left_out else ""
-        line = f"a body by {len(body.places)} places{left}"
+        unseen = f"; unseen: {_listed(body.unseen)}" if body.unseen else ""
+        line = f"a body by {len(body.places)} places{left}{unseen}"
         said.setdefault(line, []).append(name)
     for line, names in said.items():
         console.print(f"{_listed(names)}: {line}", markup=False, highlight=False)

@@ -6,8 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..body import find_marker_set
 from ..errors import RecordingError
 from ..recording import BoolArray, FloatArray, Recording, marker_channels
+
+_PARTS = (
+    *("pelvis", "chest", "head"),
+    *(f"{p}_{s}" for p in ("upper_arm", "forearm", "hand", "thigh", "shank", "foot") for s in "lr"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +45,13 @@ class BodyMap:
     stature_m: float
     confidence: float
     warnings: tuple[str, ...] = ()
+
+    @property
+    def unseen(self) -> tuple[str, ...]:
+        """Parts of the body on which no place lies, as ``"hand_l"``: they are held at rest."""
+        markers = find_marker_set(self.places)
+        seen = set(markers.select(self.places).bodies)
+        return tuple(part for part in _PARTS if part not in seen)
 
     def apply(self, recording: Recording) -> Recording:
         """Return a recording in the body's places, as markers [m], z up.

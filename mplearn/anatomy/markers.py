@@ -20,6 +20,7 @@ from .body_map import BodyMap
 from .labels import landmarks_of, names_joints
 
 SOME_FRAMES = 120  # of a recording are looked at
+TRUNK, FEWEST_ON_TRUNK = ("pelvis", "abdomen", "chest", "clavicle_l", "clavicle_r"), 4
 FEWEST = 6  # landmarks; fewer are no person
 ODD = 1.6  # how many times farther apart than on a person two markers of a segment may be
 ODD_BY_JOINT = 1.25  # the same for markers of two segments that a joint joins
@@ -68,6 +69,14 @@ def recognise_markers(recording: Recording, names: Mapping[str, str] | None = No
             f"the markers of {recording.name!r} belong to no known set, and of their labels "
             f"({', '.join(labels[:6])}, ...) {len(found)} are known; a map file says which marker "
             f"sits where ({option('names')})"
+        )
+    landmarks, _ = _places()
+    trunk = [body for body in landmarks.select(tuple(found.values())).bodies if body in TRUNK]
+    if len(trunk) < FEWEST_ON_TRUNK:
+        raise BodyError(
+            f"of the markers of {recording.name!r} {len(trunk)} are known to be on pelvis, chest "
+            f"and shoulders, and how the trunk stands cannot be told from fewer than "
+            f"{FEWEST_ON_TRUNK}; {option('names')} says which marker sits where"
         )
     return _map(labels, found, warnings=tuple(warnings))
 

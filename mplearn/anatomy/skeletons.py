@@ -31,6 +31,7 @@ from .sides import facing_votes
 SOME_FRAMES = 120  # of a recording are looked at
 STRAIGHT = 0.9  # cosine of a leg's bend at which the zero pose still stands
 FLAT = 0.8  # cosine between a foot and the vertical up to which it stands on its sole
+LEAST_CONFIDENCE = 0.15
 ABOVE_SHOULDERS = 0.03  # [m] on the human of 1.75 m: the base of the neck is higher
 NECK_RISE = 0.084
 _TABLE = TABLES["landmarks"]
@@ -109,6 +110,7 @@ class _Builder:
     warnings: list[str] = field(default_factory=list)
 
     def build(self) -> BodyMap:
+        self._check_likeness()
         self._tell_sides()
         self._measure()
         self._find_neutral()
@@ -122,6 +124,25 @@ class _Builder:
         return self._map()
 
     # ---- who is where
+
+    def _check_likeness(self) -> None:
+        """Refuse what has pairs of branches, but not in a person's proportions."""
+        assert self.plan.legs is not None and self.plan.arms is not None
+        if self._confidence() >= LEAST_CONFIDENCE or self.told:
+            return
+        limbs = [
+            f"{what} {' '.join(self.tree.names[node][0] for node in pair.nodes[0])}"
+            for what, pair in (("leg", self.plan.legs), ("arm", self.plan.arms))
+        ]
+        raise BodyError(
+            f"the skeleton of {self.name!r} is hardly a person's: it would have the "
+            f"{' and the '.join(limbs)}; {option('names')} says which joint is which"
+        )
+
+    def _confidence(self) -> float:
+        assert self.plan.legs is not None and self.plan.arms is not None
+        cost = self.plan.legs.cost + self.plan.arms.cost
+        return float(1.0 / (1.0 + np.exp(0.5 * (cost - 10.0))))
 
     def _tell_sides(self) -> None:
         """Order both pairs left first."""
@@ -543,7 +564,7 @@ class _Builder:
             parts=parts,
             left_out=tuple(left_out),
             stature_m=self.factor * self.stature_m,
-            confidence=float(1.0 / (1.0 + np.exp(0.5 * (self.legs.cost + self.arms.cost - 10.0)))),
+            confidence=self._confidence(),
             warnings=tuple(self.warnings),
         )
 

@@ -134,6 +134,8 @@ def first_posture(
             errors = (residuals[:, markers] ** 2).sum(axis=1) / MARKER_SIGMA_M**2
             effort = (postures[:, 7 + hinges] ** 2).sum(axis=1)
             best[7 + hinges] = postures[np.argmin(errors + effort)][7 + hinges]
+        else:  # nothing is known of it: it hangs, as at rest
+            best[7 + hinges] = 0.0
     settle(follower, tree, bodies, offsets, best[None], frame[None])
     found: FloatArray = best
     return found

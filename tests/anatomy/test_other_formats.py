@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import RATE_HZ, Truth
+from known_person import RATE_HZ, Truth
 from other_formats import limbs_of, write_amc_of, write_mvnx_of, write_smpl_of
 from rigs import Rig, write_rig
 

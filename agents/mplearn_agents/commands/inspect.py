@@ -94,6 +94,8 @@ def _say(console: Console, each: Inspection) -> None:
         console.print(
             "  recognised: " + ", ".join(f"{p} = {' '.join(n)}" for p, n in each.body.parts)
         )
+    if facts["unseen"]:
+        console.print(f"  unseen, held at rest: {', '.join(facts['unseen'])}")
     if facts["left_out"]:
         more = len(facts["left_out"]) - _MANY
         console.print(
