@@ -94,3 +94,20 @@ def test_static_torques_are_those_of_the_simulation():
         mujoco.mj_step(model, data)
     measured = np.abs(data.actuator_force) / robot.per_joint("torque")
     np.testing.assert_allclose(share[0], measured, atol=0.02)
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    noise=st.lists(st.integers(-8, 8), min_size=16, max_size=16),
+    sideways=st.booleans(),
+    foot=st.tuples(st.floats(0.1, 0.3), st.floats(0.05, 0.15), st.floats(0.0, 0.2)),
+)
+def test_rounding_of_corners_on_one_line_changes_nothing(noise, sideways, foot):
+    """Soles side by side: four corners lie on one line, but for the last bits of their numbers."""
+    length, width, apart = foot
+    x, y = (-length / 2, length / 2), (apart / 2 + width, apart / 2)
+    corners = np.array([(a, s * b) for s in (1, -1) for a in x for b in y])
+    corners = corners + 2.0**-56 * np.reshape(noise, (8, 2))
+    corners = corners[:, ::-1] if sideways else corners
+    margin = float(support_margin(convex_hull(corners), np.zeros(2)))
+    assert margin == pytest.approx(min(length / 2, y[0]), abs=1e-8)
