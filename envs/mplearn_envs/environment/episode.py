@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from mplearn_envs.execution.performer import PerformerState
 from mplearn_envs.execution.sensors import Measured
 from mplearn_envs.mechanics.reference import Reference
 from mplearn_envs.skills.action_choices import Choices
 from mplearn_envs.skills.repertoire import Repertoire
 from mplearn_envs.tasks import Task
+
+from .random_streams import RandomStreams
 
 _HISTORY = 100  # primitives that tasks may look back
 
@@ -68,4 +68,4 @@ class EpisodeState(NamedTuple):
     performer: PerformerState
     episode: Episode
     task: Task
-    rng: np.random.Generator
+    streams: RandomStreams

@@ -29,6 +29,7 @@ from .episode import Episode, EpisodeState
 from .observation import Observation, ObservationBuilder
 from .options import ActionOptions, MotionOptions, PictureOptions, require_number, require_one_of
 from .plain import PlainSpec, from_plain
+from .random_streams import RandomStreams
 from .rewards import add, earned_meanwhile
 
 
@@ -82,6 +83,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         self.render_mode = render_mode
         self.frame_callback: Callable[[], object] | None = None
         self._episode: Episode | None = None
+        self._streams: RandomStreams | None = None
 
     def _made_repertoire(self) -> Repertoire:
         library, motion = self.source.now(), self.motion
@@ -125,6 +127,9 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
             NoPathError: The task's goal cannot be reached.
         """
         super().reset(seed=seed)
+        if seed is not None or self._streams is None:
+            own = seed if seed is not None else int(self.np_random.integers(2**63))
+            self._streams = RandomStreams.of(own)
         self._episode = None
         self._begin()
         measured = self.performer.reset()
@@ -198,8 +203,9 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
 
     def state(self) -> EpisodeState:
         """Return where the episode is: with `load_state`, actions can be tried."""
-        task, rng = copy.deepcopy((self.task, self.np_random), self._shared())
-        return EpisodeState(self.performer.state(), self._begun(), task, rng)
+        episode = self._begun()
+        task, streams = copy.deepcopy((self.task, self.streams), self._shared())
+        return EpisodeState(self.performer.state(), episode, task, streams)
 
     def load_state(self, state: EpisodeState) -> tuple[Observation, dict[str, Any]]:
         """Go on from there, bit for bit; returns observation and info, as `reset` does.
@@ -214,7 +220,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         same_kind = (state.performer.simulated is None) == (self.dynamics == "kinematic")
         episode = state.episode
         self._episode = episode if same_kind else episode._replace(measured=measured)
-        self.task, self.np_random = copy.deepcopy((state.task, state.rng), self._shared())
+        self.task, self._streams = copy.deepcopy((state.task, state.streams), self._shared())
         return self._observation(), self._info()
 
     # ---- what others may look at
@@ -223,6 +229,13 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
     def library(self) -> PrimitiveLibrary:
         """The library of now."""
         return self.repertoire.library
+
+    @property
+    def streams(self) -> RandomStreams:
+        """The environment's randomness."""
+        if self._streams is None:
+            raise InvalidValueError("the episode has not begun: call reset first")
+        return self._streams
 
     @property
     def simulation(self) -> Simulation:
@@ -279,7 +292,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
             episode.current,
             episode.history,
             episode.time_s,
-            self.np_random,
+            self.streams.task,
             options,
         )
 

@@ -122,7 +122,7 @@ class OnlinePrimitiveHumanoidEnv(MacroStepEnv):
             self.learner.end_stream()
         else:
             self.learner = MotionLearner(self.learner_config)
-        self.demonstrator.restart(self.np_random)
+        self.demonstrator.restart(self.streams.demonstrator)
         self._owed_s = 0.0
         self._n_watched = 0
         self._left_out: tuple[int, ...] = ()

@@ -31,6 +31,8 @@ def _of_mujoco(name: str) -> Any:
 
 
 _mj_step = _of_mujoco("mj_step")
+_mj_step1 = _of_mujoco("mj_step1")  # poses and velocities of the state
+_mj_step2 = _of_mujoco("mj_step2")  # what follows from them and the commands
 _mj_subtree_velocity = _of_mujoco("mj_subtreeVel")
 
 
@@ -70,7 +72,7 @@ def send(
 
     Args:
         model: Address of the model.
-        data: Address of its state, poses up to date.
+        data: Address of its state.
         views: Views of that.
         feet: Bodies of the feet, shape (2,).
         commands: All servo commands of the plan, shape (N, n) [rad].
@@ -89,7 +91,8 @@ def send(
     for knot in range(first + 1, last + 1):
         for step in range((knot - 1) * n_steps, knot * n_steps):
             views.ctrl[:] = commands[step]
-            if guided:
+            if guided:  # by how the robot stands now: what is performed depends on its state alone
+                _mj_step1(model, data)
                 _mj_subtree_velocity(model, data)
                 correct(
                     law,
@@ -103,7 +106,9 @@ def send(
                     views.xmat[feet[1]],
                     views.xaxis,
                 )
-            _mj_step(model, data)
+                _mj_step2(model, data)
+            else:
+                _mj_step(model, data)
         q[knot], v[knot] = views.qpos, views.qvel
         if has_fallen(q[knot], wanted[knot]):
             return knot, True

@@ -63,6 +63,7 @@ class Sensors:
         data.qvel[:] = 0.0 if velocity is None else velocity
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
         mujoco.mj_camlight(model, data)
         return self.read()
 

@@ -118,9 +118,10 @@ class Simulation:
         )
 
     def _update_positions(self) -> None:
-        """Bring poses up to the state, which a step leaves one step behind."""
+        """Bring poses and velocities up to the state, which a step leaves one step behind."""
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_comVel(self.model, self.data)
         mujoco.mj_camlight(self.model, self.data)
 
     def _state_of(self, data: mujoco.MjData) -> FloatArray:

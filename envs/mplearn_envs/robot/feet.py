@@ -16,7 +16,7 @@ SOLES = ("sole_l", "sole_r")  # the boxes on which a robot stands, one a foot
 #: Lower corners of a box, front ones first, counter-clockwise as seen from below.
 CORNER_SIGNS = np.array([[1.0, 1, -1], [1, -1, -1], [-1, -1, -1], [-1, 1, -1]])
 
-TOUCHES_M = 0.004  # the corner of a robot's sole that is no higher above the floor carries
+TOUCHES_M = 0.004  # the corner of a sole that is no higher above the floor carries
 # A demonstrator's feet are measured through markers and a body that is not quite his, so a foot
 # that stands seems to move by more than that; it is seen relative to the other.
 LIFT_M = 0.03  # a foot that rises so far over the other leaves the ground

@@ -92,13 +92,14 @@ def test_guided_steps_are_mujocos_with_the_guides_corrections(simulation):
     seen = [data.xpos[feet[0]], data.xpos[feet[1]], data.xmat[feet[0]], data.xmat[feet[1]]]
     changed = 0
     for step, command in enumerate(PLAN.commands):
+        mujoco.mj_step1(model, data)  # the feedback is by where the robot is now
         mujoco.mj_subtreeVel(model, data)
         data.ctrl[:] = command
         correct(
             guide, step, data.ctrl, data.subtree_com[1], data.subtree_linvel[1], *seen, data.xaxis
         )
         changed += (data.ctrl != command).any()
-        mujoco.mj_step(model, data)
+        mujoco.mj_step2(model, data)
     expected = np.empty(mujoco.mj_stateSize(model, STATE))
     mujoco.mj_getState(model, data, expected, STATE)
     simulation.perform(PLAN)
