@@ -2,11 +2,93 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 
+from ..errors import BodyError
+from ..mocap.options import option
 from ..recording import FloatArray
 from .joint_tree import JointTree
-from .plan import Plan
+from .name_hints import left_of_pair
+from .plan import LimbPair, Plan
+
+FACES = 0.3  # how clearly a person must face somewhere
+
+
+def limbs_left_first(
+    name: str, tree: JointTree, plan: Plan, told: Mapping[str, str]
+) -> tuple[LimbPair, LimbPair]:
+    """Return legs and arms, of each the left one first.
+
+    Args:
+        name: What the recording is called.
+        tree: Its skeleton.
+        plan: The body in it, with legs and arms.
+        told: Place of the body by joint, as a user says.
+
+    Raises:
+        BodyError: Facing and names contradict each other, or neither tells.
+    """
+    legs, arms = plan.legs, plan.arms
+    assert legs is not None and arms is not None
+    votes = facing_votes(tree, plan)
+    facing = sum(value for _, value in votes) / max(1.0, np.sqrt(len(votes)))
+    said = _told_left(tree, legs, told) or _told_left(tree, arms, told)
+    user = bool(said)
+    if not user:
+        said = left_of_pair(*_names(tree, legs))
+        if abs(facing) > FACES and said and np.sign(facing) != said:
+            seen = ", ".join(f"{why} {value:+.1f}" for why, value in votes)
+            raise BodyError(
+                f"{name!r} is mirrored: its names call the one side left, and by the way it faces "
+                f"it is the right one ({seen}); is an axis turned round, or are the names "
+                f"exchanged? {option('names')} says which joint is which"
+            )
+        if abs(facing) <= FACES and not said:
+            raise BodyError(
+                f"cannot tell left from right in {name!r}: nothing points ahead clearly, and the "
+                f"names do not say; {option('names')} does"
+            )
+    left_first = (said or np.sign(facing)) > 0
+    hips = _between(tree, legs) * (1.0 if left_first else -1.0)
+    arms_left_first = np.median((hips * _between(tree, arms)).sum(axis=1)) > 0
+    arms_said = left_of_pair(*_names(tree, arms))
+    if not user and arms_said and (arms_said > 0) != arms_left_first:
+        raise BodyError(
+            f"the arms of {name!r} are called left and right the other way round than its legs; "
+            f"{option('names')} says which joint is which"
+        )
+    return (
+        legs if left_first else _exchanged(legs),
+        arms if arms_left_first else _exchanged(arms),
+    )
+
+
+def _told_left(tree: JointTree, pair: LimbPair, told: Mapping[str, str]) -> int:
+    """Return 1 if a user calls a joint of the first limb left, -1 of the second, 0 neither."""
+    for sign, *parts in zip((1, -1), pair.nodes, pair.inner, pair.outer, strict=True):
+        for name in (name for part in parts for node in part for name in tree.names[node]):
+            side = told.get(name, "")[-2:]
+            if side in ("_l", "_r"):
+                return sign if side == "_l" else -sign
+    return 0
+
+
+def _names(tree: JointTree, pair: LimbPair) -> tuple[list[str], list[str]]:
+    sides = [(*inner, *nodes) for inner, nodes in zip(pair.inner, pair.nodes, strict=True)]
+    first, second = ([tree.names[node][-1] for node in side] for side in sides)
+    return first, second
+
+
+def _between(tree: JointTree, pair: LimbPair) -> FloatArray:
+    between: FloatArray = tree.points[:, pair.nodes[0][0]] - tree.points[:, pair.nodes[1][0]]
+    return between
+
+
+def _exchanged(pair: LimbPair) -> LimbPair:
+    return replace(pair, nodes=pair.nodes[::-1], inner=pair.inner[::-1], outer=pair.outer[::-1])
 
 
 def facing_votes(tree: JointTree, plan: Plan) -> list[tuple[str, float]]:
