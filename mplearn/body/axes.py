@@ -15,7 +15,7 @@ import numpy as np
 
 from mplearn.maths.rigid_fit import fit_similarity
 from mplearn.recording import FloatArray
-from mplearn.state import Array, Range
+from mplearn.state import Array, Range, complete
 
 NEAR_M = 0.015  # median distance of markers from where they were, at which nobody has moved
 SMALLEST, LARGEST = 1e-4, 1e4  # ratio of units
@@ -23,6 +23,7 @@ LIKE_PEOPLE = 0.4  # ratio of sizes from which on it cannot be another person
 SAME = 0.01  # by how much, as a share, a size may differ from a power of ten to be one
 
 
+@complete
 @dataclass(frozen=True, eq=False)
 class Axes:
     """Where a stream's markers are in the axes in which the stream began.

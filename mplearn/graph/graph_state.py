@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 
 from ..recording import IntArray
-from ..state import Array, Range, State, require
+from ..state import WHOLE, Array, Range, State, require
 
 _LONGEST_MS = 86_400_000
 
@@ -43,8 +43,11 @@ class GraphState(State):
         pairs = set(map(tuple, edges[:, :2].tolist()))
         require(len(pairs) == len(edges), "edges", "must be of different pairs")
         count, total_ms = edges[:, 2].astype(np.float64), edges[:, 3]
-        require(bool((count >= 1).all()), "edges", "must have counts of at least 1")
+        counted = bool(((count >= 1) & (count <= WHOLE)).all())
+        require(counted, "edges", f"must have counts in [1, {WHOLE:g}]")
         fits = (total_ms >= 0) & (total_ms <= count * _LONGEST_MS) & (edges[:, 4] >= 0)
+        squares = edges[:, 4].astype(np.float64)  # no less than of equal durations
+        fits &= (squares >= 0.999 * total_ms**2.0 / count) & (squares <= count * _LONGEST_MS**2)
         require(bool(fits.all()), "edges", "must have durations of at least 0 and at most a day")
         lengths = histories[:, 0]
         inside = (lengths >= 2) & (lengths <= order)
@@ -52,4 +55,10 @@ class GraphState(State):
         used = np.arange(order) < lengths[:, None]
         named = np.concatenate((histories[:, 1:-2][used], histories[:, -2]))
         require(bool(np.isin(named, ids).all()), "histories", "must name only ids of nodes")
-        require(bool((histories[:, -1] >= 1).all()), "histories", "must have counts of at least 1")
+        counts = {(source, target): n for source, target, n in edges[:, :3].tolist()}
+        seen = set()
+        for length, *context, after, n in histories.tolist():
+            seen.add((*context[:length], after))
+            most = counts.get((context[length - 1], after), 0)
+            require(1 <= n <= most, "histories", f"must have counts in [1, {most}] there, not {n}")
+        require(len(seen) == len(histories), "histories", "must differ")

@@ -29,6 +29,11 @@ class AbsurdState(State):
     largest: Annotated[float, Range(1.0)]
     in_a_row: Count
 
+    def check(self) -> None:
+        """Check that the last frame is there, or is not."""
+        missing = np.isnan(self.last)
+        require(bool(missing.all() or not missing.any()), "last", "must be finite, or all missing")
+
 
 class AbsurdFrames:
     """Finds frames that hold a value that is not finite, or far beyond all that was seen.

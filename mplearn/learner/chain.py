@@ -102,14 +102,18 @@ class ChainState(State):
         links: The segments, some at a time.
         paused_frames: Frames of the pause that goes on.
         broken: Whether what comes next does not follow what came.
+        n_links: How many segments there are.
     """
 
     links: tuple[LinksState, ...]
     paused_frames: Count
     broken: bool
+    n_links: Count
 
     def check(self) -> None:
-        """Check that the parts follow each other."""
+        """Check that the parts follow each other, and that none is missing."""
+        n = sum(len(block.number) for block in self.links)
+        require(self.n_links == n, "links", f"must be {self.n_links} segments, not {n}")
         for k, (one, two) in enumerate(pairwise(self.links), start=1):
             rises = len(one.number) and len(two.number) and one.number[-1] < two.number[0]
             require(bool(rises), f"links[{k}].number", "must rise")
@@ -299,7 +303,7 @@ class Chain:
             kept[at] = known if known and known[0] == now else (now, LinksState.of(now))
         self._kept = kept
         links_states = tuple(state for _, state in kept.values())
-        return ChainState(links_states, self._paused_frames, self._broken)
+        return ChainState(links_states, self._paused_frames, self._broken, len(self._links))
 
     def load_state(self, state: ChainState) -> None:
         """Resume from what `state` returned."""

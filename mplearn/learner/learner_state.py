@@ -62,7 +62,16 @@ class LearnerState(State):
         held = self.buffer.first + len(self.buffer.frames)
         require(since >= 0, "stream_start", f"must be at most {self.n_frames}")
         require(held == since, "n_frames", f"must be {held} after stream_start, not {since}")
-        require(self.person < max(self.n_people, 1), "person", f"must be below {self.n_people}")
+        require(self.segmenter.n_frames == since, "segmenter.n_frames", f"must be {since}")
+        n_people = 0 if self.observer is None else self.observer.identity.bodies.n_people
+        require(self.n_people == n_people, "n_people", f"must be {n_people}, as many as were met")
+        require(self.person < max(n_people, 0), "person", f"must be below {n_people}")
+        for k, each in enumerate(self.tree.trees):
+            met = each.person < max(n_people, 1)
+            require(met, f"tree.trees[{k}].person", f"must be below {max(n_people, 1)}")
+        if self.observer is None and since:
+            seen = bool(np.isfinite(self.absurd.last).all())
+            require(seen, "absurd.last", "must be a frame once there was one")
         require(self.lost_from <= self.n_frames, "lost_from", f"must be at most {self.n_frames}")
         primitives = self.tree.primitives
         ids = set(self.graph.ids.tolist())
@@ -73,5 +82,11 @@ class LearnerState(State):
             require(
                 bool(np.isin(known, self.graph.ids).all()), f"{place}.primitive", "must be known"
             )
+            require(
+                bool((block.nearest < self.tree.free_id).all()),
+                f"{place}.nearest",
+                "must be nodes of the tree, now or before",
+            )
             inside = (block.end <= self.n_frames) & (block.number < self.tree.n_seen)
+            inside &= block.decided_at <= self.n_frames
             require(bool(inside.all()), f"{place}.end", "must have been seen")

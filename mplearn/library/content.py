@@ -40,7 +40,26 @@ class LibraryState(State):
                 f"tree[{k}].parent",
                 f"must be a node, not {node.parent}",
             )
+            for name in ("id", "n_exemplars"):
+                low = getattr(node, name) >= 0
+                require(low, f"tree[{k}].{name}", "must be at least 0")
         require_no_cycle(parents, lambda id: f"tree[{list(parents).index(id)}].parent")
+        if not parents:
+            return
+        roots = [id for id, parent in parents.items() if parent is None]
+        require(len(roots) == 1, "tree", f"must have one root, not {roots}")
+        for k, primitive in enumerate(self.primitives):
+            require(primitive.id in parents, f"primitives[{k}].id", "must be a node of the tree")
+            parent = parents[primitive.id]
+            above = primitive.parent == parent
+            require(above, f"primitives[{k}].parent", f"must be {parent}, not {primitive.parent}")
+        if self.recogniser is not None:
+            index = self.recogniser.index
+            ids = {primitive.id for primitive in self.primitives}
+            leaves = index.ids[index.leaves].tolist()
+            require(ids.issuperset(leaves), "recogniser.index.ids", "must be primitives")
+            above = parents.keys() >= set(index.parents.tolist())
+            require(above, "recogniser.index.parents", "must be nodes of the tree")
 
 
 def to_content(library: PrimitiveLibrary) -> Any:

@@ -12,9 +12,13 @@ from ..errors import InvalidValueError
 from ..generation import Dynamics, estimate_dynamics, gaps_filled
 from ..hmm import LeftRightHMM
 from ..recording import FloatArray
+from ..state import complete
 from .compact import CompactMotion
 
+_LONGEST_S = 86_400.0
 
+
+@complete
 @dataclass(frozen=True, eq=False)
 class Primitive:
     """A motion primitive: a leaf of the tree, frozen.
@@ -40,9 +44,9 @@ class Primitive:
     parent: int | None = None
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.mean_duration_s) and self.mean_duration_s > 0):
+        if not 0 < self.mean_duration_s <= _LONGEST_S:
             raise InvalidValueError(
-                f"mean_duration_s of primitive {self.id} must be positive and finite, "
+                f"mean_duration_s of primitive {self.id} must lie in (0, {_LONGEST_S:g}], "
                 f"not {self.mean_duration_s}"
             )
         if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):

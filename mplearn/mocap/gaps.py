@@ -58,6 +58,17 @@ class GapsState(State):
     unseen_frames: Annotated[IntArray, Array("m", low=0)]
     neighbours: RigidityState
 
+    def check(self) -> None:
+        """Check that what is tracked is somewhere, and that nothing is unseen for too long."""
+        lost = np.isnan(self.last)
+        whole = bool((lost.all(axis=1) == lost.any(axis=1)).all())
+        require(whole, "last", "must be finite, or missing, in all of x, y, z")
+        known = bool((lost | np.isfinite(self.position)).all())
+        require(known, "position", "must be finite where a marker is tracked")
+        frames = self.neighbours.frames
+        fits = bool((self.unseen_frames <= frames).all())
+        require(fits, "unseen_frames", f"must be at most {frames}")
+
 
 class GapTracker:
     """Fills the gaps of markers, frame after frame, without looking ahead.
@@ -148,6 +159,10 @@ class GapTracker:
         state = validated(state)
         n = len(state.last)
         require(n == self.n_markers, "last", f"is of {n} markers, not of {self.n_markers}")
+        lost, longest = np.isnan(state.last[:, 0]), self._max_gap_frames
+        never = state.unseen_frames == state.neighbours.frames
+        fits = bool((lost == ((state.unseen_frames > longest) | never)).all())
+        require(fits, "last", f"must be missing where a marker is unseen for over {longest} frames")
         with within("neighbours"):
             self._neighbours = Neighbours.from_state(state.neighbours, n)
         self._tracks = Tracks(

@@ -44,6 +44,10 @@ class RigidityState(State):
     before: Annotated[FloatArray, Array("m", 3, nan=True)]
     as_last_seen: Annotated[FloatArray, Array("m", "m", 3, nan=True)]
 
+    def check(self) -> None:
+        """Check that no distance was seen more often than there were frames."""
+        require(bool((self.looks <= self.frames).all()), "looks", f"must be at most {self.frames}")
+
 
 class Neighbours(NamedTuple):
     """What is known of the distances between markers, for kernels, which change it in place.

@@ -55,6 +55,11 @@ class PeopleState(State):
     sharing: SharingState | None
 
     @property
+    def free_id(self) -> int:
+        """First id that was never used."""
+        return self.next_id if self.sharing is None else self.sharing.next_id
+
+    @property
     def primitives(self) -> set[int]:
         """Ids of the primitives."""
         if self.sharing is not None:
@@ -72,7 +77,10 @@ class PeopleState(State):
         if sharing is None:
             require(len(trees) == 1, "sharing", f"is needed for {len(trees)} people")
             largest = max(node.id for node in self.trees[0].tree.nodes)
-            require(self.next_id > largest, "next_id", f"must exceed {largest}")
+            most = self.trees[0].tree.next_id
+            require(
+                largest < self.next_id <= most, "next_id", f"must lie in [{largest + 1}, {most}]"
+            )
             return
         require(sharing.n_seen == n_seen, "sharing.n_seen", f"must be {n_seen} as in the trees")
         leaves = {

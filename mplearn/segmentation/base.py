@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import InvalidValueError
 from ..recording import FloatArray, Segment
-from ..state import State
+from ..state import Count, State
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,11 +21,13 @@ class SegmenterState(State):
     Attributes:
         segmenter: Name of its class.
         rate_hz: Frames per second [1/s].
+        n_frames: Frames since the start of the stream.
         arrays: Its arrays by name; each field of a record is one, as ``record.field``.
     """
 
     segmenter: str
     rate_hz: float
+    n_frames: Count
     arrays: dict[str, NDArray[Any]]
 
 

@@ -152,7 +152,8 @@ class SpeedSegmenter(Segmenter):
             for own, array in self._arrays.items()
             for name, column in _columns(own, array).items()
         }
-        return SegmenterState(type(self).__name__, self.rate_hz, columns)
+        n_frames = int(self._arrays["state"]["frames"][0])
+        return SegmenterState(type(self).__name__, self.rate_hz, n_frames, columns)
 
     def load_state(self, state: SegmenterState) -> None:
         """Resume from what `state` returned.
@@ -179,6 +180,11 @@ class SpeedSegmenter(Segmenter):
         for name, column in wanted.items():
             _check(state.arrays[name], column, f"arrays.{name}")
             column[...] = state.arrays[name]
+        frames = int(loaded["state"]["frames"][0])
+        require(frames == state.n_frames, "n_frames", f"must be {frames}, not {state.n_frames}")
+        for name, column in wanted.items():
+            fine = column.dtype.kind != "i" or bool((column <= frames + 1).all())
+            require(fine, f"arrays.{name}", f"must name frames that were seen, {frames}")
         self._check_loaded(loaded)
         self._arrays = loaded
         self._bind()

@@ -4,12 +4,14 @@ from .checkpoint import Checkpoint as Checkpoint
 from .checkpoint import checkpoint as checkpoint
 from .checkpoint import resumed as resumed
 from .declared import LARGEST as LARGEST
+from .declared import WHOLE as WHOLE
 from .declared import Array as Array
 from .declared import Blob as Blob
 from .declared import Count as Count
 from .declared import Range as Range
 from .declared import SharedState as SharedState
 from .declared import State as State
+from .declared import complete as complete
 from .declared import require as require
 from .declared import require_no_cycle as require_no_cycle
 from .files import FileFormat as FileFormat

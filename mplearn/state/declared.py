@@ -11,13 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import StateError
 
+T = TypeVar("T")
 LARGEST = 1e250  # of a number in a state, where nothing else is said: what lies beyond is damage
 
 
@@ -60,7 +61,25 @@ class Array:
             object.__setattr__(self, name, value)
 
 
-Count: TypeAlias = Annotated[int, Range(0)]
+WHOLE = 2.0**53  # of a whole number: up to it, numbers are exact
+Count: TypeAlias = Annotated[int, Range(0, WHOLE)]
+
+
+def complete(kind: type[T]) -> type[T]:
+    """Mark a dataclass whose fields must all be there, whatever defaults its constructor has.
+
+    Elsewhere a field that is missing takes its default: as where a setting is newer than a file.
+    """
+    _COMPLETE.add(kind)
+    return kind
+
+
+def is_complete(kind: type) -> bool:
+    """Whether a dataclass is so marked."""
+    return kind in _COMPLETE
+
+
+_COMPLETE: set[type] = set()
 
 
 @dataclass(frozen=True, eq=False)

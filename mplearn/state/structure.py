@@ -25,13 +25,23 @@ from typing import (
 import numpy as np
 
 from ..errors import MPLearnError, StateError
-from .declared import LARGEST, Array, Blob, Range, SharedState, State, limits, shown
+from .declared import (
+    LARGEST,
+    WHOLE,
+    Array,
+    Blob,
+    Range,
+    SharedState,
+    State,
+    is_complete,
+    limits,
+    shown,
+)
 
 T = TypeVar("T")
 Scope: TypeAlias = dict[str, int]  # lengths of the axes that have names, in one state
 Reader: TypeAlias = Callable[[Any, Scope], Any]
 
-_WHOLE = float(2**53)
 _LONGEST_TEXT = 100_000
 
 
@@ -100,7 +110,7 @@ def _reader(kind: Any) -> Reader:
         return lambda value, scope: kind(*row(value, scope))
     readers: dict[Any, Reader] = {
         bool: _bool,
-        int: _number(int, Range(-_WHOLE, _WHOLE)),
+        int: _number(int, Range(-WHOLE, WHOLE)),
         float: _number(float, None),
         str: _text,
     }
@@ -224,6 +234,8 @@ def _text(value: Any, _: Scope) -> str:
 
 def _number(kind: type, marker: Range | None) -> Reader:
     low, high = (-LARGEST, LARGEST) if marker is None else (marker.low, marker.high)
+    if kind is int:
+        low, high = max(low, -WHOLE), min(high, WHOLE)
     allowed = (int, np.integer) if kind is int else (int, float, np.integer, np.floating)
     called = "a whole number" if kind is int else "a number"
 
@@ -271,6 +283,8 @@ def _blob(marker: Array) -> Reader:
 
 def _array_check(dtype: np.dtype[Any], marker: Array) -> Callable[[Any, Scope | None], None]:
     low, high, bounded = marker.low, marker.high, dtype.kind != "b"
+    if dtype.kind == "i":
+        low, high = max(low, -WHOLE), WHOLE if high == LARGEST else high
 
     def check(value: Any, scope: Scope | None) -> None:
         if not isinstance(value, np.ndarray) or value.dtype != dtype:
@@ -321,14 +335,10 @@ def _dataclass(kind: type) -> Reader:
     def readers() -> list[tuple[str, Reader, bool]]:
         if not known:
             hints = get_type_hints(kind, include_extras=True)
-            known.extend(
-                (
-                    each.name,
-                    _reader(hints[each.name]),
-                    each.default is not MISSING or each.default_factory is not MISSING,
-                )
-                for each in fields(kind)
-            )
+            for each in fields(kind):
+                default = each.default is not MISSING or each.default_factory is not MISSING
+                optional = default and not is_complete(kind)
+                known.append((each.name, _reader(hints[each.name]), optional))
         return known
 
     def read(value: Any, _: Scope) -> Any:

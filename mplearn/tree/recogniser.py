@@ -51,6 +51,9 @@ class RecogniserState(State):
         wanted = self.config.form.n_points
         require(points == wanted, "bank.columns", f"must hold {wanted} points each, not {points}")
         known = set(self.bank.numbers.tolist())
+        used = {number for group in self.index.members for number in group}
+        if self.config.n_candidates:  # the bank holds what is searched, and nothing else
+            require(used >= known, "index.members", f"must name {sorted(known - used)}")
         for k, group in enumerate(self.index.members):
             require(
                 known.issuperset(group), f"index.members[{k}]", "must name exemplars of the bank"

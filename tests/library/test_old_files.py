@@ -1,0 +1,41 @@
+"""Library files that older code wrote still open, and say what they said then."""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mplearn_envs
+from mplearn import PrimitiveLibrary
+
+OLD = Path(__file__).parent / "data" / "people-schema-1.mplearn"  # five motions by three people
+EMBEDDED = Path(mplearn_envs.__file__).parent / "data" / "default.mplearn"
+
+
+def test_a_library_of_several_people_says_what_it_said():
+    library = PrimitiveLibrary.load(OLD)
+    assert library.version == "adc83cf7521edfd7"
+    assert library.names == ("Bögen: hoch", "P2", "P3", "P4", "P5")
+    assert len(library.tree) == 17
+    assert library.walk(None, 5, np.random.default_rng(0)) == (4, 3, 2, 1, 5)
+    distances = (0.003547056, 0.003915958, 0.001819743, 0.001887716, 0.001404298)
+    scores = (0.489337, 0.495932, 0.39865, 0.352748, 0.318466)
+    for id, distance, score in zip(library.ids, distances, scores, strict=True):
+        motion = library[id].exemplars[0]
+        said = library.recognise(motion)
+        assert said.primitive == id
+        assert said.distance == pytest.approx(distance, abs=1e-8)
+        assert library.score_motion(motion).score == pytest.approx(score, abs=1e-5)
+
+
+@pytest.mark.parametrize("path", [OLD, EMBEDDED])
+def test_what_is_read_is_written_again(path, tmp_path):
+    library = PrimitiveLibrary.load(path)
+    copy = library.save(tmp_path / "copy.mplearn")
+    headers = []
+    for each in (path, copy):
+        with zipfile.ZipFile(each) as archive:
+            headers.append((archive.read("header.json"), archive.read("arrays.bin")))
+    assert headers[0] == headers[1]
+    assert PrimitiveLibrary.load(copy).version == library.version

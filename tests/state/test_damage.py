@@ -1,0 +1,172 @@
+"""A damaged state is refused with the place of the damage, or is the same all the same.
+
+``python tests/state/test_damage.py 1500`` tries so many damages of each kind of learner, and says
+what became of them.
+"""
+
+import sys
+import warnings
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from damage import damaged, same
+
+from mplearn import LearnerConfig, MotionLearner, PrimitiveLibrary
+from mplearn.demonstrator import Person, demonstrate
+from mplearn.errors import LibraryError, StateError
+from mplearn.evaluation.observing import observe
+from mplearn.evaluation.streams import join_people
+from mplearn.learner import LearnerState
+from mplearn.library.content import FILES, from_content, to_content
+from mplearn.state import from_plain, to_plain
+
+
+def one_person() -> MotionLearner:
+    """A learner of features, in the middle of a motion."""
+    features = observe(demonstrate(("BAR", "BAL", "SQD", "SQR") * 6, seed=1).recording)
+    learner = MotionLearner(LearnerConfig(features.channels, features.rate_hz))
+    learner.learn_many(features.frames[:-100])
+    return learner
+
+
+def two_people() -> MotionLearner:
+    """A learner of the markers of two people, in the middle of a motion."""
+    people = (Person("small", 1.58), Person("tall", 1.84))
+    script = ("BAR", "BAL") * 5
+    takes = [demonstrate(script, seed=k, person=each).recording for k, each in enumerate(people)]
+    stream = join_people(takes, np.random.default_rng(0), interleaved=True)
+    learner = MotionLearner(LearnerConfig(stream.channels, stream.rate_hz))
+    learner.learn_many(stream.frames[: int(0.93 * len(stream.frames))])
+    return learner
+
+
+def tried(plain, load, save, n, seed):
+    """Count what became of damages; return those that were taken for something else."""
+    counts, silent = Counter(), []
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for k in range(n):
+            wrong, what = damaged(plain, np.random.default_rng((seed, k)))
+            try:
+                found = load(wrong)
+            except StateError as error:
+                assert error.place or "." not in what.place, (what, str(error))
+                counts["refused"] += 1
+            except LibraryError as error:
+                assert "does not describe a library" in str(error), (what, str(error))
+                counts["refused"] += 1
+            else:
+                equal = same(save(found), plain)
+                counts["the same" if equal else "silent"] += 1
+                silent += [] if equal else [what]
+    return counts, silent
+
+
+def tried_learner(learner, n, seed=0):
+    return tried(
+        to_plain(learner.state()),
+        lambda plain: MotionLearner.from_state(from_plain(LearnerState, plain)),
+        lambda found: to_plain(found.state()),
+        n,
+        seed,
+    )
+
+
+@pytest.fixture(scope="module", params=[one_person, two_people])
+def learner(request):
+    return request.param()
+
+
+def test_a_damaged_learner_is_refused_or_the_same(learner):
+    counts, silent = tried_learner(learner, 400)
+    assert not silent
+    assert counts["refused"] > 360
+
+
+def test_what_a_learner_holds_is_refused_where_it_is_damaged(learner):
+    state = learner.state()
+    first = state.tree.trees[0].tree
+    wrong = replace(first.nodes[2], matrix=first.nodes[2].matrix[:-1])
+    nodes = (*first.nodes[:2], wrong, *first.nodes[3:])
+    person = replace(state.tree.trees[0], tree=replace(first, nodes=nodes))
+    trees = (person, *state.tree.trees[1:])
+    with pytest.raises(StateError) as caught:
+        MotionLearner.from_state(replace(state, tree=replace(state.tree, trees=trees)))
+    assert caught.value.place == "tree.trees[0].tree.nodes[2].matrix"
+
+
+def test_a_learner_goes_on_from_a_file_bit_for_bit(learner, tmp_path):
+    path = learner.save(tmp_path / "half.learner")
+    again = MotionLearner.load(path)
+    assert again.state() == learner.state()
+    assert again.snapshot().version == learner.snapshot().version
+    frames = np.resize(np.asarray(learner.state().absurd.last), (1, len(learner.config.channels)))
+    frames = np.nan_to_num(frames)
+    assert again.learn_many(frames) == MotionLearner.load(path).learn_many(frames)
+    damaged_file = bytearray(path.read_bytes())
+    damaged_file[len(damaged_file) // 2] ^= 1
+    path.write_bytes(bytes(damaged_file))
+    with pytest.raises(StateError, match=r"half\.learner"):
+        MotionLearner.load(path)
+    with pytest.raises(StateError, match="not an mplearn learner"):
+        MotionLearner.load(learner.snapshot().save(tmp_path / "a.mplearn"))
+
+
+@pytest.fixture(scope="module")
+def library():
+    return two_people().snapshot()
+
+
+def test_a_damaged_library_is_refused_or_the_same(library):
+    plain = to_content(library)
+    counts, silent = tried(
+        plain, lambda wrong: from_content(PrimitiveLibrary, wrong, "x"), to_content, 400, 0
+    )
+    legal = {  # nothing else says that it is wrong
+        "recogniser.bank.columns": "nan",  # a value that was not measured
+        "recogniser": "none",  # a library that only acts
+    }
+    wrong = [what for what in silent if legal.get(what.place) != what.kind]
+    assert not [what for what in wrong if not what.place.startswith("tree[")]
+    assert counts["refused"] > 360
+
+
+def changed(library, **changes):
+    return to_content(library) | changes
+
+
+@pytest.mark.parametrize(
+    ("place", "change"),
+    [
+        ("channels[0]", lambda content: content["channels"].__setitem__(0, 7)),
+        ("primitives[0]", lambda content: content["primitives"][0].update(mean_duration_s=1e300)),
+        ("primitives[0]", lambda content: content["primitives"][0].update(mean_duration_s=9e4)),
+        ("primitives[0].name", lambda content: content["primitives"][0].update(name="\ud800")),
+        (
+            "tree[1].parent",
+            lambda content: content["tree"][1].__setitem__(1, content["tree"][1][0]),
+        ),
+        ("rate_hz", lambda content: content.update(rate_hz=float("nan"))),
+        ("graph.ids", lambda content: content["graph"].update(ids=np.array([1, 1]))),
+    ],
+)
+def test_what_used_to_get_past_the_reader(library, tmp_path, place, change):
+    content = to_content(library)
+    change(content)
+    if place == "primitives[0].name":  # no file can hold it
+        with pytest.raises(LibraryError, match="name"):
+            from_content(PrimitiveLibrary, content, "here")
+        return
+    FILES.write(tmp_path / "wrong.mplearn", content)
+    with pytest.raises(LibraryError) as caught:
+        PrimitiveLibrary.load(tmp_path / "wrong.mplearn")
+    assert place in str(caught.value)
+
+
+if __name__ == "__main__":
+    n = int(sys.argv[1])
+    for make in (one_person, two_people):
+        found, taken = tried_learner(make(), n, seed=1)
+        print(f"{make.__name__}: {dict(found)} {taken}")
