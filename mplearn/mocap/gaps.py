@@ -159,7 +159,7 @@ class GapTracker:
         state = validated(state)
         n = len(state.last)
         require(n == self.n_markers, "last", f"is of {n} markers, not of {self.n_markers}")
-        lost, longest = np.isnan(state.last[:, 0]), self._max_gap_frames
+        lost, longest = np.isnan(state.last[:, 0]), self._rules.max_gap_frames
         never = state.unseen_frames == state.neighbours.frames
         fits = bool((lost == ((state.unseen_frames > longest) | never)).all())
         require(fits, "last", f"must be missing where a marker is unseen for over {longest} frames")

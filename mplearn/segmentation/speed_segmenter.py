@@ -182,8 +182,8 @@ class SpeedSegmenter(Segmenter):
             column[...] = state.arrays[name]
         frames = int(loaded["state"]["frames"][0])
         require(frames == state.n_frames, "n_frames", f"must be {frames}, not {state.n_frames}")
-        for name, column in wanted.items():
-            fine = column.dtype.kind != "i" or bool((column <= frames + 1).all())
+        for name, array in loaded.items():
+            fine = array.dtype.kind != "i" or bool((array <= frames).all())
             require(fine, f"arrays.{name}", f"must name frames that were seen, {frames}")
         self._check_loaded(loaded)
         self._arrays = loaded
