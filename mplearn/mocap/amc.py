@@ -87,25 +87,25 @@ def _frames(
     """Return whether angles are degrees (None: not said), a frame's bones, and the table."""
     lines, places, modes = [], [], set()
     for place, line in enumerate(read_text(path).splitlines(), start=1):
-        words = line.split()
-        if words and words[0].startswith(":"):
-            modes.add(words[0].lower())
-        elif words and not words[0].startswith("#"):
-            lines.append(words)
+        text = line.strip()
+        if text.startswith(":"):
+            modes.add(text.split()[0].lower())
+        elif text and not text.startswith("#"):
+            lines.append(text)
             places.append(place)
     degrees = True if ":degrees" in modes else False if ":radians" in modes else None
-    starts = [i for i, words in enumerate(lines) if len(words) == 1 and words[0].isdecimal()]
+    starts = [i for i, text in enumerate(lines) if text.isdecimal()]
     if not starts or starts[0] != 0:
-        raise bad_file(path, f"starts with {lines[0][0][:40] if lines else ''!r}", _EXPECTED)
+        raise bad_file(path, f"starts with {lines[0][:40] if lines else ''!r}", _EXPECTED)
     height = starts[1] if len(starts) > 1 else len(lines)
     if len(starts) > 1 and len(lines) < starts[-1] + height:
-        findings.warn(f"the last frame, {lines[starts[-1]][0][:12]}, is cut off: left out")
+        findings.warn(f"the last frame, {lines[starts[-1]][:12]}, is cut off: left out")
         cut = starts.pop()
         del lines[cut:], places[cut:]
     if height == 1 or len(lines) != height * len(starts) or any(np.diff(starts) != height):
         wrong = next((i for i, s in enumerate(starts) if s != i * height), len(starts))
         raise bad_file(path, f"frame {wrong} has another number of bones than the first", _EXPECTED)
-    count = [int(lines[start][0][:12]) for start in starts]
+    count = [int(lines[start][:12]) for start in starts]
     keep = np.append(True, np.diff(count) != 0)
     if not keep.all():
         findings.warn(f"{int((~keep).sum())} frames that stand twice are left out")
@@ -116,15 +116,16 @@ def _frames(
 
     layout, tables = [], []
     for row in range(1, height):
-        bone, *cells = lines[row]
-        rows = lines[row::height]
+        rows = [text.split() for text in lines[row::height]]
+        bone, n_cells = rows[0][0], len(rows[0]) - 1
         for frame, words in enumerate(rows):
             if words[0] != bone:
-                number = lines[starts[frame]][0]
-                raise bad_file(path, f"bone {words[0]!r} in frame {number}", f"{bone!r}, as before")
-        layout.append((bone, len(cells)))
-        where = places[row::height]
-        tables.append(numbers(path, [words[1:] for words in rows], len(cells), where))
+                number = lines[starts[frame]]
+                raise bad_file(
+                    path, f"bone {words[0]!r} in frame {number}", f"{bone[:40]!r}, as before"
+                )
+        layout.append((bone, n_cells))
+        tables.append(numbers(path, [words[1:] for words in rows], n_cells, places[row::height]))
     return degrees, layout, np.concatenate(tables, axis=1)[keep]
 
 

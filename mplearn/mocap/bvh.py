@@ -17,24 +17,27 @@ from pathlib import Path
 
 import numpy as np
 
-from ..recording import Recording
+from ..recording import FloatArray, Recording
 from .bvh_hierarchy import parse_hierarchy
 from .bvh_motion import parse_motion
 from .files import bad_file, read_text
 from .findings import Findings
+from .kinematics import Joint
 from .reader import Hints, Reader
 from .skeletal import SkeletalMotion, skeletal_recording
 from .space import Space
 
 # the format names neither: centimetres are usual, and so is y up
 _SPACE = Space(0.01, "y", "z", says_unit=False)
+_NEXT_TO_NOTHING = 0.1  # of the offset
 _MOTION = re.compile(r"(?:^|(?<=\}))[ \t]*MOTION[ \t]*$", re.IGNORECASE | re.MULTILINE)
 
 
 class BVHReader(Reader):
     """Reads BVH files: y up, z forward, centimetres unless the person or a hint tells otherwise.
 
-    A joint's position channels replace its offset. Unlike most formats this one has a rate without
+    A joint's position channels replace its offset, unless those of most joints are next to nothing:
+    then they are how far it is off its offset. Unlike most formats this one has a rate without
     a name: seconds a frame.
     """
 
@@ -54,5 +57,24 @@ class BVHReader(Reader):
             path, text[start.end() + 1 :], first_line, len(columns), hints.rate_hz, findings
         )
         values *= [np.pi / 180.0 if column.rotates else 1.0 for column in columns]
+        _from_parents(joints, values, findings)
         motion = SkeletalMotion(joints, columns, values, rate_hz, _SPACE)
         return skeletal_recording(path, motion, hints, findings, positions=positions)
+
+
+def _from_parents(joints: tuple[Joint, ...], values: FloatArray, findings: Findings) -> None:
+    """Let positions that are counted from the offsets be counted from the parents, in place."""
+    moving = [j for j in joints if j.parent >= 0 and len(j.translations) == 3 and j.offset.any()]
+    small = []
+    for joint in moving:
+        columns = [column for _, column in joint.translations]
+        known = values[~np.isnan(values[:, columns]).any(axis=1)][:, columns]
+        if len(known) and np.linalg.norm(np.median(known, axis=0)) < _NEXT_TO_NOTHING * float(
+            np.linalg.norm(joint.offset)
+        ):
+            small.append(joint)
+    if small and 2 * len(small) > len(moving):
+        findings.note("positions of joints are taken as how far they are off their offsets")
+        for joint in small:
+            for axis, column in joint.translations:
+                values[:, column] += joint.offset[axis]

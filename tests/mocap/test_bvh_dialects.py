@@ -106,6 +106,27 @@ def test_a_dialect_holds_the_same_motion(tmp_path: Path, dialect: str) -> None:
     assert all(said in text for text in texts)
 
 
+@pytest.mark.parametrize("wobble", [0.0, 0.3])
+def test_positions_that_are_counted_from_the_offsets(tmp_path: Path, wobble: float) -> None:
+    """Some tools write zeros where others repeat the offset."""
+    values = bvh_values()
+    text = BVH_HIERARCHY.replace("CHANNELS 3 ", "CHANNELS 6 Xposition Yposition Zposition ")
+    rng = np.random.default_rng(0)
+    off = wobble * rng.normal(size=(3, len(values), 3))
+    offsets = np.array([[0, 25, 1], [18, 30, -2], [0, 40, 0]])
+    parts = np.split(values, [6, 9, 12, 15], axis=1)  # hips, spine, arm, head's place, the rest
+    tables = []
+    for add in (np.zeros((3, 1, 3)), offsets[:, None]):
+        moved = off + add
+        places = [moved[0], parts[1], moved[1], parts[2], moved[2], parts[4]]
+        tables.append(np.concatenate([parts[0], *places], axis=1))
+    ours, usual = (
+        points_of(write_bvh(tmp_path / f"{i}.bvh", table, text)) for i, table in enumerate(tables)
+    )
+    assert ours == pytest.approx(usual, abs=1e-12)
+    assert np.linalg.norm(ours[:, 1] - ours[:, 0], axis=1).min() > 0.2
+
+
 def test_latin_1_names(tmp_path: Path) -> None:
     text, expected = plain(tmp_path)
     path = tmp_path / "take.bvh"
