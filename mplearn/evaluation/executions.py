@@ -8,6 +8,7 @@ at which the person's takes with the same limb usually start.
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -17,7 +18,7 @@ import numpy as np
 from ..errors import RecordingError
 from ..maths.resampling import bridge_gaps
 from ..maths.rigid_fit import fit_upright
-from ..recording import FloatArray, LabelledSegment, Recording
+from ..recording import BoolArray, FloatArray, IntArray, LabelledSegment, Recording
 
 TRAVEL_RATIO = 3.0  # a limb that travels this much farther than its mirror image names the side
 TRAVEL_M = 0.02  # and at least this far, root mean square [m]
@@ -43,6 +44,46 @@ def without_gaps(frames: FloatArray, name: str = "") -> FloatArray:
     if unseen.any():
         raise RecordingError(f"recording {name!r}: column {unseen.argmax()} is missing throughout")
     return filled
+
+
+def all_without_gaps(takes: Sequence[Recording]) -> list[FloatArray]:
+    """Bridge the gaps of a person's takes, shape (T, D) each.
+
+    A marker that a take never shows is put between the three that are nearest to it in the others,
+    so that takes can be compared and joined; it is no measurement.
+
+    Raises:
+        RecordingError: A take never shows a column that is no marker's, or no marker at all.
+    """
+    filled = []
+    for take in takes:
+        if not take.is_markers:
+            filled.append(without_gaps(take.frames, take.name))
+            continue
+        markers = bridge_gaps(take.frames).reshape(len(take), -1, 3)
+        unseen: BoolArray = np.asarray(np.isnan(markers).any(axis=(0, 2)))
+        if unseen.all():
+            raise RecordingError(f"recording {take.name!r}: all markers are missing throughout")
+        for marker in np.flatnonzero(unseen):
+            near = _neighbours(takes, int(marker), ~unseen)
+            markers[:, marker] = markers[:, near].mean(axis=1)
+        filled.append(markers.reshape(take.frames.shape))
+    return filled
+
+
+def _neighbours(takes: Sequence[Recording], marker: int, seen: BoolArray) -> IntArray:
+    """Return the three seen markers that are nearest to one in takes that show it; all if none."""
+    distances = [
+        np.linalg.norm(take.markers - take.markers[:, [marker]], axis=2)
+        for take in takes
+        if np.isfinite(take.markers[:, marker]).any()
+    ]
+    if not distances:
+        return np.flatnonzero(seen)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of markers that are never seen together
+        usual = np.nanmedian(np.concatenate(distances), axis=0)
+    return np.argsort(np.where(seen & np.isfinite(usual), usual, np.inf))[:3]
 
 
 def find_reversal(frames: FloatArray, rate_hz: float) -> int:
@@ -129,7 +170,7 @@ def split_repetitions(takes: Sequence[Recording]) -> tuple[Recording, ...]:
     Raises:
         RecordingError: A take has fewer than two labelled repetitions, or one that is too short.
     """
-    filled = [without_gaps(take.frames, take.name) for take in takes]
+    filled = all_without_gaps(takes)
     for take in takes:
         if len(take.labels) < 2 or min(label.end - label.start for label in take.labels) < 10:
             raise RecordingError(

@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import InvalidValueError, RecordingError
 from ..maths.easing import minimum_jerk
 from ..recording import FloatArray, LabelledSegment, Recording
-from .executions import split_repetitions, stood_like, without_gaps
+from .executions import all_without_gaps, split_repetitions, stood_like
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def make_session(
     check_alike(takes, "session", ("channels", "rate_hz", "person"))
     first = takes[0]
     split = split_repetitions(takes)
-    filled = [without_gaps(take.frames) for take in split]
+    filled = all_without_gaps(split)
     movements = [
         [_Execution(i, take.labels[k : k + 2]) for k in range(0, len(take.labels), 2)]
         * config.executions

@@ -10,6 +10,7 @@ from data_folder import DATA, needs_data
 
 from mplearn.errors import InvalidValueError, RecordingError
 from mplearn.evaluation.executions import (
+    all_without_gaps,
     find_limb,
     find_reversal,
     split_repetitions,
@@ -169,3 +170,22 @@ def test_one_persons_takes_with_sides_found_from_data():
     assert names["s01"][:2] == ["m02R-out", "m07R-out"]
     assert names["s02"][:2] == ["m02L-out", "m07R-out"]
     assert names["s01"][2] != names["s02"][2]  # s01's starts at the other end
+
+
+def test_a_marker_that_one_take_never_shows_is_put_beside_its_neighbours():
+    rng = np.random.default_rng(4)
+    rest = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0.05, 0.05, 0], [1, 1, 1], [1, 1, 1.5]])
+    takes = []
+    for shift in (0.0, 3.0):
+        way = np.cumsum(rng.normal(0, 0.01, (40, 1, 3)), axis=0) + shift
+        markers = (rest + way).reshape(40, -1)
+        takes.append(Recording(markers, 100.0, marker_channels(tuple("ABCDEF")), f"{shift}"))
+    lost = takes[1].frames.copy()
+    lost[:, 9:12] = np.nan  # D lies between A, B and C
+    takes[1] = replace(takes[1], frames=lost)
+    filled = all_without_gaps(takes)
+    np.testing.assert_array_equal(filled[0], takes[0].frames)
+    between = lost.reshape(40, -1, 3)[:, :3].mean(axis=1)
+    np.testing.assert_allclose(filled[1][:, 9:12], between)
+    with pytest.raises(RecordingError, match="missing throughout"):
+        all_without_gaps([replace(takes[1], frames=np.full_like(lost, np.nan))])

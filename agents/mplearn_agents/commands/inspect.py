@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 HELP = "Show what recordings hold: how they were read, and the person recognised in them."
 _MANY = 12  # names in a line
+_MOST_ROWS = 20  # of a picture
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -69,9 +70,10 @@ def _draw(args: argparse.Namespace, found: list[Inspection], console: Console) -
 
     path = args.picture or Path(f"{args.data.name.split('.')[0]}.png")
     path.parent.mkdir(parents=True, exist_ok=True)
-    draw(found[:40], path)
+    step = -(-len(found) // _MOST_ROWS)
+    draw(found[::step], path)
     if not args.json:
-        more = f" of the first 40 of {len(found)} takes" if len(found) > 40 else ""
+        more = f" of every {step}th take" if step > 1 else ""
         console.print(f"stick figures{more} written to {path}")
 
 
