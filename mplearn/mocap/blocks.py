@@ -89,16 +89,18 @@ def read_block(
     path = sheet.path
     if not block.columns:
         raise bad_file(path, "no markers", "columns X, Y, Z below a name")
+    clocks = [i for i in (block.time, block.frame) if i is not None]
+    columns = [*clocks, *(i for axes in block.columns for i in axes)]
     rows = sheet.rows(block.start, block.stop)
-    values = measured_rows(path, rows, block.width, findings, group=3)
+    values = measured_rows(path, rows, block.width, findings, group=3, columns=columns)
     if not len(values):
         raise bad_file(path, "0 frames", "at least one")
-    points = values[:, [i for axes in block.columns for i in axes]].reshape(len(values), -1, 3)
+    points = values[:, len(clocks) :].reshape(len(values), -1, 3).copy()
     if zero_is_missing:
         points[(points == 0.0).all(axis=2)] = np.nan
     seen = (~np.isnan(points).any(axis=2)).sum(axis=0)
     kept, names = chosen_names(path, block.names, seen, findings)
-    clock = _clock(path, block, values, findings)
+    clock = _clock(path, block, values[:, : len(clocks)], findings)
     flat = points[:, kept].reshape(len(points), -1)
     points = clock.even(flat).reshape(-1, len(kept), 3)
     rate_hz = hints.rate_hz or _rate(path, said_hz, clock, findings)
@@ -113,21 +115,22 @@ def read_block(
     )
 
 
-def _clock(path: Path, block: Block, values: FloatArray, findings: Findings) -> Clock:
-    plain = Clock(np.nan, np.arange(len(values), dtype=np.float64), False)
-    if block.time is not None and np.ptp(np.nan_to_num(values[:, block.time])) > 0:
-        clock = even_clock(path, values[:, block.time])
+def _clock(path: Path, block: Block, clocks: FloatArray, findings: Findings) -> Clock:
+    """Return the clock of times, if there are any, or of frames: the columns of ``clocks``."""
+    plain = Clock(np.nan, np.arange(len(clocks), dtype=np.float64), False)
+    if block.time is not None and np.ptp(np.nan_to_num(clocks[:, 0])) > 0:
+        clock = even_clock(path, clocks[:, 0])
         if clock.jitters:
             findings.note(f"times jitter: resampled to an even {clock.rate_hz:.6g} Hz")
         return clock
-    if block.frame is None or len(values) < 2:
+    if block.frame is None or len(clocks) < 2:
         return plain
-    steps = np.diff(values[:, block.frame])
+    steps = np.diff(clocks[:, -1])
     if (steps == 1).all() or not (steps > 0).all() or (steps != np.rint(steps)).any():
         return plain
     usual = float(np.median(steps))
     places = np.concatenate([[0.0], np.cumsum(steps)]) / usual
-    if (places != np.rint(places)).any() or places[-1] > 10 * len(values) + 1000:
+    if (places != np.rint(places)).any() or places[-1] > 10 * len(clocks) + 1000:
         return plain
     return Clock(np.nan, places, False)
 

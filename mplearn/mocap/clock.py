@@ -11,6 +11,7 @@ from ..recording import FloatArray
 from .files import bad_file
 
 _EVEN = 0.3  # of a frame: what rounding leaves
+_UNEVEN, _MANY = 0.1, 0.2  # a clock jitters if such a share of its steps is off by such a share
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +74,9 @@ def even_clock(path: Path, times_s: FloatArray) -> Clock:
         raise bad_file(
             path, "most of the time has no frames", "an even rate with few dropped frames"
         )
+    if (whole < 1).any() and _jitters(times_s):
+        rate_hz = (len(times_s) - 1) / (times_s[-1] - times_s[0])
+        return Clock(float(rate_hz), (times_s - times_s[0]) * rate_hz, True)
     index = np.concatenate([[0.0], np.cumsum(whole)])
     rate_hz = float(index[-1] / (times_s[-1] - times_s[0]))
     places = (times_s - times_s[0]) * rate_hz
@@ -87,3 +91,12 @@ def even_clock(path: Path, times_s: FloatArray) -> Clock:
     if off.max() <= _EVEN:
         return Clock(rate_hz, index, False)
     return Clock(rate_hz, places, True)
+
+
+def _jitters(times_s: FloatArray) -> bool:
+    """Whether times lie around an even clock of which no frame is missing, many of them off it."""
+    steps = np.diff(times_s)
+    uneven = np.abs(steps / np.median(steps) - 1.0) > _UNEVEN
+    even = np.linspace(times_s[0], times_s[-1], len(times_s))
+    off = np.abs(times_s - even).max() / steps.mean()
+    return bool(uneven.mean() >= _MANY and off < 0.5 and steps.max() < 2.5 * steps.mean())

@@ -105,6 +105,12 @@ class Columns:
     confidences: tuple[int, ...]
     points: int | None
 
+    @property
+    def measured(self) -> list[int]:
+        """Columns that may be measurements."""
+        other = {*self.times, *self.frames, *self.texts.values(), *self.confidences, self.points}
+        return [i for i in range(len(self.names)) if i not in other]
+
     def time_unit_s(self, column: int) -> float | None:
         """Return the unit of a column of times [s], if its header says it."""
         said = self.units[column].lower()

@@ -151,69 +151,81 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
         if i < len(first) and first[i].strip() and not is_number(first[i]):
             textual[f"time {i}"] = i
     texts: dict[str, list[str]] = {name: [] for name in textual}
-    numeric = [i for i in range(n_columns) if i not in textual.values()]
+    markers = [i for axes in columns.markers.values() for i in axes]
+    measured = [i for i in columns.measured if i not in textual.values()]
+    are_markers = bool(markers) and len(markers) >= _MARKERS_SHARE * len(measured)
+    if are_markers:
+        wanted = markers
+    elif columns.points is not None:
+        wanted = [next(i for i in measured if columns.names[i].lower() == a) for a in "xyz"]
+    else:
+        wanted = measured
+    clocks = [i for i in (*columns.times, *columns.frames) if i not in textual.values()]
 
     def rows() -> Iterator[tuple[int, list[str]]]:
         for line, cells in sheet.rows(header.start):
-            if not textual:
-                yield line, cells
-                continue
-            while len(cells) > n_columns and not cells[-1].strip():
-                cells.pop()
-            if len(cells) != n_columns:
-                raise bad_file(path, f"line {line} has {len(cells)} columns", f"{n_columns}")
-            for name, i in textual.items():
-                texts[name].append(cells[i].strip())
-            yield line, [cells[i] for i in numeric]
+            if textual:
+                while len(cells) > n_columns and not cells[-1].strip():
+                    cells.pop()
+                if len(cells) != n_columns:
+                    raise bad_file(path, f"line {line} has {len(cells)} columns", f"{n_columns}")
+                for name, i in textual.items():
+                    texts[name].append(cells[i].strip())
+            yield line, cells
 
-    group = 3 if columns.markers else 1
-    found = measured_rows(path, rows(), len(numeric), findings, group=group)
-    place = {column: k for k, column in enumerate(numeric)}
+    found = measured_rows(
+        path,
+        rows(),
+        n_columns,
+        findings,
+        group=3 if are_markers else 1,
+        columns=[*clocks, *wanted],
+    )
+    place = {column: k for k, column in enumerate([*clocks, *wanted])}
     numbers = [i for i in columns.frames if _counts(found[:, place[i]])]
-    times = [i for i in columns.times if i in place]
-    left = [i for i in numeric if i not in times and i not in numbers]
-    left = [i for i in left if i not in columns.confidences]
-    if (not left and columns.points is None) or not len(found):
-        raise bad_file(path, f"{len(left)} channels, {len(found)} rows", "at least one of each")
-    if not all(columns.names[i] for i in left):
+    if wanted == measured:  # what is only called a number of frames is measured
+        wanted = [i for i in clocks if i in columns.frames and i not in numbers] + wanted
+    if not wanted or not len(found):
+        raise bad_file(path, f"{len(wanted)} channels, {len(found)} rows", "at least one of each")
+    if not all(columns.names[i] for i in wanted):
         raise bad_file(path, f"columns named {list(columns.names[:6])}", "names, each different")
-    clock = [(found[:, place[i]], columns.time_unit_s(i)) for i in times]
-    clock += [(_of_day(path, texts.pop(n)), 1.0) for n in list(texts) if n.startswith("time ")]
+    times = [(found[:, place[i]], columns.time_unit_s(i)) for i in clocks if i in columns.times]
+    times = [(seconds, unit_s) for seconds, unit_s in times if not np.isnan(seconds).all()]
+    times += [(_of_day(path, texts.pop(n)), 1.0) for n in list(texts) if n.startswith("time ")]
     table = _Table(
-        found[:, [place[i] for i in left]],
-        tuple(columns.names[i] for i in left),
+        found[:, [place[i] for i in wanted]],
+        tuple(columns.names[i] for i in wanted),
         None,
         None,
-        tuple(clock),
+        tuple(times),
         found[:, place[numbers[0]]] if numbers else None,
         texts,
     )
-    if columns.points is not None:
-        return table
-    return _sorted_out(table, left, columns, findings)
+    if are_markers:
+        return _of_markers(table, columns, findings)
+    return table if columns.points is not None else _in_si(table, wanted, columns, findings)
 
 
-def _sorted_out(table: _Table, left: list[int], columns: Columns, findings: Findings) -> _Table:
-    """Return a table with either its markers or its channels."""
-    place = {column: k for k, column in enumerate(left)}
-    markers = columns.markers
-    if markers and 3 * len(markers) >= _MARKERS_SHARE * len(left):
-        used = [i for axes in markers.values() for i in axes]
-        others = [columns.names[i] for i in left if i not in set(used)]
-        if others:
-            findings.leave_out(others)
-            findings.note(f"{len(others)} columns that are no markers left out")
-        if columns.doubled:
-            findings.warn(
-                f"the same name more than once: {', '.join(columns.doubled[:5])}; the first one "
-                "is used"
-            )
-        units = {columns.units[i] for i in used if columns.units[i]}
-        unit = named_unit(units.pop()) if len(units) == 1 else None
-        values = table.values[:, [place[i] for i in used]].copy()
-        return replace(table, values=values, channels=(), markers=tuple(markers), unit_m=unit)
+def _of_markers(table: _Table, columns: Columns, findings: Findings) -> _Table:
+    """Return a table with its columns named as markers."""
+    used = [i for axes in columns.markers.values() for i in axes]
+    others = [columns.names[i] for i in columns.measured if i not in set(used)]
+    if others:
+        findings.leave_out(others)
+        findings.note(f"{len(others)} columns that are no markers left out")
+    if columns.doubled:
+        findings.warn(
+            f"the same name more than once: {', '.join(columns.doubled[:5])}; the first one is used"
+        )
+    units = {columns.units[i] for i in used if columns.units[i]}
+    unit = named_unit(units.pop()) if len(units) == 1 else None
+    return replace(table, channels=(), markers=tuple(columns.markers), unit_m=unit)
+
+
+def _in_si(table: _Table, wanted: list[int], columns: Columns, findings: Findings) -> _Table:
+    """Return a table of channels in radians and metres, as far as units are said."""
     values = table.values.copy()
-    said = [columns.units[i] for i in left]
+    said = [columns.units[i] for i in wanted]
     for k, text in enumerate(said):
         values[:, k] *= angle_factor(text) or named_unit(text) or 1.0
     reach = np.nanmax(np.abs(values), initial=0.0)

@@ -81,6 +81,7 @@ def measured_rows(
     findings: Findings,
     *,
     group: int = 1,
+    columns: Sequence[int] | None = None,
 ) -> FloatArray:
     """Return the cells of a table as an array, as far as they are there.
 
@@ -93,6 +94,7 @@ def measured_rows(
         n_columns: How many columns have a name.
         findings: Where to tell what contradicts itself.
         group: How many columns at a row's end belong together: three for markers.
+        columns: Which columns to return; all of them by default. Others may hold any text.
 
     Returns:
         Shape (T, n_columns), NaN where a cell is empty.
@@ -115,6 +117,8 @@ def measured_rows(
                 raise bad_file(path, f"line {line} has {len(cells)} columns", f"{n_columns}")
             n_cut += 1
             cells = cells + [""] * (n_columns - len(cells))
+        if columns is not None:
+            cells = [cells[i] for i in columns]
         values.extend(_row(path, cells, line))
         lines.append(line)
     n_rows = len(lines)
@@ -125,8 +129,10 @@ def measured_rows(
         findings.leave_out(["(no name)"] * -(-(max(count for _, count in extra) - n_columns) // 3))
         findings.warn("there are more columns than names; those behind the named ones are left out")
     if n_cut:
-        findings.note(f"{n_cut} rows end early; what they would hold is missing")
-    table = np.frombuffer(values, np.float64).reshape(n_rows, n_columns).copy()
+        tell = findings.warn if n_cut == n_rows else findings.note
+        tell(f"{n_cut} of {n_rows} rows end early; what they would hold is missing")
+    width = n_columns if columns is None else len(columns)
+    table = np.frombuffer(values, np.float64).reshape(n_rows, width).copy()
     if np.isinf(table).any():
         row_, column = (int(i) for i in np.argwhere(np.isinf(table))[0])
         raise bad_file(

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..recording import FloatArray, Recording, marker_channels
 from .clock import even_clock
+from .columns import meaning_of
 from .files import bad_file, cmu_subject, read_text, stem
 from .findings import Findings
 from .names import chosen_names
@@ -92,14 +93,7 @@ def _table(
     path: Path, lines: list[str], header: _Header, findings: Findings
 ) -> tuple[FloatArray, list[str]]:
     """Return frame numbers, times and coordinates, shape (T, 2 + 3M), and the M names."""
-    cells = lines[header.names_at].rstrip("\r\n").split("\t")[2:]
-    labels = [name.strip() for name in cells]
-    if not all(not name for i, name in enumerate(labels) if i % 3):
-        labels = [name for name in labels if name]  # one name after the other
-    else:
-        labels = labels[::3]
-    while labels and not labels[-1]:
-        labels.pop()
+    labels = _labels(lines[header.names_at].rstrip("\r\n").split("\t")[2:])
     if not labels:
         raise bad_file(path, "no marker names", "at least one")
     start = header.names_at + 1
@@ -114,6 +108,19 @@ def _table(
     if not len(values):
         raise bad_file(path, "0 frames", "at least one")
     return values, labels
+
+
+def _labels(cells: list[str]) -> list[str]:
+    """Return the markers' names: above the first of three columns each, or as some write them."""
+    labels = [name.strip() for name in cells]
+    while labels and not labels[-1]:
+        labels.pop()
+    if not any(name for i, name in enumerate(labels) if i % 3):
+        return labels[::3]
+    triples = meaning_of(labels).markers  # a name for each column: nose_x, nose_y, nose_z
+    if [i for axes in triples.values() for i in axes] == list(range(len(labels))):
+        return list(triples)
+    return [name for name in labels if name]  # one after the other
 
 
 def _names_axes(line: str) -> bool:
