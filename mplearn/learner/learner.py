@@ -19,7 +19,7 @@ from ..people import PeopleTree
 from ..recording import BoolArray, FloatArray, Recording, Segment, are_markers
 from ..segmentation import make_segmenter
 from ..state import FileFormat, from_plain, require, to_plain, validated, within
-from ..tree import Change, MirrorMap, Placement
+from ..tree import Change, MirrorMap, Placement, make_distance
 from .absurd import AbsurdFrames
 from .buffer import FrameBuffer
 from .chain import Chain
@@ -447,5 +447,6 @@ class MotionLearner:
             return []
         rules = self.config.tree
         novelty = MotionNovelty(matrices, rules.n_nearest)
-        found = novelty.score([(placement.nearest, placement.distance**rules.power)])
+        length = make_distance(rules).length(placement.distance)
+        found = novelty.score([(placement.nearest, float(length))])
         return [Anomaly(segment, "motion", *found)] if found.p_value <= allowed else []

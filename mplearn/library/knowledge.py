@@ -45,9 +45,9 @@ class Knowledge(Holdings):
         Raises:
             InvalidValueError: As `recognise`.
         """
-        power = self._recogniser.config.power
+        length = self._recogniser.distance.length
         matches = self.recognise(frames).alternatives
-        return self._novelty.score((match.node, match.distance**power) for match in matches)
+        return self._novelty.score((match.node, float(length(match.distance))) for match in matches)
 
     def score_order(self, sequence: Sequence[Key | None]) -> tuple[AnomalyScore, ...]:
         """Return how unusual each primitive of a sequence is after those before it.

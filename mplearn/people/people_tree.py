@@ -222,7 +222,7 @@ class PeopleTree:
     def matrices(self, person: int) -> dict[int, FloatArray]:
         """Return the distances among a person's own exemplars of each primitive, shape (k, k).
 
-        They are those of `Placement.distance` to the configured power. Empty for a person of whom
+        They are the lengths of `Placement.distance` (`Distance.length`). Empty for a person of whom
         nothing was seen; of several leaves in one primitive the fullest counts.
         """
         if person not in self._trees:

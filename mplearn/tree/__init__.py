@@ -2,6 +2,12 @@
 
 from .config import FormConfig as FormConfig
 from .config import TreeConfig as TreeConfig
+from .distance import Distance as Distance
+from .distance import Exemplar as Exemplar
+from .distance import LikelihoodDistance as LikelihoodDistance
+from .distance import MonteCarloDistance as MonteCarloDistance
+from .distance import make_distance as make_distance
+from .distance import register_distance as register_distance
 from .mirror import MirrorMap as MirrorMap
 from .node import Node as Node
 from .placement import ROOT as ROOT

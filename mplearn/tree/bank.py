@@ -5,44 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated
 
 import numpy as np
-from numba import njit
 
 from ..hmm import fit
-from ..hmm.kernels import log_densities, log_likelihood
 from ..recording import FloatArray, IntArray
 from ..state import Array, State, require
 from . import form
 from .config import TreeConfig
+from .distance import Exemplar, make_distance
 from .rows import Rows
 
 _STEEPNESS = 4.0  # a segment twice as long, as two motions in one are, is three times as far
-
-
-class Exemplar(NamedTuple):
-    """A segment in the form in which it is compared, and its model.
-
-    Attributes:
-        columns: Points, shape (D, P).
-        means: Shape (N, D).
-        variances: Shape (N, D).
-        log_norms: Shape (N, D).
-        log_stay: Shape (N,).
-        log_next: Shape (N,).
-        own: Log-likelihood of the points under the model, shape ().
-        duration: How long the segment lasts [frame], shape ().
-    """
-
-    columns: FloatArray
-    means: FloatArray
-    variances: FloatArray
-    log_norms: FloatArray
-    log_stay: FloatArray
-    log_next: FloatArray
-    own: FloatArray
-    duration: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,12 +48,16 @@ class ExemplarBank:
         config: Rules of the tree.
         n_channels: D.
         floor: Smallest variance of each channel, shape (D,).
+
+    Attributes:
+        distance: How far exemplars are apart.
     """
 
     def __init__(self, config: TreeConfig, n_channels: int, floor: FloatArray) -> None:
         self.config = config
         self.n_channels = n_channels
         self.floor = np.array(floor, dtype=np.float64)
+        self.distance = make_distance(config)
         self._weights = form.weights(config.form)
         self._roots = np.sqrt(self._weights)
         self._slots: dict[int, int] = {}
@@ -160,16 +139,16 @@ class ExemplarBank:
     def distances(
         self, exemplar: Exemplar, others: Sequence[int], *, forms_only: bool = False
     ) -> FloatArray:
-        """Return the distance from an exemplar to others of the bank, shape (k,).
+        """Return how far an exemplar is from others of the bank, shape (k,).
 
-        It is the symmetric likelihood distance [nat a frame] to the configured power; it grows
-        where one lasts longer than the other by more than motions do, unless forms only count.
+        It is the length of their distance (`Distance.length`); it grows where one lasts longer than
+        the other by more than motions do, unless forms only count.
         """
         slots = self._slots_of(others)
         raw = np.empty(len(slots))
         for arrays, rows, here in self._rows.parted(slots):
-            raw[here] = _distances(exemplar, arrays, rows, self._weights)
-        distances = np.maximum(raw, 0.0) ** self.config.power
+            raw[here] = self.distance.divergence(exemplar, Exemplar(*arrays), rows, self._weights)
+        distances = self.distance.length(raw)
         if not forms_only and np.isfinite(self.config.tempo):
             longer = self._rows.gather(slots, _DURATION) / exemplar.duration
             beyond = np.maximum(longer, 1 / longer) / self.config.tempo
@@ -221,27 +200,3 @@ class ExemplarBank:
 
 _COLUMNS = Exemplar._fields.index("columns")
 _DURATION = Exemplar._fields.index("duration")
-
-
-@njit(cache=True)
-def _score(columns: FloatArray, model: Any, weights: FloatArray) -> float:
-    means, variances, norms, stay, following = model
-    densities = log_densities(
-        columns, weights, 0, len(weights), means, variances, norms, len(means)
-    )
-    return log_likelihood(densities, stay, following, True)
-
-
-@njit(cache=True)
-def _distances(exemplar: Any, arrays: Any, others: IntArray, weights: FloatArray) -> FloatArray:
-    """Return eq. 5 in both directions, averaged, per unit of weight."""
-    columns, means, variances, norms, stay, following, own, _ = arrays
-    mine = exemplar[1:6]
-    mass = weights.sum()
-    out = np.empty(len(others))
-    for k, other in enumerate(others):
-        theirs = (means[other], variances[other], norms[other], stay[other], following[other])
-        forth = exemplar[6].item() - _score(exemplar[0], theirs, weights)
-        back = own[other] - _score(columns[other], mine, weights)
-        out[k] = 0.5 * (forth + back) / mass
-    return out

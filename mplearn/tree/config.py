@@ -50,8 +50,11 @@ class TreeConfig:
             from its neighbour [Kulic2008b]; 1 for none.
         variance_floor: Smallest standard deviation of a model, as a share of that of all motion
             ever seen (of the channel's group).
-        power: Power of the likelihood distance [nat] that everything below is measured in; 1 is
-            eq. 5 itself, 0.5 makes it grow linearly with the difference of postures.
+        distance: How far two segments are apart: ``"likelihood"``, eq. 5 on the segments;
+            ``"monte_carlo"``, eq. 5 on generated sequences, as printed; or one's own
+            (`register_distance`).
+        power: Power of that distance that everything below is measured in; of a likelihood distance
+            [nat] 1 is eq. 5 itself, 0.5 makes it grow linearly with the difference of postures.
         tempo: Two segments, one of which lasts longer than the other by more than this factor, are
             the farther apart for it; inf for durations that do not matter.
         local: Whether a cluster is formed below mu - cutoff * sigma of the node that grew, as
@@ -90,6 +93,7 @@ class TreeConfig:
     n_states: int = 8
     max_chains: int = 1
     variance_floor: float = 0.6
+    distance: str = "likelihood"
     power: float = 0.5
     tempo: float = 1.5
     local: bool = False
@@ -119,6 +123,7 @@ class TreeConfig:
         return replace(
             cls(),
             form=FormConfig(n_points=32, head=0.0, ramp=0.0, centring=0.0),
+            distance="monte_carlo",
             power=1.0,
             tempo=math.inf,
             local=True,

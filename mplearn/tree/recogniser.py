@@ -15,6 +15,7 @@ from ..state import Count, State, require, validated, within
 from . import form
 from .bank import BankState, ExemplarBank
 from .config import TreeConfig
+from .distance import Distance
 from .placement import Match
 from .rejection import Strangers, spreads
 from .search import IndexState, NodeIndex
@@ -86,6 +87,11 @@ class Recogniser:
         return tuple(int(id) for id in self._index.ids[self._index.leaves])
 
     @property
+    def distance(self) -> Distance:
+        """How far segments are apart, by which it decides."""
+        return self._bank.distance
+
+    @property
     def false_acceptance(self) -> float:
         """Largest share of motions of unknown kinds to be expected that is taken for known ones.
 
@@ -137,7 +143,7 @@ class Recogniser:
     def matrices(self) -> dict[int, FloatArray]:
         """Return the distances among the exemplars of each primitive, shape (k, k).
 
-        They are those of `Recognition` to the configured power.
+        They are the lengths of those of `Recognition` (`Distance.length`).
         """
         index = self._index
         known = zip(index.ids.tolist(), index.leaves.tolist(), index.members, strict=True)

@@ -45,12 +45,15 @@ class Strangers:
     def of(cls, index: NodeIndex, bank: ExemplarBank, units: FloatArray) -> Strangers:
         """Return those of all leaves of an index, in a unit of each node, shape (n,)."""
         unit = dict(zip(index.ids.tolist(), units.tolist(), strict=True))
-        power = index.config.power
         found = []
         for id, is_leaf, members in zip(index.ids, index.leaves, index.members, strict=True):
             near = [index.others(bank[n], bank, int(id)) for n in members] if is_leaf else []
             found.append(
-                [min(m.distance**power / unit[m.node] for m in each) for each in near if each]
+                [
+                    min(float(bank.distance.length(m.distance)) / unit[m.node] for m in each)
+                    for each in near
+                    if each
+                ]
             )
         return cls([np.array(each) for each in found])
 

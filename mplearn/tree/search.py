@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from ..recording import BoolArray, FloatArray, IntArray
 from ..state import Array, Range, State, require, require_no_cycle
-from .bank import Exemplar, ExemplarBank
+from .bank import ExemplarBank
 from .config import TreeConfig
+from .distance import Exemplar
 from .node import Node
 from .placement import ROOT, Match
 from .rows import Rows
@@ -175,7 +176,7 @@ class NodeIndex:
             distance = float(mean_nearest(row[first : first + len(group)], self.config.n_nearest))
             first += len(group)
             ratio = distance / max(float(radii[k]), 1e-12)
-            matches.append(Match(int(self.ids[k]), distance ** (1 / self.config.power), ratio))
+            matches.append(Match(int(self.ids[k]), bank.distance.divergence_of(distance), ratio))
         return sorted(matches, key=lambda match: (match.ratio, match.node))
 
     def _descend(self, exemplar: Exemplar, bank: ExemplarBank) -> list[Match]:

@@ -1,0 +1,225 @@
+"""How far two segments are apart: the one measure that tree, search, rejection and novelty go by.
+
+A distance of your own derives from `Distance`, demands one method, and joins by one line:
+
+    register_distance("mine", MyDistance)
+    TreeConfig(distance="mine")
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ..errors import InvalidValueError
+from ..hmm.kernels import log_densities, log_likelihood
+from ..recording import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from .config import TreeConfig
+
+_N_DRAWS = 8  # sequences that `MonteCarloDistance` generates of each model
+_SEED = 20120301
+
+
+class Exemplar(NamedTuple):
+    """A segment in the form in which it is compared, and its model.
+
+    Attributes:
+        columns: Points, shape (D, P).
+        means: Shape (N, D).
+        variances: Shape (N, D).
+        log_norms: Shape (N, D).
+        log_stay: Shape (N,).
+        log_next: Shape (N,).
+        own: Log-likelihood of the points under the model, shape ().
+        duration: How long the segment lasts [frame], shape ().
+    """
+
+    columns: FloatArray
+    means: FloatArray
+    variances: FloatArray
+    log_norms: FloatArray
+    log_stay: FloatArray
+    log_next: FloatArray
+    own: FloatArray
+    duration: FloatArray
+
+
+class Distance(ABC):
+    """How far segments are apart.
+
+    `divergence` is what a distance is named after, and what `Match.distance` reports. The rules
+    add, average and compare `length`, which should grow linearly with the difference of postures.
+
+    Args:
+        config: Rules of the tree; ``power`` makes a length of a divergence.
+
+    Example:
+        >>> from mplearn.tree import TreeConfig
+        >>> likelihood = LikelihoodDistance(TreeConfig())
+        >>> float(likelihood.length(9.0)), likelihood.divergence_of(3.0)
+        (3.0, 9.0)
+    """
+
+    def __init__(self, config: TreeConfig) -> None:
+        self.power = config.power
+
+    @abstractmethod
+    def divergence(
+        self, exemplar: Exemplar, others: Exemplar, rows: IntArray, weights: FloatArray
+    ) -> FloatArray:
+        """Return how far an exemplar is from others, shape (k,).
+
+        It must be symmetric, 0 between equal exemplars, and deterministic.
+
+        Args:
+            exemplar: The one.
+            others: Many, stacked: each array has one axis more, in front.
+            rows: Which of them, shape (k,).
+            weights: Weight of each point, shape (P,).
+        """
+
+    def length(self, divergence: FloatArray | float) -> FloatArray:
+        """Return divergences on the scale of the rules; what is below 0 by chance counts as 0."""
+        return np.asarray(np.maximum(divergence, 0.0) ** self.power)
+
+    def divergence_of(self, length: float) -> float:
+        """Return the divergence that has this length."""
+        return float(length ** (1 / self.power))
+
+
+class LikelihoodDistance(Distance):
+    """The symmetric likelihood distance [nat a frame] [Kulic2012, eq. 5], on training sequences.
+
+    Each direction is ``[log P(O | own) - log P(O | other)] / T``; the segments themselves stand for
+    generated sequences: cheaper, and without sampling noise.
+    """
+
+    def divergence(
+        self, exemplar: Exemplar, others: Exemplar, rows: IntArray, weights: FloatArray
+    ) -> FloatArray:
+        """Return eq. 5 in both directions, averaged, per unit of weight."""
+        return _likelihood(tuple(exemplar), tuple(others), rows, weights)
+
+
+class MonteCarloDistance(Distance):
+    """The symmetric likelihood distance as the paper prints it: on sequences that models generate.
+
+    Every model is sampled with the same random numbers, so that the distance is symmetric,
+    deterministic, and the same in a tree, in a recogniser and in a stored library.
+    """
+
+    def __init__(self, config: TreeConfig) -> None:
+        super().__init__(config)
+        self._n_points = config.form.n_points
+        self._moves = np.random.default_rng(_SEED).random((_N_DRAWS, self._n_points))
+
+    def divergence(
+        self, exemplar: Exemplar, others: Exemplar, rows: IntArray, weights: FloatArray
+    ) -> FloatArray:
+        """Return eq. 5 in both directions, averaged over draws, per unit of weight."""
+        width = exemplar.means.shape[1]
+        noise = np.random.default_rng(_SEED).standard_normal((_N_DRAWS, width, self._n_points))
+        return _monte_carlo(tuple(exemplar), tuple(others), rows, weights, self._moves, noise)
+
+
+#: Distances by the name that `TreeConfig.distance` gives; see `register_distance`.
+_KINDS: dict[str, Callable[[TreeConfig], Distance]] = {
+    "likelihood": LikelihoodDistance,
+    "monte_carlo": MonteCarloDistance,
+}
+
+
+def register_distance(name: str, kind: Callable[[TreeConfig], Distance]) -> None:
+    """Let `TreeConfig.distance` name a distance of one's own.
+
+    A library that was learned by it needs it registered where the library is opened.
+
+    Raises:
+        InvalidValueError: The name is taken by another.
+    """
+    if _KINDS.setdefault(name, kind) is not kind:
+        raise InvalidValueError(f"there is a distance {name!r} already")
+
+
+def make_distance(config: TreeConfig) -> Distance:
+    """Return the distance that a configuration names.
+
+    Raises:
+        InvalidValueError: There is none of that name.
+    """
+    if config.distance not in _KINDS:
+        raise InvalidValueError(
+            f"no distance {config.distance!r}; there are {', '.join(_KINDS)} "
+            "(register_distance adds one)"
+        )
+    return _KINDS[config.distance](config)
+
+
+@njit(cache=True)
+def _score(columns: FloatArray, model: Any, weights: FloatArray) -> float:
+    means, variances, norms, stay, following = model
+    densities = log_densities(
+        columns, weights, 0, len(weights), means, variances, norms, len(means)
+    )
+    return log_likelihood(densities, stay, following, True)
+
+
+@njit(cache=True)
+def _likelihood(exemplar: Any, others: Any, rows: IntArray, weights: FloatArray) -> FloatArray:
+    columns, means, variances, norms, stay, following, own, _ = others
+    mine = exemplar[1:6]
+    mass = weights.sum()
+    out = np.empty(len(rows))
+    for k, row in enumerate(rows):
+        theirs = (means[row], variances[row], norms[row], stay[row], following[row])
+        forth = exemplar[6].item() - _score(exemplar[0], theirs, weights)
+        back = own[row] - _score(columns[row], mine, weights)
+        out[k] = 0.5 * (forth + back) / mass
+    return out
+
+
+@njit(cache=True)
+def _generated(model: Any, moves: FloatArray, noise: FloatArray) -> FloatArray:
+    """Return a sequence of a left-right model that ends in its last state, shape (D, P)."""
+    means, variances, _, stay, _ = model
+    n_states, n_points = len(means), len(moves)
+    out = np.empty_like(noise)
+    state = 0
+    for t in range(n_points):
+        left = n_points - t
+        must = n_states - state >= left  # no more points than states to go through
+        if t and state < n_states - 1 and (must or moves[t] > np.exp(stay[state])):
+            state += 1
+        for d in range(len(noise)):
+            out[d, t] = means[state, d] + np.sqrt(variances[state, d]) * noise[d, t]
+    return out
+
+
+@njit(cache=True)
+def _monte_carlo(
+    exemplar: Any,
+    others: Any,
+    rows: IntArray,
+    weights: FloatArray,
+    moves: FloatArray,
+    noise: FloatArray,
+) -> FloatArray:
+    means, variances, norms, stay, following = others[1:6]
+    mine = exemplar[1:6]
+    mass = weights.sum() * len(moves)
+    out = np.zeros(len(rows))
+    for k, row in enumerate(rows):
+        theirs = (means[row], variances[row], norms[row], stay[row], following[row])
+        for draw in range(len(moves)):
+            here = _generated(mine, moves[draw], noise[draw])
+            there = _generated(theirs, moves[draw], noise[draw])
+            forth = _score(here, mine, weights) - _score(here, theirs, weights)
+            back = _score(there, theirs, weights) - _score(there, mine, weights)
+            out[k] += 0.5 * (forth + back) / mass
+    return out
