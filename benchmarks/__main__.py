@@ -19,6 +19,7 @@ from . import (
     memory,
     performing,
     segmentation,
+    states,
     tree,
 )
 
@@ -33,6 +34,7 @@ TITLES = {
     performing: "Planning and performing",
     environment: "The environment",
     memory: "Memory of a stream of ten hours",
+    states: "A state, a checkpoint and a library, after one segment more",
 }
 
 

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .learner import LearnerConfig as LearnerConfig
     from .learner import MotionLearner as MotionLearner
     from .library import PrimitiveLibrary as PrimitiveLibrary
+    from .merging import merge_learners as merge_learners
     from .mocap import open_recording as open_recording
     from .mocap import open_recordings as open_recordings
     from .recording import LabelledSegment as LabelledSegment
@@ -23,6 +24,7 @@ _ROOMS = {
     "LearnerConfig": "learner",
     "MotionLearner": "learner",
     "PrimitiveLibrary": "library",
+    "merge_learners": "merging",
     "open_recording": "mocap",
     "open_recordings": "mocap",
     "LabelledSegment": "recording",

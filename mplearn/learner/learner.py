@@ -178,7 +178,7 @@ class MotionLearner:
     def merge(self, first: int, second: int) -> Change:
         """Merge two primitives as a person sees fit; see `PeopleTree.merge`.
 
-        Learners are merged by `mplearn.merging.merge_learners`.
+        Learners are merged by `mplearn.merge_learners`.
         """
         return self._edited(self.tree.merge(first, second))
 

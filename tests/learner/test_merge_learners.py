@@ -4,9 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mplearn import merge_learners as merge
 from mplearn.errors import InvalidValueError
 from mplearn.learner import LearnerConfig, MotionLearner, SegmentClosed
-from mplearn.merging import merge_learners as merge
 from mplearn.recording import Recording
 
 
@@ -79,6 +79,20 @@ def test_merging_changes_nobody_and_three_are_as_good_as_two(shards) -> None:
     assert len(three.tree.leaves) == 4
     nested = merge([merge([a, b]), a]), merge([a, merge([b, a])])
     assert counts(nested[0]) == counts(nested[1]) == counts(three)
+
+
+def test_exemplars_are_shared_however_many_are_merged(shards) -> None:
+    seen = {
+        id(frames)
+        for each in shards
+        for node in each.tree.nodes
+        for frames in each.tree.exemplars(node.id)
+    }
+    merged = merge([*shards, *shards, *shards])
+    assert merged.n_frames == 3 * sum(each.n_frames for each in shards)
+    found = [x for node in merged.tree.nodes for x in merged.tree.exemplars(node.id)]
+    assert len(found) > 20
+    assert {id(frames) for frames in found} <= seen
 
 
 def test_what_cannot_be_merged(shards) -> None:
