@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from ..recording import FloatArray, Recording, marker_channels
 from .files import bad_file, cmu_subject, stem
 from .findings import Findings
 from .kinematics import Joint, joint_positions, skeleton_of, with_axes
+from .part_names import HEIGHTS, place_of
 from .reader import Hints
 from .space import Space, placed
 from .stature import unit_of_skeleton
@@ -75,7 +76,15 @@ def skeletal_recording(
     local = joint_positions(joints, motion.values)
     parents = [joint.parent for joint in joints]
     sized = unit_of_skeleton(local, parents, motion.space.unit_m)
-    place = placed(path, local, names, motion.rate_hz, motion.space, hints, findings, sized)
+    space = motion.space
+    if sized is None and len({place_of(name).part for name in names} & HEIGHTS.keys()) < 2:
+        findings.note(
+            "no person by its joints: unit and vertical axis are those usual in the format"
+        )
+        hints = replace(
+            hints, unit_m=hints.unit_m or space.unit_m, up_axis=hints.up_axis or space.up
+        )
+    place = placed(path, local, names, motion.rate_hz, space, hints, findings, sized)
     if not positions:
         channels, frames = angle_channels(path, motion, place.axes, place.unit_m)
     elif hints.joint_axes:

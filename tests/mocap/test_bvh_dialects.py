@@ -207,6 +207,33 @@ def test_what_is_no_bvh_is_named(tmp_path: Path, change: Callable[[str], str], f
         open_recording(path)
 
 
+def test_what_is_no_person_is_read_as_it_is(tmp_path: Path) -> None:
+    """A hand: neither its size nor how it lies tells the unit or what is up."""
+    fingers = "".join(
+        f"JOINT LeftHand{name}1\n{{\nOFFSET 9 0 {2 * i}\nCHANNELS 1 Zrotation\n"
+        f"JOINT LeftHand{name}2\n{{\nOFFSET 4 0 0\nCHANNELS 1 Zrotation\n"
+        "End Site\n{\nOFFSET 3 0 0\n}\n}\n}\n"
+        for i, name in enumerate(("Thumb", "Index", "Middle", "Ring", "Pinky"))
+    )
+    root = "OFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n"
+    text = f"HIERARCHY\nROOT LeftHand\n{{\n{root}{fingers}}}\n"
+    values = np.random.default_rng(0).uniform(0, 40, (30, 13))
+    values[:, :3] = [3.0, 110.0, 5.0]
+    path = write_bvh(tmp_path / "hand.bvh", values, text)
+    recording = open_recording(path)
+    assert recording.channels[:4] == (
+        "LeftHand.ty",
+        "LeftHand.tz",
+        "LeftHand.tx",
+        "LeftHandThumb1.rz",
+    )
+    assert recording.frames[0, 1] == pytest.approx(1.1)
+    assert recording.report is not None
+    assert (recording.report.unit_m, recording.report.up) == (0.01, "y")
+    assert recording.report.notes[0].startswith("no person")
+    assert open_recording(path, hints=Hints(unit_m=0.02)).frames[0, 1] == pytest.approx(2.2)
+
+
 def test_several_trees(tmp_path: Path) -> None:
     text, expected = plain(tmp_path)
     prop = "ROOT Stick\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n"
