@@ -23,3 +23,10 @@ def shortest_way(env, info, slots):
         ways += [[*way, slot] for slot in np.flatnonzero(after.mask).tolist() if slot]
         assert len(way) < 8
     raise AssertionError("no way")
+
+
+def named(info):
+    """Return the slots that a task names."""
+    slots = info["task"]["slots"]
+    assert slots.dtype == np.int64
+    return slots[slots >= 0].tolist()

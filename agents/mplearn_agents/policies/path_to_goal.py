@@ -130,7 +130,8 @@ class PathToTask(Policy):
         Raises:
             InvalidValueError: The task names no slots.
         """
-        slots = info.get("task", {}).get("slots")
+        named = info.get("task", {}).get("slots", ())
+        slots = tuple(int(slot) for slot in named if slot >= 0)
         if not slots:
             raise InvalidValueError(
                 "this policy needs a task that names slots in info['task'], like 'goal' and "

@@ -19,8 +19,8 @@ from mplearn_envs.environment.plain import to_plain
 if TYPE_CHECKING:
     import minari
 
-#: What of ``info`` is kept, with its value at a reset: a learner needs the discounts.
-KEPT = {"discount": 1.0, "duration_s": 0.0, "illegal": False, "fallen": False}
+#: What of ``info`` is kept: a learner needs the discounts.
+KEPT = ("discount", "duration_s", "illegal", "fallen")
 
 
 def export_episodes(
@@ -108,7 +108,7 @@ class _Recorder(gymnasium.Wrapper[Any, Any, Any, Any]):
             name: [] for name in ("actions", "rewards", "terminations", "truncations")
         }
         shown = {key: [value] for key, value in observation.items()}
-        infos = {key: [value] for key, value in KEPT.items()}
+        infos = {key: [info[key]] for key in KEPT}
         self.episodes.append({"seed": seed, "observations": shown, "infos": infos, **steps})
         return observation, info
 

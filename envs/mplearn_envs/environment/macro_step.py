@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any, Literal, SupportsFloat, get_args
+from typing import Any, Literal, NamedTuple, SupportsFloat, get_args
 
 import gymnasium
 import mujoco
@@ -31,6 +31,35 @@ from .options import ActionOptions, MotionOptions, PictureOptions, require_numbe
 from .plain import PlainSpec, from_plain
 from .random_streams import RandomStreams
 from .rewards import add, earned_meanwhile
+
+#: Terms of the reward that are the environment's own.
+TERMS = ("fall", "illegal", "novel")
+
+
+class StepInfo(NamedTuple):
+    """What ``info`` says of a macro step; the defaults are those after a reset.
+
+    Attributes:
+        duration_s: How long it took [s].
+        discount: Discount over that time.
+        illegal: Whether the action was illegal.
+        novel: Whether the transition was never observed.
+        fallen: Whether the robot fell.
+        speed: Speed of performance, as a share of the human's.
+        tracking_rmse_rad: Root mean square of the joints' tracking error [rad].
+        cog_deviation_m: Largest distance of the COG from its plan [m].
+        zmp_margin_m: Least distance of the zero-moment point from the edge of the soles [m].
+    """
+
+    duration_s: float = 0.0
+    discount: float = 1.0
+    illegal: bool = False
+    novel: bool = False
+    fallen: bool = False
+    speed: float = 0.0
+    tracking_rmse_rad: float = 0.0
+    cog_deviation_m: float = 0.0
+    zmp_margin_m: float = 0.0
 
 
 class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
@@ -84,6 +113,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         self.frame_callback: Callable[[], object] | None = None
         self._episode: Episode | None = None
         self._streams: RandomStreams | None = None
+        self._terms: dict[str, float] = {}
 
     def _made_repertoire(self) -> Repertoire:
         library, motion = self.source.now(), self.motion
@@ -136,6 +166,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         episode = Episode(measured, self.repertoire.entries(self.performer.reference))
         self.task.reset(self._scene(episode, options or {}))
         self._episode = episode
+        self._terms = dict.fromkeys((*self.task.terms, *TERMS), 0.0)
         self._show()
         return self._observation(), self._info()
 
@@ -174,15 +205,8 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         terminated = report.fallen or self.task.done
         self._episode = episode._replace(running=not terminated)
 
-        info = self._info()
-        info["duration_s"] = duration_s
-        info["discount"] = remaining
-        info["reward_terms"] = terms
-        info["illegal"] = not legal
-        info["novel"] = novel
-        info["fallen"] = report.fallen
-        info.update(outcome.figures)
-        return self._observation(), sum(terms.values()), terminated, False, info
+        step = StepInfo(duration_s, remaining, not legal, novel, report.fallen, **outcome.figures)
+        return self._observation(), sum(terms.values()), terminated, False, self._info(step, terms)
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return which actions are legal, shape (capacity,): the convention of sb3-contrib."""
@@ -229,6 +253,10 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
     def library(self) -> PrimitiveLibrary:
         """The library of now."""
         return self.repertoire.library
+
+    def infeasible(self) -> dict[int, tuple[str, ...]]:
+        """Return the slots that are 1 in ``info["infeasible"]``, and the reasons against each."""
+        return dict(self._begun().choices.refused)
 
     @property
     def streams(self) -> RandomStreams:
@@ -301,18 +329,26 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         slot = HOLD if episode.current is None else self.repertoire.slots[episode.current]
         return self._builder.see(episode.measured, slot, episode.choices, self.task.observe())
 
-    def _info(self) -> dict[str, Any]:
-        choices, current = self._begun().choices, self._begun().current
-        report = self.task.report()
+    def _info(
+        self, step: StepInfo | None = None, terms: Mapping[str, float] | None = None
+    ) -> dict[str, Any]:
+        episode, report = self._begun(), self.task.report()
+        choices, current = episode.choices, episode.current
+        if step is None:
+            step = StepInfo(zmp_margin_m=float(episode.measured.support_margin[0]))
+        infeasible = np.zeros(self.capacity, np.int8)
+        infeasible[list(choices.refused)] = 1
         info = {
             "action_mask": choices.mask.copy(),
             "transition_prior": choices.prior.copy(),
-            "infeasible": dict(choices.refused),
+            "infeasible": infeasible,
             "dead_end": choices.dead_end,
             "library_version": self.library.version,
             "primitive": -1 if current is None else current,
             "primitive_name": "" if current is None else self.library[current].name,
             "task": report,
+            **step._asdict(),
+            "reward_terms": self._terms | dict(terms or {}),
         }
         if "success" in report:
             info["is_success"] = report["success"]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Literal
+
+import numpy as np
 
 from mplearn.errors import InvalidValueError
 from mplearn.learner import (
@@ -17,6 +19,7 @@ from mplearn.learner import (
     TransitionSeen,
 )
 from mplearn.learner.events import Event
+from mplearn.recording import IntArray
 from mplearn_envs.data.library_source import LibrarySource
 from mplearn_envs.execution.modes import Dynamics
 from mplearn_envs.robot import Robot
@@ -24,7 +27,7 @@ from mplearn_envs.tasks import FollowTask, Task
 
 from .episode import EpisodeState
 from .live_demonstrator import DemonstratorLike, open_demonstrator
-from .macro_step import MacroStepEnv
+from .macro_step import MacroStepEnv, StepInfo
 from .options import ActionOptions, MotionOptions, PictureOptions, require_number
 from .plain import from_plain
 
@@ -46,8 +49,9 @@ class OnlinePrimitiveHumanoidEnv(MacroStepEnv):
     ## Info
 
     Besides: ``learner``, a dict of ``watched_s`` (in this episode, warm-up included),
-    ``n_primitives``, ``recognised`` (ids of what was recognised during this step, in order),
-    ``born`` and ``gone`` (ids), ``without_slot`` (ids).
+    ``n_primitives``, ``n_without_slot``, and of what happened during this step by slot, int64 of
+    shape (capacity,): ``recognised`` (how often), ``born`` and ``gone``. ``env.unwrapped.events``
+    has the learner's events themselves.
 
     ## Start
 
@@ -130,20 +134,26 @@ class OnlinePrimitiveHumanoidEnv(MacroStepEnv):
             self._watch(self.warm_up_s)
             self.repertoire.forget()
         self._left_out = self.repertoire.update(self.learner.snapshot())
-        self._news: dict[str, tuple[int, ...]] = {"recognised": (), "born": (), "gone": ()}
+        self.events: tuple[Event, ...] = ()
+        self._news = {name: self._by_slot(()) for name in ("recognised", "born", "gone")}
 
     def _meanwhile(self, duration_s: float) -> None:
-        events = self._watch(duration_s)
-        before = set(self.repertoire.library.ids)
+        before = dict(self.repertoire.slots)
+        self.events = tuple(self._watch(duration_s))
         kinds = (PrimitiveBorn, PrimitiveMerged, PrimitiveSplit, TransitionSeen)
-        if any(isinstance(event, kinds) for event in events):
+        if any(isinstance(event, kinds) for event in self.events):
             self._left_out = self.repertoire.update(self.learner.snapshot())
-        now = set(self.repertoire.library.ids)
+        now = self.repertoire.slots
+        seen = (e.primitive for e in self.events if isinstance(e, Recognised))
         self._news = {
-            "recognised": tuple(e.primitive for e in events if isinstance(e, Recognised)),
-            "born": tuple(sorted(now - before)),
-            "gone": tuple(sorted(before - now)),
+            "recognised": self._by_slot(now[id] for id in seen if id in now),
+            "born": self._by_slot(now[id] for id in now.keys() - before.keys()),
+            "gone": self._by_slot(before[id] for id in before.keys() - now.keys()),
         }
+
+    def _by_slot(self, slots: Iterable[int]) -> IntArray:
+        """Return how often each slot is among some, shape (capacity,)."""
+        return np.bincount(np.fromiter(slots, np.int64), minlength=self.capacity)
 
     def _watch(self, duration_s: float) -> list[Event]:
         """Let the demonstrator go on, and learn."""
@@ -160,13 +170,16 @@ class OnlinePrimitiveHumanoidEnv(MacroStepEnv):
                 events.extend(self.learner.end_stream())
         return events
 
-    def _info(self) -> dict[str, Any]:
+    def _info(
+        self, step: StepInfo | None = None, terms: Mapping[str, float] | None = None
+    ) -> dict[str, Any]:
         report = {
             "watched_s": self._n_watched / self.demonstrator.rate_hz,
             "n_primitives": len(self.library),
-            "without_slot": self._left_out,
+            "n_without_slot": len(self._left_out),
         }
-        return super()._info() | {"learner": report | self._news}
+        news = {name: slots.copy() for name, slots in self._news.items()}
+        return super()._info(step, terms) | {"learner": report | news}
 
     def state(self) -> EpisodeState:
         """Refuse: the learner belongs to the state.

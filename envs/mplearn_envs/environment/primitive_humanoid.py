@@ -59,13 +59,13 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
     ## Legal actions, and the prior
 
     Hold is always legal. After a primitive, those are legal that were observed to follow it and
-    that the robot can perform (`Feasibility`; ``info["infeasible"]`` has the reasons against the
-    others). The prior is their observed frequency; hold has probability 0 as long as there is
-    another choice. Holding changes nothing in that: the same successors stay legal. At a dead end
-    only hold is legal, with probability 1; it makes an *entry*: as at the start of an episode,
-    those primitives are legal that start nearest to the present posture (up to 0.5 rad farther than
-    the nearest one), with their observed frequency as prior. So a walk by the prior goes on for
-    ever::
+    that the robot can perform (`Feasibility`; ``env.unwrapped.infeasible()`` has the reasons
+    against the others). The prior is their observed frequency; hold has probability 0 as long as
+    there is another choice. Holding changes nothing in that: the same successors stay legal. At a
+    dead end only hold is legal, with probability 1; it makes an *entry*: as at the start of an
+    episode, those primitives are legal that start nearest to the present posture (up to 0.5 rad
+    farther than the nearest one), with their observed frequency as prior. So a walk by the prior
+    goes on for ever::
 
         action = env.action_space.sample(probability=info["transition_prior"])
 
@@ -105,12 +105,31 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
 
     ## Info
 
-    ``action_mask`` (int8), ``transition_prior`` (float64), ``infeasible`` (slot: reasons, of what
-    the demonstrator might have chosen here), ``dead_end``, ``library_version``, ``primitive`` (id,
-    -1 for none), ``primitive_name``, ``task`` (`Task.report`), ``is_success`` (where the task has
-    success); after a step also ``duration_s``, ``discount``, ``reward_terms``, ``illegal``,
-    ``novel``, ``fallen``, ``speed``, ``tracking_rmse_rad``, ``cog_deviation_m`` (largest),
-    ``zmp_margin_m`` (least).
+    The same keys and shapes after `reset` and after `step` (C = capacity):
+
+    ================== ================ ======================================================
+    key                value            meaning
+    ================== ================ ======================================================
+    action_mask        int8 (C,)        1 where an action is legal
+    transition_prior   float64 (C,)     probability of each action
+    infeasible         int8 (C,)        1 where the demonstrator might have gone and the robot
+                                        cannot; ``env.unwrapped.infeasible()`` has the reasons
+    dead_end           bool             whether nothing but holding is legal
+    library_version    str              of the library
+    primitive          int              id of the primitive performed last, -1 for none
+    primitive_name     str              its name, "" for none
+    task               dict             `Task.report`: numbers, arrays of fixed lengths
+    is_success         bool             whether the task is solved, where it can be
+    duration_s         float            how long the macro step took [s]; 0 after a reset
+    discount           float            ``discount`` to the power of that; 1 after a reset
+    reward_terms       dict of floats   the reward's terms; 0 after a reset
+    illegal, novel     bool             whether the action was
+    fallen             bool             whether the robot fell
+    speed              float            of performance, as a share of the human's
+    tracking_rmse_rad  float            root mean square of the joints' tracking error [rad]
+    cog_deviation_m    float            largest distance of the COG from its plan [m]
+    zmp_margin_m       float            least distance of the ZMP from the soles' edge [m]
+    ================== ================ ======================================================
 
     ## Arguments
 

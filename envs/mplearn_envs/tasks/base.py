@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
 
-from mplearn.recording import FloatArray
+from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.execution.sensors import Measured
 from mplearn_envs.execution.tracking_report import TrackingReport
 from mplearn_envs.mechanics.reference import Reference
@@ -69,9 +69,12 @@ class Task(ABC):
 
     Attributes:
         fallen: Price of a fall.
+        terms: Names of the terms that its rewards have: ``info["reward_terms"]`` has them from the
+            reset on, with 0 where nothing was earned. Others are there only when they are earned.
     """
 
     fallen: float = 10.0
+    terms: ClassVar[tuple[str, ...]] = ()
 
     def space(self, repertoire: Repertoire) -> spaces.Box | None:
         """Return the bounds of what `observe` returns; None if the task shows nothing.
@@ -116,6 +119,17 @@ class Task(ABC):
     def report(self) -> dict[str, Any]:
         """Return what is known of the episode, for ``info["task"]``; not for the agent to see.
 
+        It has the same keys and shapes in all of an episode, the start included: numbers, or arrays
+        of a fixed length. What names slots as "slots" (int64, filled up with -1) is understood by
+        the policies that search paths.
+
         ``"success"`` (bool), if there, is also ``info["is_success"]``.
         """
         return {}
+
+
+def padded(slots: tuple[int, ...], length: int) -> IntArray:
+    """Return slots as an array of a fixed length, filled up with -1."""
+    out = np.full(length, -1, dtype=np.int64)
+    out[: len(slots)] = slots
+    return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
@@ -73,6 +73,7 @@ class FollowTask(Task):
     deadline_s: float = 60.0
     agree: float = 1.0
     fallen: float = 10.0
+    terms: ClassVar[tuple[str, ...]] = ("agree",)
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.pace) and self.pace > 0):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from gymnasium import spaces
@@ -50,6 +51,7 @@ class FreeTask(Task):
     fallen: float = 10.0
     safe_m: float = 0.05
     memory: int = 10
+    terms: ClassVar[tuple[str, ...]] = ("likely", "varied", "alive", "balanced")
 
     def space(self, repertoire: Repertoire) -> spaces.Box:
         """Return the bounds of the shares."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Any, ClassVar, Literal, TypeAlias, get_args
 
 import numpy as np
 from gymnasium import spaces
@@ -15,7 +15,7 @@ from mplearn_envs.execution.earliest_arrival import earliest_arrivals
 from mplearn_envs.execution.tracking_report import TrackingReport
 from mplearn_envs.skills.repertoire import Repertoire
 
-from .base import Choice, Scene, Task
+from .base import Choice, Scene, Task, padded
 from .goals import Goal, GoalKind, HandGoals, PostureGoals, PrimitiveGoals
 
 KindName: TypeAlias = Literal["hand", "posture", "primitive"]
@@ -81,6 +81,7 @@ class GoalTask(Task):
     hurry: float = 0.1
     reached: float = 1.0
     fallen: float = 10.0
+    terms: ClassVar[tuple[str, ...]] = ("hurry", "reached")
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(KindName):
@@ -112,6 +113,7 @@ class GoalTask(Task):
         target = scene.options.get("target", self.target)
         self.goal = self._drawn(scene) if target is None else self._kind.given(target)
         self._slots, self._least_time_s = self._ways(self.goal, repertoire)
+        self._capacity = repertoire.capacity
         self._now, self._time_s = scene.measured, scene.time_s
         self._success = False
 
@@ -143,7 +145,7 @@ class GoalTask(Task):
         """Return success, the goal's slots, and in which time it can be reached at best."""
         return {
             "success": self._success,
-            "slots": self._slots,
+            "slots": padded(self._slots, self._capacity),
             "least_time_s": self._least_time_s,
         }
 

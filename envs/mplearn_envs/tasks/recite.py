@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
@@ -14,7 +14,7 @@ from mplearn.recording import FloatArray
 from mplearn_envs.execution.tracking_report import TrackingReport
 from mplearn_envs.skills.repertoire import Repertoire
 
-from .base import Choice, Scene, Task
+from .base import Choice, Scene, Task, padded
 
 
 @dataclass
@@ -60,6 +60,7 @@ class ReciteTask(Task):
     said: float = 1.0
     complete: float = 1.0
     fallen: float = 10.0
+    terms: ClassVar[tuple[str, ...]] = ("hurry", "said", "complete")
 
     def __post_init__(self) -> None:
         if self.request is not None:
@@ -135,7 +136,10 @@ class ReciteTask(Task):
 
     def report(self) -> dict[str, Any]:
         """Return success, and the slots that remain to be said."""
-        return {"success": self._complete, "slots": self._slots[self._n_said :]}
+        return {
+            "success": self._complete,
+            "slots": padded(self._slots[self._n_said :], self.length),
+        }
 
 
 def _drawn_request(scene: Scene, length: int) -> tuple[int, ...]:

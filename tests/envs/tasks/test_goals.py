@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from standing_env import SLOT, legal
-from standing_task import make, shortest_way
+from standing_task import make, named, shortest_way
 
 from mplearn_envs.execution.earliest_arrival import earliest_arrivals
 from mplearn_envs.tasks import GoalTask
@@ -20,7 +20,7 @@ def test_goals_are_drawn_by_seed_not_yet_reached_and_reached_in_the_least_time(k
         goals.add(observation["task"].tobytes())
         assert not info["is_success"]
         time_s, value, terminated = 0.0, 0.0, False
-        for action in shortest_way(env, info, info["task"]["slots"]):
+        for action in shortest_way(env, info, named(info)):
             assert not terminated
             _, reward, terminated, _, info = env.step(action)
             value += 0.95**time_s * reward
@@ -58,7 +58,7 @@ def test_a_hand_reaches_its_point():
     env = make(GoalTask("hand", far_m=0.15, tolerance_m=0.05))
     observation, info = env.reset(seed=3)
     start = observation["task"]
-    for action in shortest_way(env, info, info["task"]["slots"]):
+    for action in shortest_way(env, info, named(info)):
         observation, *_ = env.step(action)
     end = observation["task"]
     np.testing.assert_array_equal(start[:5], end[:5])
@@ -83,10 +83,10 @@ def test_given_goals():
     bow = {"base_pitch": 0.8}
     env = make(GoalTask("posture", target=bow))
     observation, info = env.reset()
-    assert info["task"]["slots"] == (SLOT["bow down"],)
+    assert named(info) == [SLOT["bow down"]]
     apart = observation["task"][33:66]
     assert apart[2] == pytest.approx(0.8, abs=0.01) and np.count_nonzero(apart) == 1
     assert env.step(SLOT["bow down"])[4]["is_success"]
     env = make(GoalTask("primitive"))
-    assert env.reset(options={"target": "rise"})[1]["task"]["slots"] == (SLOT["rise"],)
-    assert env.reset(options={"target": 4})[1]["task"]["slots"] == (SLOT["arms down"],)
+    assert named(env.reset(options={"target": "rise"})[1]) == [SLOT["rise"]]
+    assert named(env.reset(options={"target": 4})[1]) == [SLOT["arms down"]]

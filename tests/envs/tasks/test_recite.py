@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 from standing_env import SLOT, legal
-from standing_task import make, shortest_way
+from standing_task import make, named, shortest_way
 
 from mplearn_envs.tasks import ReciteTask
 
@@ -14,7 +14,7 @@ def test_requests_ask_for_ways_round():
     repertoire = env.unwrapped.repertoire
     for seed in range(10):
         observation, info = env.reset(seed=seed)
-        request = list(info["task"]["slots"])
+        request = named(info)
         blocks = observation["task"][:-1].reshape(3, 32)
         assert blocks.argmax(axis=1).tolist() == request and blocks.sum() == 3
         assert request[0] not in legal(info)  # the shortcut is illegal
@@ -25,7 +25,7 @@ def test_requests_ask_for_ways_round():
             for action in shortest_way(env, info, (slot,)):
                 observation, _, terminated, _, info = env.step(action)
                 earned += info["reward_terms"]["said"] / info["discount"]
-        assert terminated and info["is_success"] and info["task"]["slots"] == ()
+        assert terminated and info["is_success"] and named(info) == []
         assert earned == pytest.approx(3.0)
         assert info["reward_terms"]["complete"] == pytest.approx(info["discount"])
         assert not observation["task"][:-1].any()
@@ -36,4 +36,4 @@ def test_a_shortcut_says_nothing():
     env.reset()
     *_, info = env.step(SLOT["rise"])
     assert info["illegal"] and info["reward_terms"]["said"] == 0.0
-    assert info["task"]["slots"] == (SLOT["rise"], SLOT["arms down"])
+    assert named(info) == [SLOT["rise"], SLOT["arms down"]]
