@@ -18,10 +18,11 @@ from .sides import limbs_left_first
 _REFERENCE_M = {"trunk": 0.5775, "thigh": 0.42875, "shank": 0.4305, "shoulders": 0.35}
 _STATURE_M = 1.75
 _PEOPLE_M = (0.7, 2.3)  # statures
-_UNITS_M = (1.0, 0.1, 0.01, 0.001, 0.0254, 0.3048, 0.0254 / 0.45)
+_UNITS_M = (1.0, 0.01, 0.001, 0.0254 / 0.45, 0.0254, 0.3048, 0.1)  # the most usual first
 LEAST_CONFIDENCE = 0.15
 ABOVE_SHOULDERS = 0.03  # [m] on the human of 1.75 m: the base of the neck is higher
 NECK_RISE = 0.084
+CLEARLY_UP = 0.85  # cosine between an axis and the way from the ankles to the neck
 STRAIGHT = 0.9  # cosine of a leg's bend at which the zero pose still stands
 
 
@@ -33,6 +34,8 @@ class Person:
         tree: Its skeleton.
         plan: The body in it, with legs and arms.
         told: Place of the body by joint, as a user says.
+        unit_m: Length that was taken for the file's unit [m].
+        up_in_doubt: Whether another axis than z may be up.
 
     Attributes:
         tree: See above, as ``spine`` and ``head`` (nodes, from below).
@@ -54,7 +57,18 @@ class Person:
         BodyError: It is hardly a person, or left and right cannot be told, with the reason.
     """
 
-    def __init__(self, name: str, tree: JointTree, plan: Plan, told: Mapping[str, str]) -> None:
+    def __init__(
+        self,
+        name: str,
+        tree: JointTree,
+        plan: Plan,
+        told: Mapping[str, str],
+        *,
+        unit_m: float = 1.0,
+        up_in_doubt: bool = True,
+    ) -> None:
+        self.unit_m = unit_m
+        self.up_in_doubt = up_in_doubt
         self.name, self.tree = name, tree
         self.spine, self.head = plan.spine, plan.head
         self.warnings: list[str] = []
@@ -95,14 +109,14 @@ class Person:
         self.factor = 1.0
         low, high = _PEOPLE_M
         if not low < self.stature_m < high:
-            factors = sorted({a / b for a in _UNITS_M for b in _UNITS_M})
+            factors = [unit_m / self.unit_m for unit_m in _UNITS_M]
             fitting = [f for f in factors if 1.4 < f * self.stature_m < 2.05]
             if not fitting:
                 raise BodyError(
                     f"the person in {self.name!r} would be {self.stature_m:.3g} m tall; is the "
                     f"unit of length right? ({option('unit_m')} sets it)"
                 )
-            self.factor = min(fitting, key=lambda f: abs(np.log(f * self.stature_m / 1.7)))
+            self.factor = fitting[0]
             self.warnings.append(
                 f"the person would be {self.stature_m:.3g} m tall: all lengths are multiplied by "
                 f"{self.factor:.4g} ({option('unit_m')} settles it)"
@@ -132,7 +146,7 @@ class Person:
             ],
             axis=0,
         )
-        self._turn_upright(up, straight)
+        self._turn_upright()
         order = np.argsort(-(2.0 * straight + up @ self.turn[2]))
         self.upright = order[: max(3, len(order) // 10)]
         self.zero = self._trunk_axes(self.tree.rest[None])[0] if self._zero_stands() else None
@@ -148,21 +162,21 @@ class Person:
         bent = [float(cosines(bone, up)) for bone in bones]
         return min(bent) > STRAIGHT and abs(float(cosines(across, up))) < 0.3
 
-    def _turn_upright(self, up: FloatArray, straight: FloatArray) -> None:
-        """Find the axis that is up, where it is clearly not z."""
+    def _turn_upright(self) -> None:
+        """Find the axis that is up, where it is clearly not z: from the ankles to the neck."""
         self.turn = np.eye(3)
-        standing = straight >= np.quantile(straight, 0.5)
-        mean = up[standing].mean(axis=0)
-        axis = int(np.argmax(np.abs(mean)))
-        sign = float(np.sign(mean[axis]))
-        if (axis == 2 and sign > 0) or abs(mean[axis]) < 0.9 or np.median(straight) < 0.9:
+        ankles = np.mean([self.at(side[2]) for side in self.legs.nodes], axis=0)
+        tall = unit(self.at(self.neck) - ankles).mean(axis=0)
+        axis = int(np.argmax(np.abs(tall)))
+        sign = float(np.sign(tall[axis]))
+        if not self.up_in_doubt or (axis == 2 and sign > 0) or abs(tall[axis]) < CLEARLY_UP:
             return
         self.turn = np.roll(np.eye(3), (2 - axis), axis=0)
         if sign < 0:
             self.turn = np.diag((1.0, -1.0, -1.0)) @ self.turn
         self.warnings.append(
-            f"the person stands along {'-' if sign < 0 else ''}{'xyz'[axis]}, so that was taken "
-            f"for up ({option('up_axis')} settles it)"
+            f"the person stands along {'-' if sign < 0 else ''}{'xyz'[axis]} of what was read, so "
+            f"that was taken for up ({option('up_axis')} settles it)"
         )
 
 

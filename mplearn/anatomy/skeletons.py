@@ -57,7 +57,10 @@ def recognise_skeleton(recording: Recording, names: Mapping[str, str] | None = N
             "...): two legs and two arms were not found among its branches; "
             f"{option('names')} says which joint is which"
         )
-    person = Person(recording.name, tree, plan, names or {})
+    report = recording.report
+    doubt = report is None or any("points up is in doubt" in text for text in report.warnings)
+    unit_m = (report.unit_m if report else None) or 1.0
+    person = Person(recording.name, tree, plan, names or {}, unit_m=unit_m, up_in_doubt=doubt)
     return Placing(person, skeleton, some, axes).map(names or {})
 
 

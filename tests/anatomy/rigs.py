@@ -202,8 +202,8 @@ def _along_bones(rest: list[_Node]) -> None:
     old = [(node.pos[0].copy(), node.mat[0].copy()) for node in rest]
     for k, node in enumerate(rest):
         below = next((c for c, child in enumerate(rest) if child.parent == k), None)
-        if below is not None:
-            bone = old[k][1].T @ (old[below][0] - old[k][0])
+        bone = np.zeros(3) if below is None else old[k][1].T @ (old[below][0] - old[k][0])
+        if below is not None and np.linalg.norm(bone) > 1e-9:
             sign = -1.0 if old[below][0][1] < -0.01 else 1.0
             turn, _ = Rotation.align_vectors([[sign, 0.0, 0.0]], [bone])
             node.mat = turn.as_matrix()[None]
