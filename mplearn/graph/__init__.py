@@ -6,7 +6,7 @@ from .extension import Extension as Extension
 from .graph_state import GraphState as GraphState
 from .levels import LevelledGraph as LevelledGraph
 from .levels import tree_levels as tree_levels
-from .plan import Criterion as Criterion
 from .prediction import History as History
 from .prediction import Prediction as Prediction
+from .transition_graph import Criterion as Criterion
 from .transition_graph import TransitionGraph as TransitionGraph

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..recording import FloatArray
-from .forecast import Forecast
 from .prediction import History, Prediction, backed_off, most_likely, usable_context
+from .transition_graph import TransitionGraph
 
 
 class Extension:
@@ -18,9 +18,9 @@ class Extension:
         graph: The graph; its order and its weight of shorter histories hold for both.
     """
 
-    def __init__(self, graph: Forecast) -> None:
+    def __init__(self, graph: TransitionGraph) -> None:
         self._graph = graph
-        self._beside = Forecast(
+        self._beside = TransitionGraph(
             order=graph.order,
             concentration=graph.concentration,
             history_capacity=graph.history_capacity,
@@ -44,7 +44,7 @@ class Extension:
     def observe(
         self, previous: int, next: int, duration_s: float, *, before: Sequence[int] = ()
     ) -> None:
-        """Count a transition that the graph does not hold; see `TransitionCounts.observe`."""
+        """Count a transition that the graph does not hold; see `TransitionGraph.observe`."""
         for id in (*before, previous, next):
             self.add_node(id)
         self._beside.observe(previous, next, duration_s, before=before)
@@ -60,7 +60,7 @@ class Extension:
         return row
 
     def predict(self, history: History, k: int = 3) -> tuple[Prediction, ...]:
-        """Return the ``k`` nodes most likely to come next; see `Forecast.predict`."""
+        """Return the ``k`` nodes most likely to come next; see `TransitionGraph.predict`."""
         context = usable_context(history, self._graph.order)
         p = backed_off(self, context, self._graph.concentration)
         return most_likely(self.ids, p, k, lambda id: self._time_s(context[-1:], id))

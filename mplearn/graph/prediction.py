@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 import numpy as np
 
 from ..errors import InvalidValueError
 from ..recording import FloatArray
-from .counts import TransitionCounts
+
+if TYPE_CHECKING:
+    from .transition_graph import TransitionGraph
 
 History: TypeAlias = Sequence[int | None]
 
@@ -90,7 +92,7 @@ def most_likely(
     return tuple(Prediction(ids[i], float(p[i]), *time_s(ids[i])) for i in best)
 
 
-def surprise(counts: TransitionCounts, sequence: History) -> FloatArray:
+def surprise(counts: TransitionGraph, sequence: History) -> FloatArray:
     """Return -log p(x_t | x_1..x_{t-1}) [nat], shape (len(sequence) - 1,); NaN where x_t is None.
 
     NaN too where nothing is known of what came before x_t: that is no order.

@@ -1,8 +1,8 @@
 """The primitive library: frozen, versioned snapshots of what was learned."""
 
 from .compact import CompactMotion as CompactMotion
-from .holdings import TreeNode as TreeNode
 from .library import PrimitiveLibrary as PrimitiveLibrary
 from .novelty import AnomalyScore as AnomalyScore
 from .novelty import MotionNovelty as MotionNovelty
 from .primitive import Primitive as Primitive
+from .primitive import TreeNode as TreeNode

@@ -9,8 +9,7 @@ from ..errors import LibraryError, MPLearnError
 from ..graph import GraphState, TransitionGraph
 from ..state import FileFormat, Range, State, from_plain, require, require_no_cycle, to_plain
 from ..tree.recogniser import Recogniser, RecogniserState
-from .holdings import TreeNode
-from .primitive import Primitive
+from .primitive import Primitive, TreeNode
 
 if TYPE_CHECKING:
     from .library import PrimitiveLibrary

@@ -3,34 +3,183 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Unpack
+from typing import TYPE_CHECKING, TypeAlias, Unpack
 
 import numpy as np
 
-from ..errors import InvalidValueError
+from ..body import view_of
+from ..errors import InvalidValueError, UnknownPrimitiveError
 from ..generation import StyleName, Trajectory, generate, retime
-from ..graph import Asked, Criterion, LevelledGraph, tree_levels
+from ..graph import (
+    Asked,
+    Criterion,
+    History,
+    LevelledGraph,
+    Prediction,
+    TransitionGraph,
+    tree_levels,
+)
 from ..recording import FloatArray
 from .content import FILES, from_content, to_content
-from .holdings import Key
-from .knowledge import Knowledge
+from .novelty import AnomalyScore, MotionNovelty, novelty_of
+from .primitive import Primitive, TreeNode
+
+if TYPE_CHECKING:
+    from ..tree import Recogniser, Recognition
+
+Key: TypeAlias = int | str
 
 
 @dataclass(frozen=True, eq=False)
-class PrimitiveLibrary(Knowledge):
+class PrimitiveLibrary:
     """A snapshot of learned primitives and their transitions; nothing here changes.
 
     Wherever a primitive is asked for, its id or its name will do. Two libraries hold the same if
-    their `version` is the same. Attributes are those of `Holdings`.
+    their `version` is the same.
+
+    Attributes:
+        primitives: The primitives.
+        graph: Their transitions; a snapshot that refuses changes, its `copy` can grow.
+        channels: Name of each channel, length D.
+        rate_hz: Frame rate of models and exemplars [1/s].
+        body: Name of the body that moves; empty where the channels are no body's.
+        tree: The nodes of the tree.
+        recogniser: What recognises segments; None in a library that only acts.
+
+    Raises:
+        InvalidValueError: Ids, names or channels are not unique, or parts do not fit each other.
     """
+
+    primitives: tuple[Primitive, ...]
+    graph: TransitionGraph = field(repr=False)
+    channels: tuple[str, ...]
+    rate_hz: float
+    body: str = ""
+    tree: tuple[TreeNode, ...] = field(default=(), repr=False)
+    recogniser: Recogniser | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "primitives", tuple(self.primitives))
+        object.__setattr__(self, "channels", tuple(self.channels))
+        object.__setattr__(self, "tree", tuple(TreeNode(*node) for node in self.tree))
+        ids = [primitive.id for primitive in self.primitives]
+        names = [primitive.name for primitive in self.primitives]
+        for what, values in (("ids", ids), ("names", names), ("channels", self.channels)):
+            if len(set(values)) != len(values):
+                raise InvalidValueError(f"{what} of a library must differ, not {values}")
+        for primitive in self.primitives:
+            if primitive.hmm.n_channels != len(self.channels):
+                raise InvalidValueError(
+                    f"primitive {primitive.id} has {primitive.hmm.n_channels} channels, "
+                    f"the library {len(self.channels)}"
+                )
+            if primitive.rate_hz != self.rate_hz:
+                raise InvalidValueError(
+                    f"primitive {primitive.id} has rate_hz {primitive.rate_hz}, "
+                    f"the library {self.rate_hz}"
+                )
+        strangers = set(self.graph.ids) - set(ids)
+        if strangers:
+            raise InvalidValueError(f"the graph names {sorted(strangers)}, which are no primitives")
+        graph, missing = self.graph, [id for id in ids if id not in self.graph]
+        if missing:
+            graph = graph.copy()
+            for id in missing:
+                graph.add_node(id)
+        object.__setattr__(self, "graph", graph.snapshot())
+
+    # ---- what it holds
+
+    def __len__(self) -> int:
+        """Number of primitives."""
+        return len(self.primitives)
+
+    def __getitem__(self, key: Key) -> Primitive:
+        """Return a primitive by id or name.
+
+        Raises:
+            UnknownPrimitiveError: There is none.
+        """
+        found = self._by_key.get(key)
+        if found is None:
+            names = ", ".join(primitive.name for primitive in self.primitives[:30])
+            raise UnknownPrimitiveError(
+                f"no primitive {key!r} in the library; it holds {len(self)}: {names}"
+            )
+        return found
+
+    def __contains__(self, key: object) -> bool:
+        """Whether there is a primitive of this id or name."""
+        return key in self._by_key
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """Ids of the primitives."""
+        return tuple(primitive.id for primitive in self.primitives)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the primitives."""
+        return tuple(primitive.name for primitive in self.primitives)
 
     @cached_property
     def version(self) -> str:
         """Hash of all that the library holds, names included: 16 hexadecimal digits."""
         return FILES.digest(to_content(self))[:16]
+
+    # ---- what it knows
+
+    def recognise(self, frames: FloatArray) -> Recognition:
+        """Recognise a segment, shape (T, D).
+
+        Raises:
+            InvalidValueError: The library was made without a recogniser, or the segment has other
+                channels.
+        """
+        recogniser = self._recogniser
+        frames = np.asarray(frames, dtype=np.float64)
+        if frames.ndim != 2 or frames.shape[1] != len(self.channels):
+            raise InvalidValueError(
+                f"a segment must have shape (T, {len(self.channels)}), not {frames.shape}"
+            )
+        return recogniser.recognise(view_of(self.channels).see(frames))
+
+    def score_motion(self, frames: FloatArray) -> AnomalyScore:
+        """Return how unlike every known primitive a segment is, shape (T, D), see `MotionNovelty`.
+
+        Raises:
+            InvalidValueError: As `recognise`.
+        """
+        length = self._recogniser.distance.length
+        matches = self.recognise(frames).alternatives
+        return self._novelty.score((match.node, float(length(match.distance))) for match in matches)
+
+    def score_order(self, sequence: Sequence[Key | None]) -> tuple[AnomalyScore, ...]:
+        """Return how unusual each primitive of a sequence is after those before it.
+
+        Args:
+            sequence: Primitives in the order they were performed; None where one was not
+                recognised.
+
+        Returns:
+            A score for each but the first, see `TransitionGraph.surprises` and `p_values`;
+            NaN where it or the one before it was not recognised.
+        """
+        known = self._known(sequence)
+        scores, shares = self.graph.surprises(known), self.graph.p_values(known)
+        return tuple(map(AnomalyScore, scores.tolist(), shares.tolist()))
+
+    def predict_next(self, history: Sequence[Key | None], k: int = 3) -> tuple[Prediction, ...]:
+        """Return the ``k`` primitives most likely to come next, see `TransitionGraph.predict`.
+
+        Args:
+            history: The latest primitives, oldest first; None where one was not recognised.
+            k: How many to return at most.
+        """
+        return self.graph.predict(self._known(history), k)
 
     # ---- planning
 
@@ -153,3 +302,23 @@ class PrimitiveLibrary(Knowledge):
             LibraryError: The file is missing, damaged, foreign, or of a newer version.
         """
         return from_content(cls, FILES.read(Path(path)), str(path))
+
+    # ---- inside
+
+    @cached_property
+    def _by_key(self) -> dict[Key, Primitive]:
+        keyed: dict[Key, Primitive] = {p.name: p for p in self.primitives}
+        return keyed | {p.id: p for p in self.primitives}
+
+    @property
+    def _recogniser(self) -> Recogniser:
+        if self.recogniser is None:
+            raise InvalidValueError("this library holds no recogniser")
+        return self.recogniser
+
+    @cached_property
+    def _novelty(self) -> MotionNovelty:
+        return novelty_of(self._recogniser)
+
+    def _known(self, sequence: Sequence[Key | None]) -> History:
+        return [None if key is None else self[key].id for key in sequence]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -141,3 +142,17 @@ def _single_precision(hmm: LeftRightHMM) -> LeftRightHMM:
         variances=np.maximum(hmm.variances, tiny).astype(np.float32),
         log_stay=np.append(np.minimum(hmm.log_stay[:-1], -tiny), 0.0).astype(np.float32),
     )
+
+
+class TreeNode(NamedTuple):
+    """A node of the tree that the primitives were learned in.
+
+    Attributes:
+        id: Identity; that of its primitive, if it is a leaf.
+        parent: Node above it; None at the root.
+        n_exemplars: How many segments were placed in it.
+    """
+
+    id: int
+    parent: int | None
+    n_exemplars: int
