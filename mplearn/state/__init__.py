@@ -12,6 +12,7 @@ from .declared import Range as Range
 from .declared import SharedState as SharedState
 from .declared import State as State
 from .declared import complete as complete
+from .declared import newer as newer
 from .declared import require as require
 from .declared import require_no_cycle as require_no_cycle
 from .files import FileFormat as FileFormat

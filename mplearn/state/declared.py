@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..errors import StateError
 
 T = TypeVar("T")
+_ABSENT = "absent"
 LARGEST = 1e250  # of a number in a state, where nothing else is said: what lies beyond is damage
 
 
@@ -72,6 +73,35 @@ def complete(kind: type[T]) -> type[T]:
     """
     _COMPLETE.add(kind)
     return kind
+
+
+def newer(default: T, *, absent: T) -> T:
+    """Return the field of a setting that is newer than files that are about.
+
+    Args:
+        default: What it is in a new configuration.
+        absent: What a file means that does not name it: how things were before. It is written only
+            where it is something else, so that an old file's content stays the same to the bit.
+
+    Example:
+        >>> from dataclasses import dataclass
+        >>> from mplearn.state import from_plain, to_plain
+        >>> @dataclass(frozen=True)
+        ... class Rules:
+        ...     order: int = 2
+        ...     reach: float = newer(1.5, absent=1.0)
+        >>> from_plain(Rules, {"order": 3})
+        Rules(order=3, reach=1.0)
+        >>> to_plain(Rules(3, 1.0)), to_plain(Rules())
+        ({'order': 3}, {'order': 2, 'reach': 1.5})
+    """
+    made: T = field(default=default, metadata={_ABSENT: absent})
+    return made
+
+
+def absent_fields(kind: Any) -> dict[str, Any]:
+    """Return the `newer` fields of a dataclass by name, and what the absence of each means."""
+    return {each.name: each.metadata[_ABSENT] for each in fields(kind) if _ABSENT in each.metadata}
 
 
 def is_complete(kind: type) -> bool:

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from .declared import Blob, SharedState
+from .declared import Blob, SharedState, absent_fields
 
 Share = Callable[[Blob | SharedState], Any]
 
@@ -41,10 +41,20 @@ def to_plain(value: Any, share: Share | None = None) -> Any:
 
 
 def fields_of(value: Any, share: Share | None = None) -> dict[str, Any]:
-    """Return the fields of a dataclass as plain values by name."""
-    return {name: to_plain(getattr(value, name), share) for name in _names(cast(Any, type(value)))}
+    """Return the fields of a dataclass as plain values by name.
+
+    A `newer` field is left out where it has the value that its absence means, so that what an older
+    version wrote is written again as it was.
+    """
+    names, absent = _names(cast(Any, type(value)))
+    return {
+        name: to_plain(getattr(value, name), share)
+        for name in names
+        if name not in absent or getattr(value, name) != absent[name]
+    }
 
 
 @cache
-def _names(kind: Any) -> tuple[str, ...]:
-    return tuple(each.name for each in fields(kind))
+def _names(kind: Any) -> tuple[tuple[str, ...], dict[str, Any]]:
+    """Return the names of the fields, and what the absence of some means."""
+    return tuple(each.name for each in fields(kind)), absent_fields(kind)

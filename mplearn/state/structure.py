@@ -33,6 +33,7 @@ from .declared import (
     Range,
     SharedState,
     State,
+    absent_fields,
     is_complete,
     limits,
     shown,
@@ -352,7 +353,7 @@ def _dataclass(kind: type) -> Reader:
         if strange:
             raise StateError(f"has no field {strange[0]!r:.60}; known are {sorted(names)}")
         scope: Scope = {}
-        found = {}
+        found = {} if typed else absent_fields(kind)
         for name, one, optional in readers():
             if name not in given:
                 if optional:

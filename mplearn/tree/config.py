@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 from ..errors import InvalidValueError
+from ..state import newer
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ class TreeConfig:
     n_states: int = 8
     max_chains: int = 1
     variance_floor: float = 0.6
-    distance: str = "likelihood"
+    distance: str = newer("likelihood", absent="likelihood")
     power: float = 0.5
     tempo: float = 1.5
     local: bool = False
