@@ -402,6 +402,7 @@ class MotionLearner:
         """Take features that are ready, shape (k, D)."""
         events: list[Event] = []
         for seen in self._view.see(features):
+            self.tree.pass_time()
             segments = self._segmenter.update(seen)
             self._buffer.append(seen)
             self.n_frames += 1

@@ -278,6 +278,11 @@ class PeopleTree:
             return placement
         return self._sharing.follow(person, placement, frames)
 
+    def pass_time(self) -> None:
+        """Let a frame pass; see `PrimitiveTree.pass_time`."""
+        for tree in self._trees.values():
+            tree.pass_time()
+
     # ---- learning by hand
 
     def split(self, id: int, groups: Sequence[Sequence[int]] | None = None) -> Change:

@@ -114,12 +114,9 @@ class ExemplarBank:
         """Forget an exemplar."""
         self._rows.release(self._slots.pop(number))
 
-    def refit(self, floor: FloatArray) -> None:
-        """Model all exemplars again, with another variance floor."""
-        self.floor = np.array(floor, dtype=np.float64)
-        for number, slot in self._slots.items():
-            exemplar = self[number]
-            self._rows.write(slot, self.model(exemplar.columns.T, float(exemplar.duration)))
+    def take_over(self, other: ExemplarBank) -> None:
+        """Hold what another bank holds, from now on instead of it."""
+        self.floor, self._slots, self._rows = other.floor, other._slots, other._rows
 
     def profile(self, exemplar: Exemplar) -> FloatArray:
         """Return the points times the root of their weights, shape (D * P,); 0 where missing."""
@@ -150,8 +147,8 @@ class ExemplarBank:
             raw[here] = self.distance.divergence(exemplar, Exemplar(*arrays), rows, self._weights)
         distances = self.distance.length(raw)
         if not forms_only and np.isfinite(self.config.tempo):
-            longer = self._rows.gather(slots, _DURATION) / exemplar.duration
-            beyond = np.maximum(longer, 1 / longer) / self.config.tempo
+            one, other = exemplar.duration, self._rows.gather(slots, _DURATION)
+            beyond = np.maximum(one, other) / np.minimum(one, other) / self.config.tempo
             distances *= np.maximum(beyond, 1.0) ** _STEEPNESS
         return np.asarray(distances)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ..state import Blob, within
 from . import form
 from .bank import ExemplarBank
 from .config import TreeConfig
+from .renewal import EFFORT, SAMPLE, Renewal, RenewalState
 from .spread import ChannelSpread, DistanceSample, SampleState, SpreadState
 
 _RESCALE = 1.5  # models are made again when the variance of all motion has changed by this factor
@@ -27,6 +28,7 @@ class SegmentMemory:
     Attributes:
         bank: Models of the segments, and the distances between them.
         frames: The segments as they came, shape (L, D) each.
+        renewal: The models on their way that will take the place of these; None for none.
     """
 
     def __init__(self, config: TreeConfig, groups: IntArray) -> None:
@@ -37,15 +39,19 @@ class SegmentMemory:
         self._spread = ChannelSpread(groups)
         self._sample = DistanceSample(config.n_sampled, config.seed)
         self._holds: Counter[int] = Counter()
+        self.renewal: Renewal | None = None
 
     def remember(self, number: int, frames: FloatArray) -> None:
         """Take up a segment, shape (L, D), held once; it is not written to from now on."""
         points = form.points_of(frames, self.config.form)
         self._spread.update(points)
         if not self._sample.numbers:
-            self.rescale()
+            floor = self.outgrown()
+            self.bank.floor = self.bank.floor if floor is None else floor
         seen = form.centred(points, self.config.form)
         self.bank.add(number, self.bank.model(seen, len(frames)))
+        if self.renewal is not None:
+            self.renewal.add(number)
         self.frames[number] = frames
         self.hold(number)
         place = self._sample.place_for(number)
@@ -67,20 +73,45 @@ class SegmentMemory:
                 del self._holds[number], self.frames[number]
                 self._blobs.pop(number, None)
                 self.bank.drop(number)
+                if self.renewal is not None:
+                    self.renewal.drop(number)
 
-    def rescale(self) -> bool:
-        """Model all segments again where the variance of all motion has changed much.
-
-        Returns:
-            Whether that was done: distances among them have changed then.
-        """
+    def outgrown(self) -> FloatArray | None:
+        """Return the variance floor of new models, if that of all motion has changed much."""
         floor = self.config.variance_floor**2 * self._spread.variances()
         change = floor / self.bank.floor
         if change.max() <= _RESCALE and change.min() >= 1 / _RESCALE:
-            return False
-        self.bank.refit(floor)
-        self.measure()
-        return True
+            return None
+        return floor
+
+    def renew(self, floor: FloatArray, groups: Mapping[int, Sequence[int]]) -> None:
+        """Begin to make all models and distances again.
+
+        Args:
+            floor: Smallest variance of each channel in them, shape (D,).
+            groups: Numbers of the segments in each node, by its id.
+        """
+        self.renewal = Renewal(self.bank, floor, self._all(groups))
+
+    def get_on(self, groups: Mapping[int, Sequence[int]]) -> dict[int, FloatArray] | None:
+        """Do a frame's part of that; return the new distances in each node once all is ready."""
+        assert self.renewal is not None
+        self.renewal.frames_left -= 1
+        if self.renewal.frames_left > 0:
+            self.renewal.work(self._all(groups), EFFORT)
+            return None
+        return self.get_done(groups)
+
+    def get_done(self, groups: Mapping[int, Sequence[int]]) -> dict[int, FloatArray]:
+        """Do all that is left of it now."""
+        assert self.renewal is not None
+        matrices = self.renewal.finish(self._all(groups))
+        self._sample.remeasured(matrices.pop(SAMPLE))
+        self.renewal = None
+        return matrices
+
+    def _all(self, groups: Mapping[int, Sequence[int]]) -> dict[int, Sequence[int]]:
+        return {SAMPLE: self._sample.numbers, **groups}
 
     def measure(self) -> None:
         """Measure the distances in the sample again."""
@@ -107,6 +138,16 @@ class SegmentMemory:
     def sample(self) -> SampleState:
         """Return the state of the sample of all segments."""
         return self._sample.state(self.blob)
+
+    def renewal_state(self) -> RenewalState | None:
+        """Return the state of the models on their way."""
+        if self.renewal is None:
+            return None
+        return RenewalState(self.renewal.bank.floor.copy(), self.renewal.frames_left)
+
+    def load_renewal(self, state: RenewalState, groups: Mapping[int, Sequence[int]]) -> None:
+        """Resume what `renewal_state` returned, after `load`."""
+        self.renewal = Renewal(self.bank, state.floor, self._all(groups), state.frames_left)
 
     def load(
         self,

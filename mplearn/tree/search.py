@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Annotated
@@ -119,6 +119,10 @@ class NodeIndex:
         if self.members[k] != members:
             self.members[k] = list(members)
             self._means.write(slot, (bank.mean_profile(members),))
+
+    def remeasured(self, diameters: Mapping[int, float]) -> None:
+        """Take note of nodes' new diameters, by id."""
+        self._known["diameter"] = [diameters[id] for id in self.ids.tolist()]
 
     def scale(self, but: int | None = None) -> float:
         """Return the median diameter of the leaves, but for one: how much executions vary.

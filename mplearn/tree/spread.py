@@ -135,6 +135,11 @@ class DistanceSample:
         )
         self._state = None
 
+    def remeasured(self, matrix: FloatArray) -> None:
+        """Take over distances that were measured again, shape (n, n)."""
+        self._matrix[: len(matrix), : len(matrix)] = matrix
+        self._state = None
+
     def scale(self, spread: float, mean_share: float) -> float:
         """Return the largest distance expected between executions of one motion.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -57,6 +57,18 @@ class Structure:
     def tune(self) -> None:
         """Let radii follow the scale of all motion."""
         self.index.limit = self.config.reach_limit * self.memory.scale()
+
+    @property
+    def groups(self) -> dict[int, Sequence[int]]:
+        """Numbers of the segments in each node."""
+        return {id: node.members for id, node in self.nodes.items()}
+
+    def remeasured(self, matrices: Mapping[int, FloatArray]) -> None:
+        """Take over distances in the nodes that were measured again."""
+        for id, node in self.nodes.items():
+            node.matrix = matrices[id]
+        self.index.remeasured({id: node.diameter for id, node in self.nodes.items()})
+        self.tune()
 
     def remeasure(self) -> None:
         """Measure all distances again."""

@@ -31,6 +31,7 @@ from .models import GroupModels
 from .node import Node, NodeState
 from .placement import ROOT, Change, Placement
 from .recogniser import Recogniser, refusal
+from .renewal import RenewalState
 from .revision import merge_duplicates, split_mixed
 from .spread import SampleState, SpreadState
 from .structure import Structure
@@ -51,6 +52,7 @@ class TreeState(State):
         spread: How much all motion varies.
         sample: Some of all segments.
         nodes: The nodes, the root first.
+        renewal: Models on their way that will take the place of these; None for none.
     """
 
     n_seen: Count
@@ -59,6 +61,7 @@ class TreeState(State):
     spread: SpreadState
     sample: SampleState
     nodes: tuple[NodeState, ...]
+    renewal: RenewalState | None = None
 
     def check(self) -> None:
         """Check that the nodes make one tree, and that equal numbers are the same segment."""
@@ -160,6 +163,7 @@ class PrimitiveTree:
         self._memory = SegmentMemory(config, numbers)
         self._structure = Structure(config, self._memory)
         self._models = GroupModels(config, self._structure)
+        self._time_passes = False
 
     # ---- looking
 
@@ -270,8 +274,7 @@ class PrimitiveTree:
             if not change.splits:
                 change = merge_duplicates(structure, matches, self.n_seen)
         self._memory.release(number)
-        if self._memory.rescale():
-            structure.remeasure()
+        self._renew()
         structure.tune()
         self._models.forget()
         home = next((to for which, to in change.moved if which == number), node.id)
@@ -288,6 +291,28 @@ class PrimitiveTree:
             like=like,
         )
 
+    def pass_time(self) -> None:
+        """Let a frame pass: what takes long is done a little at a time by those who call this.
+
+        Where nobody does, `insert` does it at once.
+        """
+        self._time_passes = True
+        if self._memory.renewal is not None:
+            matrices = self._memory.get_on(self._structure.groups)
+            if matrices is not None:
+                self._structure.remeasured(matrices)
+
+    def _renew(self) -> None:
+        """Begin to model all segments again where the variance of all motion has changed much."""
+        memory, structure = self._memory, self._structure
+        if memory.renewal is None:
+            floor = memory.outgrown()
+            if floor is None:
+                return
+            memory.renew(floor, structure.groups)
+        if not self._time_passes:
+            structure.remeasured(memory.get_done(structure.groups))
+
     def place_waiting(self) -> Change:
         """Place what waits in the root where it fits by now, or in primitives of its own."""
         structure, bank = self._structure, self.bank
@@ -303,6 +328,8 @@ class PrimitiveTree:
 
     def remeasure(self) -> None:
         """Measure all distances among segments again."""
+        if self._memory.renewal is not None:
+            self._structure.remeasured(self._memory.get_done(self._structure.groups))
         self._memory.measure()
         self._structure.remeasure()
         self._models.forget()
@@ -378,6 +405,7 @@ class PrimitiveTree:
             spread=memory.spread(),
             sample=memory.sample(),
             nodes=tuple(node.state(memory.blob) for node in self.nodes),
+            renewal=memory.renewal_state(),
         )
 
     def load_state(self, state: TreeState) -> None:
@@ -402,12 +430,18 @@ class PrimitiveTree:
         self._structure.nodes = {node.id: Node.from_state(node) for node in state.nodes}
         self._structure.reindex()
         self._structure.tune()
+        if state.renewal is not None:
+            memory.load_renewal(state.renewal, self._structure.groups)
         self._models = GroupModels(self.config, self._structure)
 
     def _check_fits(self, state: TreeState) -> None:
         """Check that segments are such as this tree takes up."""
         width, longest = self.n_channels, round(_LONGEST_S * self.rate_hz)
-        require(len(state.floor) == width, "floor", f"must have shape ({width},)")
+        floors = {"floor": state.floor}
+        if state.renewal is not None:
+            floors["renewal.floor"] = state.renewal.floor
+        for place, floor in floors.items():
+            require(len(floor) == width, place, f"must have shape ({width},)")
         parts = {"sample": state.sample.frames}
         parts |= {f"nodes[{k}]": node.frames for k, node in enumerate(state.nodes)}
         for place, segments in parts.items():
