@@ -58,10 +58,13 @@ def parse_motion(
         first_line += 1
     rate_hz = rate_hz or _rate(path, said.get("Frame Time", ""))
     flat, counts, lines = _flat(path, text[at:], first_line, findings)
-    n_said = int(said["Frames"]) if said.get("Frames", "")[:9].isdecimal() else None
+    said_frames = said.get("Frames", "")[:12]
+    n_said = int(said_frames) if said_frames.isdecimal() else None
     n_frames = _frames_in(path, counts, lines, width, n_said, findings)
     if n_said != n_frames and n_frames * width == len(flat):
-        findings.warn(f"{n_frames} frames are there and read; 'Frames:' says {said.get('Frames')}")
+        findings.warn(
+            f"{n_frames} frames are there and read; 'Frames:' says {said_frames or 'nothing'}"
+        )
     values = flat[: n_frames * width].reshape(n_frames, width)
     n_missing = int(np.isnan(values).sum())
     if n_missing:

@@ -14,7 +14,8 @@ from .files import bad_file
 from .findings import Findings
 
 _MEASURED = {"position": 3, "orientation": 4, "jointAngle": 3}
-_TEXTS = (*_MEASURED, "pos_b", "connector1", "connector2")
+_LISTED = {"pos_b": "segments", "connector1": "joints", "connector2": "joints"}
+_TEXTS = (*_MEASURED, *_LISTED)
 _EXPECTED = "an MVNX file: mvnx, subject, segments, frames"
 _MOST_MISSING = 10  # times as many frames as there are
 
@@ -136,6 +137,7 @@ class _Stream:
         self.times_ms: list[float] = []
         self.measured: dict[str, list[str]] = {name: [] for name in _MEASURED}
         self.t_pose = ""
+        self._list = ""  # which of the subject's own lists is open; fingers have others
         self._segment = self._point = ""
         self._joint: list[str] = []
         self._frame = ""  # type of the frame that is open
@@ -153,24 +155,26 @@ class _Stream:
         if name == "subject":
             self.file.subject = attributes.get("label", "").strip()
             self.file.rate_hz = _positive(attributes.get("frameRate", ""))
-        elif name == "segment":
+        elif name in ("segments", "joints"):
+            self._list = name
+        elif name == "segment" and self._list == "segments":
             self._segment = (
                 attributes.get("label", "").strip() or f"segment{len(self.file.segments)}"
             )
             self.file.segments.append(self._segment)
-        elif name == "point":
+        elif name == "point" and self._list == "segments":
             self._point = attributes.get("label", "").strip()
-        elif name == "joint":
+        elif name == "joint" and self._list == "joints":
             self._joint = [attributes.get("label", "").strip()]
         elif name == "frame":
             self._frame = attributes.get("type", "normal").strip().lower() or "normal"
             if self._frame == "normal":
                 self.numbers += 1
                 index = attributes.get("index", "")
-                self.indices.append(int(index) if index[:9].isdecimal() else 0)
+                self.indices.append(int(index[:12]) if index.isdecimal() else 0)
                 time_ms = _positive(attributes.get("time", ""))
                 self.times_ms += [] if time_ms is None else [time_ms]
-        elif name in _TEXTS:
+        elif name in _MEASURED or _LISTED.get(name) == self._list:
             self._parts = []
 
     def text(self, text: str) -> None:
@@ -181,6 +185,8 @@ class _Stream:
         name = name.rpartition(":")[2]
         if name == "frame":
             self._frame = ""
+        elif name == self._list:
+            self._list = ""
         if self._parts is None or name not in _TEXTS or self.n_subjects > 1:
             return
         text, self._parts = "".join(self._parts).strip(), None

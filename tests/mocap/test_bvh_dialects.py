@@ -63,6 +63,7 @@ DIALECTS: dict[str, tuple[Callable[[str], str], str]] = {
     "the same name twice": (lambda s: s.replace("JOINT Leg", "JOINT Arm"), "Arm_2"),
     "frames one less": (lambda s: s.replace("Frames: 12", "Frames: 11"), "says 11"),
     "frames one more": (lambda s: s.replace("Frames: 12", "Frames:\t13"), "says 13"),
+    "frames without end": (lambda s: s.replace("Frames: 12", "Frames: " + "9" * 5000), "says 9"),
     "no number of frames": (lambda s: s.replace("Frames: 12\n", ""), "12 frames"),
     "wrapped": (wrapped, ""),
     "glued": (glued, ""),

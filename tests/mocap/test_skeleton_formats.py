@@ -107,6 +107,33 @@ def test_mvnx_with_a_part_of_the_streams(tmp_path: Path) -> None:
         open_recording(tmp_path / "d.mvnx", positions=True)
 
 
+def test_mvnx_with_fingers(tmp_path: Path) -> None:
+    """Fingers come in lists and streams of their own, whose elements have the same names."""
+    path = write_mvnx(tmp_path / "a.mvnx")
+    plain = open_recording(path, positions=True)
+    finger = '<segment label="LeftCarpus" id="1"><points><point label="p"><pos_b>0 0 0</pos_b>'
+    finger += "</point></points></segment>"
+    joint = '<joint label="j"><connector1>LeftCarpus/p</connector1><connector2>LeftThumb/p'
+    joint += "</connector2></joint>"
+    text = path.read_text().replace(
+        "<frames>",
+        f"<fingerTrackingSegmentsLeft>{finger}</fingerTrackingSegmentsLeft>"
+        f"<fingerTrackingJointsLeft>{joint}</fingerTrackingJointsLeft><frames>",
+    )
+    text = text.replace("</frame>", "<positionFingersLeft>1 2 3</positionFingersLeft></frame>")
+    path.write_text(text)
+    assert np.array_equal(open_recording(path, positions=True).frames, plain.frames)
+
+
+@pytest.mark.parametrize("index", ["9" * 5000, "-1", "one"])
+def test_mvnx_indices_that_make_no_sense(tmp_path: Path, index: str) -> None:
+    path = write_mvnx(tmp_path / "a.mvnx")
+    plain = open_recording(path, positions=True)
+    path.write_text(path.read_text().replace('index="5"', f'index="{index}"'))
+    with pytest.warns(RecordingWarning, match="taken one by one"):
+        assert np.array_equal(open_recording(path, positions=True).frames, plain.frames)
+
+
 def test_mvnx_frames_that_were_dropped_are_missing(tmp_path: Path) -> None:
     path = write_mvnx(tmp_path / "a.mvnx")
     path.write_text(re.sub(r'<frame time="\d+" index="[45]".*\n', "", path.read_text()))
