@@ -42,6 +42,15 @@ def recognise(recording: Recording, *, names: Mapping[str, str] | None = None) -
 
     Raises:
         BodyError: There is no body in it, with the reason, and the option that would settle it.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> recording = demonstrate(["BAR"], seed=1).recording
+        >>> body = recognise(recording)
+        >>> body.places[:3], body.unseen
+        (('LFHD', 'RFHD', 'LBHD'), ())
+        >>> body.apply(recording).is_markers
+        True
     """
     if recording.skeleton is not None and recording.is_markers:
         return recognise_skeleton(recording, names)

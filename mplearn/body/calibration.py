@@ -37,6 +37,7 @@ JOINT_SIGMA_M = 0.002  # the same for a point that lies at a joint: no skin is b
 # they and the postures agree
 MANY_JOINTS, MEASURED_SIGMA = 8, 0.3
 JOINT_PLACE_SIGMAS_M = (*[0.001] * 24, 0.003, 0.01)
+SETTLED = 3e-4  # change of all sizes in a round below which the next would change nothing
 FRAMES = 12  # postures that the fit takes from the stretch it is given
 WORST_FIT_M = 0.06  # root mean square distance above which the markers are not this body's
 
@@ -89,7 +90,8 @@ def fit(follower: Follower, markers: MarkerSet, frames: FloatArray) -> Calibrati
     sigma = MEASURED_SIGMA if measured_all else SIZE_SIGMA
     rounds = JOINT_PLACE_SIGMAS_M if measured_all else PLACE_SIGMAS_M
     places_m = [np.minimum(place_sigma_m, firm) for place_sigma_m in rounds]
-    found = _alternate(person, sizes, sigma, bodies, template, places_m, start, chosen)
+    settled = SETTLED if measured_all else 0.0
+    found = _alternate(person, sizes, sigma, bodies, template, places_m, settled, start, chosen)
     if person is not follower:
         measured = person.tree.scaled(found.factors)
         sizes = match_sizes(follower.tree, measured)
@@ -99,7 +101,9 @@ def fit(follower: Follower, markers: MarkerSet, frames: FloatArray) -> Calibrati
         start[:7] = found.postures[0, :7]
         template = template / sizes[bodies]
         places_m = [np.full(len(bodies), place_sigma_m) for place_sigma_m in PLACE_SIGMAS_M]
-        found = _alternate(follower, sizes, FIXED_SIGMA, bodies, template, places_m, start, chosen)
+        found = _alternate(
+            follower, sizes, FIXED_SIGMA, bodies, template, places_m, settled, start, chosen
+        )
     rms = float(np.sqrt(np.nanmean(found.residuals**2)))
     if rms > WORST_FIT_M:
         mean = np.nan_to_num(np.nanmean(found.residuals, axis=0))
@@ -136,6 +140,7 @@ def _alternate(
     bodies: IntArray,
     template: FloatArray,
     places_m: Sequence[FloatArray],
+    settled_below: float,
     start: FloatArray,
     frames: FloatArray,
 ) -> _Fit:
@@ -149,10 +154,15 @@ def _alternate(
         postures[k] = last
         settle(follower, tree, bodies, offsets, postures[k : k + 1], frames[k : k + 1])
         last = postures[k]
-    for place_sigma_m in places_m:
+    settled = False
+    for k, place_sigma_m in enumerate(places_m):
+        if settled and np.array_equal(place_sigma_m, places_m[k - 1]):
+            continue  # nothing would change any more
+        before = factors
         factors, offsets = fit_sizes(
             follower.tree, sizes, size_sigma, bodies, template, postures, frames, place_sigma_m
         )
+        settled = bool(np.abs(factors - before).max() < settled_below)
         tree = follower.tree.scaled(factors)
         residuals = settle(follower, tree, bodies, offsets, postures, frames)
     return _Fit(factors, offsets, postures, residuals)

@@ -171,6 +171,7 @@ def find_marker_set(marker_names: Sequence[str]) -> MarkerSet:
     if known[best] < max(enough, 6):
         raise BodyError(
             f"no marker set knows the markers {list(marker_names)[:6]}...: {best!r} comes closest "
-            f"with {known[best]} of {len(plain)}; there are {', '.join(TABLES)}"
+            f"with {known[best]} of {len(plain)}; there are {', '.join(TABLES)}, and "
+            "mplearn.anatomy.recognise finds the body in recordings with other names"
         )
     return marker_set(best)
