@@ -13,8 +13,10 @@ from functools import cache
 # The first that is found counts: arms and hands before all that their names contain ("forearm"
 # holds an ear, a metacarpal "met").
 _PARTS = (
-    ("arm", r"arm|elb|wri|wr[ab]?$|hand|finger|fin$|thumb|index|pinky|ring\d|frm|upa|bic|rad|uln|"
-            r"hl?me|hle|hm[125]|mcp|metacarp|humer"),
+    ("elbow", r"elb|fore_?arm|lower_?arm|hl?me|hle|radius$"),
+    ("wrist", r"wri|wr[ab]?$|(?:left|right|^l_?|^r_?)hand$|radstyl|ulnstyl"),
+    ("arm", r"arm|hand|finger|fin$|thumb|index|pinky|ring\d|frm|upa|bic|rad|uln|hm[125]|mcp|"
+            r"metacarp|humer"),
     ("toe", r"toe|hallux|fm[125]|mt[1-5]|mth|metatars|d[1-5]m|foot_?index"),
     ("heel", r"hee(?!d)|heel|fcc|calc"),
     ("ankle", r"ank|ankle|fal|tam|mal(?:l|$)|mmal|lmal|foot|talus"),
@@ -42,6 +44,8 @@ LINKS_M = {
     ("ankle", "toe"): 0.095 * _STATURE_M,
     ("pelvis", "shoulder"): 0.285 * _STATURE_M,
     ("shoulder", "head"): 0.125 * _STATURE_M,
+    ("shoulder", "elbow"): 0.185 * _STATURE_M,
+    ("elbow", "wrist"): 0.146 * _STATURE_M,
 }
 """Distances within a person of 1.75 m that depend little on the posture [m]."""
 
@@ -51,7 +55,8 @@ class Place:
     """Where a name says that its point sits.
 
     Attributes:
-        part: One of `HEIGHTS`, ``"arm"``, or empty where the name tells nothing.
+        part: One of `HEIGHTS`, ``"elbow"``, ``"wrist"``, ``"arm"``, or empty where the name tells
+            nothing.
         side: ``"l"``, ``"r"`` or empty.
     """
 

@@ -39,11 +39,13 @@ class Unit:
         unit_m: Its length [m].
         fits: Whether a person, or a part of one, can be meant by it.
         contradicts: Whether it is another than the one declared.
+        doubtful: Whether the points would be few, or far apart, of a person.
     """
 
     unit_m: float
     fits: bool
     contradicts: bool
+    doubtful: bool = False
 
 
 def find_unit(points: FloatArray, names: tuple[str, ...], declared_m: float) -> Unit:
@@ -66,9 +68,9 @@ def find_unit(points: FloatArray, names: tuple[str, ...], declared_m: float) -> 
         if not 0 < spread < np.inf:
             return Unit(declared_m, False, False)
         adult_m = _USUAL_SPREAD_M / spread
-        if _SPREADS[0] <= declared_m / adult_m <= _SPREADS[1]:
-            return Unit(declared_m, True, False)
         low, high = _USUAL_SPREADS
+        if _SPREADS[0] <= declared_m / adult_m <= _SPREADS[1]:
+            return Unit(declared_m, True, False, not low <= declared_m / adult_m <= high)
         fits = [u for u in _COMMON if low <= u / adult_m <= high]
     if not fits:
         return Unit(declared_m, False, False)

@@ -13,11 +13,12 @@ from .files import bad_file
 from .findings import Findings
 from .options import option
 from .reader import Hints
-from .size import UNITS_M, Unit, find_unit
+from .size import UNITS_M, Unit, find_unit, spread_of
 from .vertical import find_vertical
 
 _FARTHEST_M = 100.0  # no capture volume is larger
 _SMALLEST_M = 0.02  # all markers of a body within less: not a body
+_MANY = 10  # markers; fewer may be a hand's
 _FEW = 3  # markers; about fewer the file alone can tell
 
 
@@ -139,6 +140,12 @@ def _settled_unit(
             f"the unit of length is taken as {unit_text(found.unit_m)}, by the size of the person; "
             + (f"the file says {said}" if space.says_unit else f"usual is {said}")
             + f" ({option('unit_m')} sets it)"
+        )
+    elif found.doubtful and len(names) >= _MANY:
+        findings.warn(
+            f"the unit of length is taken as {unit_text(found.unit_m)}, by which the points are "
+            f"{'close together' if spread_of(points) * found.unit_m < 0.2 else 'far apart'} for a "
+            f"person's; {option('unit_m')} settles it"
         )
     elif not space.says_unit and found.fits:
         findings.note(f"the unit of length is taken as {unit_text(found.unit_m)}: it fits a person")

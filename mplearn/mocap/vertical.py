@@ -25,7 +25,9 @@ _FEW = 3  # points; fewer tell nothing
 _SAYS_SO = 3.0  # nat: the file itself names the axis
 _USUAL = 1.5  # nat: its format does
 _NAMES = 5.0
-_LEVEL_SPREAD = 0.08  # of the stature: names closer than this in height tell little
+_TELLING = 2.0
+_LEVEL_SPREAD = 0.05  # of the stature: names closer than this in height tell little
+_STANDS = frozenset(("toe", "heel", "ankle"))
 _FLOOR = 4.0
 _FLOOR_M = (-0.06, 0.13)  # height of the lowest points of a standing foot
 _FLOOR_LIFT_M = 0.25  # jumps are rare and low
@@ -82,9 +84,12 @@ def find_vertical(
     prior = np.zeros(6)
     prior[start] = _SAYS_SO if says_so else _USUAL
     named = _by_names(first, seen, names)
-    floor = _by_floor(first, seen)
-    moved, tall = _by_motion(first, after, seen, rate_hz), _by_stature(first, seen)
-    evidence = prior + named + floor + moved + tall
+    floor = np.zeros(6)
+    evidence = prior + named
+    parts = {place_of(name).part for name in names} - {""}
+    if not parts or parts & _STANDS:  # what is lowest of an arm tells nothing
+        floor = _by_floor(first, seen)
+        evidence += floor + _by_motion(first, after, seen, rate_hz) + _by_stature(first, seen)
     best = int(np.argmax(evidence))
     margin = float(np.min(evidence[best] - np.delete(evidence, best)))
     # lying down, or standing on the hands, names say one thing and the floor another
@@ -93,8 +98,8 @@ def find_vertical(
         evidence[best] - evidence[start] < _TO_CHANGE or (floor_elsewhere and floor[start] > 0)
     ):
         return Vertical(declared, False, True, tuple(map(float, evidence)))
-    support = evidence[best] - prior[best]
-    doubtful = margin < _IN_DOUBT or support < _IN_DOUBT or floor_elsewhere
+    told = named[best] >= _TELLING or floor[best] > 0
+    doubtful = margin < _IN_DOUBT or not told or floor_elsewhere
     return Vertical(DIRECTIONS[best], best != start, bool(doubtful), tuple(map(float, evidence)))
 
 

@@ -203,6 +203,7 @@ def test_c3d_leaves_model_outputs_and_unnamed_trajectories_out(tmp_path: Path) -
     assert open_recording(path).marker_names == ("LASI", "RASI", "LTOE", "RTOE")
 
 
+@pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")  # no person: which is up?
 def test_c3d_of_two_people_keeps_their_prefixes(tmp_path: Path) -> None:
     names = [f"{who}:{name}" for who in ("Anna", "Ben") for name in ("LASI", "RASI", "CLAV")]
     path = write_c3d(tmp_path / "a.c3d", person(), names=names)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from data_folder import DATA, needs_data
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mplearn.demonstrator import demonstrate
+from mplearn.mocap import open_recording
 from mplearn.mocap.part_names import place_of
 from mplearn.mocap.size import CMU_UNIT_M, UNITS_M, find_unit, named_unit
 from mplearn.mocap.space import upright
@@ -58,6 +60,29 @@ def test_the_vertical_of_a_part_of_a_person(
         assert found.up == up or found.doubtful
         if part is LEGS:
             assert found.up == up
+
+
+@needs_data
+@pytest.mark.parametrize("part", [(), LEGS, ARMS, tuple(f"R{name}" for name in ARMS[:6])])
+def test_real_people_are_never_turned_wrongly_without_a_warning(part: tuple[str, ...]) -> None:
+    assert DATA is not None
+    sure = 0
+    for take in ("m01_s01", "m02_s02", "m05_s03", "m06_s01", "m08_s04", "m09_s05"):
+        recording = open_recording(DATA / "ui_prmd", take=take)
+        points, names = recording.markers, recording.marker_names
+        if part:
+            points, names = only(points, names, part)
+        for up in ("z", "y", "-z"):
+            for origin_m in (0.0, -1.4):
+                moved = (points + np.array([0.6, 1.3, origin_m])) @ upright(up)
+                for declared in ("y", "z"):
+                    found = find_vertical(moved, names, recording.rate_hz, declared)
+                    assert found.up == up or found.doubtful
+                    sure += not found.doubtful
+        for true_m in (1.0, 0.01, 0.001):
+            for declared_m in (1.0, 0.01, 0.001):
+                assert find_unit(points / true_m, names, declared_m).unit_m == true_m
+    assert sure >= 6 * 12 * 0.8 or len(names) < 8  # an arm alone tells nothing
 
 
 def test_names_alone_are_not_believed_of_who_lies_or_stands_on_the_hands(
@@ -165,7 +190,7 @@ def test_units_as_files_write_them(text: str, unit_m: float | None) -> None:
         *(("LFHD", "head", "l"), ("Anna:RBHD", "head", "r"), ("Head", "head", "")),
         *(("R.ASIS", "pelvis", "r"), ("L_IAS", "pelvis", "l"), ("V.Sacral", "pelvis", "")),
         *(("LeftUpLeg", "thigh", "l"), ("LeftLeg", "knee", "l"), ("RKNE", "knee", "r")),
-        *(("LeftForeArm", "arm", "l"), ("RFRM", "arm", "r"), ("LFIN", "arm", "l")),
+        *(("LeftForeArm", "elbow", "l"), ("RFRM", "arm", "r"), ("LFIN", "arm", "l")),
         *(("L_FCC", "heel", "l"), ("RHEE", "heel", "r"), ("LHeel", "heel", "l")),
         *(("RBigToe", "toe", "r"), ("L_FM5", "toe", "l"), ("LeftToeBase", "toe", "l")),
         *(("L_FAL", "ankle", "l"), ("RAnkle", "ankle", "r"), ("left ankle", "ankle", "l")),
