@@ -14,6 +14,7 @@ from ..errors import InvalidValueError
 from ..recording import LabelledSegment, Segment
 from ..tree import Placement
 from .matching import TOLERANCE_S, match_segments
+from .membership import Membership, recognised_as
 
 
 @dataclass(frozen=True)
@@ -119,33 +120,27 @@ class _Account:
     def __init__(self, truth: Sequence[LabelledSegment]) -> None:
         self.truth = truth
         self.shows: dict[int, str] = {}  # class of each placed segment, by its number
-        self.home: dict[int, int] = {}  # the node that it is in
+        self.membership = Membership()
         self.classes: dict[int, str] = {}  # class of each node ever formed
-        self.gone: set[int] = set()  # nodes that are no primitives any more
         self.demonstrations: dict[str, int] = {}
         self.wrong = self.missed = self.recognised = 0
 
     def take(self, placement: Placement, label: str, index: int) -> None:
         """Take what was said of one segment that shows ``label``."""
-        known = {self.classes[node] for node in self.classes if node not in self.gone}
+        known = {label for node, label in self.classes.items() if node not in self.membership.gone}
         if placement.recognised:
-            right = bool(label) and self.classes.get(_recognised_as(placement)) == label
+            right = bool(label) and self.classes.get(recognised_as(placement)) == label
             self.wrong += not right
             self.recognised += right
         elif label and label in known:
             self.missed += 1
         self.shows[placement.number] = label
-        self.home[placement.number] = placement.node_id
-        self.home.update(placement.moved)
-        self.gone.update(split.node for split in placement.splits)
-        for merge in placement.merges:
-            self.gone.add(merge.absorbed)
-            self.home |= {n: merge.kept for n, node in self.home.items() if node == merge.absorbed}
+        self.membership.take(placement)
         for node in placement.born:
             self._name(node, index)
 
     def _name(self, node: int, index: int) -> None:
-        votes = Counter(self.shows[number] for number, home in self.home.items() if home == node)
+        votes = Counter(self.shows[number] for number in self.membership.members(node))
         label, count = votes.most_common(1)[0] if votes else ("", 0)
         self.classes[node] = label if 2 * count > votes.total() else ""
         if label and label not in self.demonstrations:
@@ -154,9 +149,10 @@ class _Account:
 
     def rates(self, n_found: int) -> LearningRates:
         """Return the account's balance."""
-        classes = {node: label for node, label in self.classes.items() if node not in self.gone}
+        home, gone = self.membership.home, self.membership.gone
+        classes = {node: label for node, label in self.classes.items() if node not in gone}
         inside = sum(
-            bool(label) and classes.get(self.home[number]) == label
+            bool(label) and classes.get(home[number]) == label
             for number, label in self.shows.items()
         )
         return LearningRates(
@@ -174,11 +170,3 @@ class _Account:
                 if label in classes.values()
             },
         )
-
-
-def _recognised_as(placement: Placement) -> int:
-    """Return the primitive that a segment was recognised as, which it may have split at once."""
-    for split in placement.splits:
-        if placement.node_id in split.into:
-            return split.node
-    return placement.node_id

@@ -49,6 +49,12 @@ def repeating(recordings: Iterable[Recording]) -> tuple[Recording, ...]:
     )
 
 
+def lost_throughout(recording: Recording) -> str:
+    """Return the name of a channel of which a recording holds no measurement; empty where none."""
+    lost = np.isnan(recording.frames).all(axis=0)
+    return recording.channels[int(lost.argmax())] if lost.any() else ""
+
+
 def alike(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
     """Return the recordings of the channels that most have, all at the lowest of their rates."""
     if not recordings:

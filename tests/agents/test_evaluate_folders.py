@@ -78,3 +78,35 @@ def test_markers_without_labels_show_inverse_kinematics():
     angles.__dict__["recordings"] = (Recording(np.zeros((50, 1)), 100.0, ("knee",)),)
     with pytest.raises(RecordingError, match="no recording has labels"):
         evaluations_for(angles)
+
+
+def test_tables_of_labels_beside_recordings_are_read_and_bad_ones_named(tmp_path, capsys):
+    frames, labels = moved(["rest", "up"] * 8 + ["rest", "side"] * 8)
+    with (tmp_path / "one.csv").open("w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(["time", "x", "y", "z"])
+        table.writerows([f"{t / RATE_HZ:.4f}", *row] for t, row in enumerate(frames.tolist()))
+    half = len(labels) // 2
+    (tmp_path / "by_hand.json").write_text(
+        f'{{"one": {{"up": [[0, {half}]], "side": [[{half}, {len(labels)}]]}}}}'
+    )
+    (tmp_path / "broken.json").write_text("{")
+    (tmp_path / "longer.json").write_text('{"one": {"up": [[0, 100000]]}}')
+    assert main(["evaluate", str(tmp_path), "--only", "exercises", "--out", str(tmp_path)]) == 0
+    said = "".join(capsys.readouterr().out.split())
+    assert "leftout:broken.json" in said and "leftout:one(longer)" in said
+    (table,) = tmp_path.glob("*.md")
+    assert "one (by_hand)" in table.read_text() and "2 of 2" in table.read_text()
+
+
+def test_a_take_of_which_a_channel_is_lost_does_not_end_the_others(tmp_path):
+    for name in ("good", "lost"):
+        frames, labels = moved(["rest", "up"] * 4)
+        write(tmp_path / f"{name}.csv", frames, [name] * len(labels), np.arange(len(frames)) // 60)
+    setting = Setting(str(tmp_path))
+    good, lost = setting.recordings
+    frames = lost.frames.copy()
+    frames[:, 1] = np.nan
+    setting.__dict__["recordings"] = (good, replace(lost, frames=frames))
+    assert [take.name for take in setting.takes] == ["good"]
+    assert "never seen" in str(setting.refused["lost"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mplearn.demonstrator import demonstrate
-from mplearn.evaluation.experiments.activities import activities_in, true_activities
+from mplearn.evaluation.experiments.activities import activities_in
 from mplearn.evaluation.experiments.presentations import (
     all_at_once,
     first_presentation,
@@ -16,6 +16,7 @@ from mplearn.evaluation.experiments.presentations import (
     second_presentation,
 )
 from mplearn.evaluation.experiments.seen import Seen
+from mplearn.evaluation.ownership import frame_labels
 from mplearn.evaluation.partitions import agreement
 from mplearn.tree import TreeConfig
 
@@ -62,7 +63,7 @@ def test_activities_are_what_recurs_together():
     script = ["BAR", "BAL"] * 5 + ["BAD", "BAU"] * 5 + ["BAR", "BAL"] * 4
     demonstration = demonstrate(script, seed=3)
     labels = demonstration.truth
-    names = true_activities(labels, len(demonstration.recording))
+    names = frame_labels(labels, len(demonstration.recording))
     kind = np.where(np.isin(names, ["BAR", "BAL"]), "arms", "bow")
     kind[names == ""] = ""
     found = activities_in(demonstration.recording)

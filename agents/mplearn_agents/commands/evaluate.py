@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from mplearn.errors import InvalidValueError, MPLearnError
 
 from ..evaluations import BUILT_IN, Setting, evaluations_for
+from ..reading import say_left_out
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -62,12 +63,17 @@ def run(args: argparse.Namespace) -> None:
         raise InvalidValueError(f"experiments on {args.data} are {list(found)}, not {unknown}")
     if args.data not in BUILT_IN and setting.left_out:
         console.print(f"left out: {', '.join(setting.left_out)}")
+    said: set[str] = set()
     written: list[str] = []
     failed: list[str] = []
     for name in names:
         n_before = len(written)
         try:
             for table in found[name](setting):
+                for take, refused in setting.refused.items():
+                    if take not in said:
+                        said.add(take)
+                        say_left_out(console, take, refused)
                 _show(console, table)
                 written.append(table.to_markdown())
                 if args.out is not None:  # after each: a run that is stopped leaves what it has

@@ -11,6 +11,13 @@ if TYPE_CHECKING:
     from mplearn.evaluation import Table
 
 
+def exercises(setting: Setting) -> Iterator[Table]:
+    """Which activities own primitives, learned as they come, at several frame rates."""
+    from mplearn.evaluation.experiments import exercise_table
+
+    yield exercise_table(setting.annotated)
+
+
 def activities(setting: Setting) -> Iterator[Table]:
     """Which activity goes on when, the number of activities not given."""
     from mplearn.evaluation.experiments import activity_table
@@ -18,4 +25,4 @@ def activities(setting: Setting) -> Iterator[Table]:
     yield activity_table(setting.takes)
 
 
-EVALUATIONS = {"activities": activities}
+EVALUATIONS = {"exercises": exercises, "activities": activities}

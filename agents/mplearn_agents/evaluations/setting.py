@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mplearn.errors import InvalidValueError
+from mplearn.errors import InvalidValueError, MPLearnError, RecordingError
 
 if TYPE_CHECKING:
-    from mplearn.evaluation import LabelKind
+    from mplearn.evaluation import Annotations, LabelKind
     from mplearn.evaluation.experiments import Outcome, Seen
     from mplearn.recording import Recording
 
@@ -38,23 +38,87 @@ class Setting:
 
     @cached_property
     def recordings(self) -> tuple[Recording, ...]:
-        """All recordings of the data."""
-        from mplearn.mocap import open_recordings
+        """All recordings of the data that can be read, in the files' own channels."""
+        from mplearn.mocap import open_takes
 
-        return open_recordings(self.data)
+        opened = open_takes(self.data)
+        self._refused.update(opened.unreadable)
+        return opened.recordings
+
+    @cached_property
+    def bodies(self) -> tuple[Recording, ...]:
+        """The recordings as a learner takes them: people as points of one body, at own rates.
+
+        Recordings in which there are no points are taken as they are, those of most channels.
+        """
+        from mplearn.anatomy import as_bodies
+        from mplearn.evaluation import alike
+        from mplearn.mocap import Hints, open_takes
+
+        found = self.recordings
+        if not all(each.is_markers for each in found):
+            found = open_takes(self.data, positions=True, hints=Hints(joint_axes=True)).recordings
+        people = tuple(each for each in found if each.is_markers)
+        if not people:
+            return alike(found)
+        bodies = as_bodies(people)
+        self._refused.update(bodies.refused)
+        return bodies.recordings
+
+    @cached_property
+    def annotations(self) -> tuple[Annotations, ...]:
+        """Tables of labels that lie beside the recordings."""
+        from mplearn.evaluation import read_annotations
+
+        folder = Path(self.data) if Path(self.data).is_dir() else Path(self.data).parent
+        found: list[Annotations] = []
+        for path in sorted(folder.glob("*.json")):
+            try:
+                table = read_annotations(path)
+            except RecordingError as error:
+                self._refused[path.name] = error
+                continue
+            if table is not None:
+                found.append(table)
+        return tuple(found)
+
+    @cached_property
+    def annotated(self) -> list[tuple[str, tuple[Recording, ...]]]:
+        """The bodies with labels, those beside each first ("") and then each table's, by name."""
+        groups = [("", tuple(each for each in self.bodies if each.labels))]
+        groups += [(table.name, self._labelled(table, self.bodies)) for table in self.annotations]
+        return [(name, takes) for name, takes in groups if takes]
 
     @cached_property
     def kind(self) -> LabelKind:
         """What the labels of the recordings are."""
         from mplearn.evaluation import kind_of_labels
 
+        labelled = any(each.labels for each in self.recordings)
+        if not labelled and any(
+            each.name in table.stretches for table in self.annotations for each in self.recordings
+        ):
+            return "activities"
         return kind_of_labels(self.recordings)
 
     @property
-    def only_markers(self) -> bool:
-        """Whether there are markers, and no labels at all."""
-        labelled = any(each.labels for each in self.recordings)
-        return not labelled and any(each.is_markers for each in self.recordings)
+    def unlabelled(self) -> bool:
+        """Whether there are people, and no labels at all."""
+        if any(each.labels for each in self.recordings):
+            return False
+        known = {name for table in self.annotations for name in table.stretches}
+        return not any(each.name in known for each in self.recordings) and any(
+            each.is_markers or each.skeleton is not None for each in self.recordings
+        )
+
+    @property
+    def refused(self) -> Mapping[str, MPLearnError]:
+        """Why, by name, for what could not be read, recognised or observed so far."""
+        return self._refused
+
+    @cached_property
+    def _refused(self) -> dict[str, MPLearnError]:
+        return {}
 
     @cached_property
     def takes(self) -> tuple[Recording, ...]:
@@ -71,7 +135,7 @@ class Setting:
     @property
     def left_out(self) -> tuple[str, ...]:
         """Names of the recordings that are not."""
-        chosen = {take.name for take in self.takes}
+        chosen = {take.name for take in self.takes} | set(self.refused)
         return tuple(each.name for each in self.recordings if each.name not in chosen)
 
     @cached_property
@@ -86,14 +150,39 @@ class Setting:
         return self._suitable([take for take in found if take.channels == first.channels])
 
     def _suitable(self, recordings: Sequence[Recording]) -> tuple[Recording, ...]:
-        from mplearn.evaluation import alike, repeating
+        from mplearn.evaluation import alike, lost_throughout, repeating
 
-        if self.only_markers:
-            return alike([each for each in recordings if each.is_markers])
+        if self.unlabelled:
+            return self.bodies
         if self.kind == "repetitions":
-            return alike(repeating(recordings))
+            whole = []
+            for each in recordings:
+                lost = lost_throughout(each)
+                if lost:
+                    self._refused[each.name] = RecordingError(f"{lost} is never seen")
+                else:
+                    whole.append(each)
+            return alike(repeating(whole))
         labelled = tuple(each for each in recordings if each.labels)
-        return labelled if self.kind == "activities" else alike(labelled)
+        if self.kind == "primitives":
+            return alike(labelled)
+        for table in self.annotations:
+            known = {each.name for each in labelled}
+            labelled += self._labelled(table, [r for r in recordings if r.name not in known])
+        return labelled
+
+    def _labelled(
+        self, table: Annotations, recordings: Sequence[Recording]
+    ) -> tuple[Recording, ...]:
+        """Return the recordings that a table names, with its labels."""
+        found: list[Recording] = []
+        for recording in recordings:
+            if table.stretches.get(recording.name):
+                try:
+                    found.append(table.label(recording))
+                except RecordingError as error:
+                    self._refused[f"{recording.name} ({table.name})"] = error
+        return tuple(found)
 
     @cached_property
     def paper_outcomes(self) -> list[tuple[str, Outcome]]:

@@ -29,7 +29,7 @@ OF_LABELS: Mapping[LabelKind, Mapping[str, Evaluation]] = {
     "activities": ACTIVITIES,
 }
 
-#: Experiments on markers without labels.
+#: Experiments on people without labels.
 UNLABELLED: Mapping[str, Evaluation] = {"inverse-kinematics": inverse_kinematics}
 
 
@@ -37,4 +37,4 @@ def evaluations_for(setting: Setting) -> Mapping[str, Evaluation]:
     """Return the experiments on a source of data, by name, in the order they are run."""
     if setting.data in BUILT_IN:
         return BUILT_IN[setting.data]
-    return UNLABELLED if setting.only_markers else OF_LABELS[setting.kind]
+    return UNLABELLED if setting.unlabelled else OF_LABELS[setting.kind]

@@ -4,6 +4,7 @@ from .activities import activity_table as activity_table
 from .anomaly import judge_paper_session as judge_paper_session
 from .anomaly import judge_people as judge_people
 from .boundaries import boundary_table as boundary_table
+from .exercises import exercise_table as exercise_table
 from .factorial import factorial_table as factorial_table
 from .generation import generation_table as generation_table
 from .inverse_kinematics import joint_error_table as joint_error_table

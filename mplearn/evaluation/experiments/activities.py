@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Iterable
 
 from ...activities import find_activities, postures_of
-from ...recording import IntArray, LabelledSegment, Recording
+from ...recording import IntArray, Recording
 from ..observing import observe
+from ..ownership import frame_labels
 from ..partitions import Agreement, agreement
 from ..table import Table
 
@@ -20,19 +18,11 @@ def activities_in(recording: Recording) -> IntArray:
     return find_activities(postures_of(seen.frames, seen.channels), seen.rate_hz)
 
 
-def true_activities(labels: Sequence[LabelledSegment], n_frames: int) -> NDArray[np.str_]:
-    """Return the label of each frame, shape (T,); empty where there is none."""
-    names = np.full(n_frames, "", dtype=f"<U{max(1, *(len(each.label) for each in labels))}")
-    for label in labels:
-        names[label.start : label.end] = label.label
-    return names
-
-
 def activity_table(recordings: Iterable[Recording]) -> Table:
     """Find the activities of labelled recordings and compare them with the labels."""
     rows = []
     for recording in recordings:
-        truth = true_activities(recording.labels, len(recording))
+        truth = frame_labels(recording.labels, len(recording))
         found = activities_in(recording)
         labelled = truth != ""
         rows.append(_row(recording.name, agreement(truth[labelled], found[labelled])))
