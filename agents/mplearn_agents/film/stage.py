@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mplearn.errors import MissingDependencyError
 from mplearn.recording import FloatArray
 
 if TYPE_CHECKING:
@@ -43,7 +42,7 @@ class Stage:
         import mujoco
 
         from mplearn_envs.rendering.overlay import BalanceMeter
-        from mplearn_envs.rendering.renderer import close_at_exit
+        from mplearn_envs.rendering.renderer import open_renderer
 
         self.bodies, self.size, self.balance = tuple(bodies), size, balance
         self._model = _scene(self.bodies)
@@ -56,14 +55,7 @@ class Stage:
         self._camera.distance = _DISTANCE_M
         self._camera.azimuth = 180.0 if len(self.bodies) > 1 else 165.0
         self._camera.elevation = -26.0 if balance else -5.0  # the floor must be seen
-        try:
-            self._renderer = mujoco.Renderer(self._model, height=size[1], width=size[0])
-        except Exception as error:  # what fails depends on the machine's graphics libraries
-            raise MissingDependencyError(
-                "there is no off-screen renderer here: install libegl1 and libgl1-mesa-dri, or "
-                "libosmesa6, and set MUJOCO_GL to 'egl' or 'osmesa'"
-            ) from error
-        close_at_exit(self._renderer)
+        self._renderer = open_renderer(self._model, *size)
         # shadows and reflections take three quarters of the time where there is no graphics card
         for effect in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
             self._renderer.scene.flags[effect] = 0

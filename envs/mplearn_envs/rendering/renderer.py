@@ -20,16 +20,7 @@ if TYPE_CHECKING:
     import mujoco.viewer
 
 _open: WeakSet[Any] = WeakSet()
-
-
-def close_at_exit(renderer: Any) -> None:
-    """Have a `mujoco.Renderer` closed before the interpreter ends, while its graphics still live.
-
-    Args:
-        renderer: It. One that is not needed before may be closed, or forgotten.
-    """
-    _open.add(renderer)
-    _register()
+_refusal: list[str] = []  # why nothing can be drawn here, once it is known
 
 
 @cache
@@ -41,6 +32,36 @@ def _register() -> None:
 def _close_all() -> None:
     for renderer in list(_open):
         renderer.close()
+
+
+def open_renderer(model: mujoco.MjModel, width: int, height: int) -> mujoco.Renderer:
+    """Return MuJoCo's off-screen renderer, which is closed before the interpreter ends.
+
+    One that is not needed before may be closed, or forgotten. Once it could not be opened, it is
+    not tried again: with some graphics libraries a second attempt aborts the process.
+
+    Raises:
+        MissingDependencyError: There is no off-screen rendering on this machine.
+        InvalidValueError: Pictures of this size cannot be drawn.
+    """
+    if _refusal:
+        raise MissingDependencyError(_refusal[0])
+    try:
+        renderer = mujoco.Renderer(model, height=height, width=width)
+    except (ImportError, AttributeError, RuntimeError, mujoco.FatalError) as error:
+        _refusal.append(
+            "pictures need an off-screen renderer: install libegl1 and libgl1-mesa-dri and set "
+            "MUJOCO_GL=egl, or libosmesa6 and MUJOCO_GL=osmesa, before the process starts "
+            f"({error})"
+        )
+        raise MissingDependencyError(_refusal[0]) from error
+    except ValueError as error:
+        raise InvalidValueError(
+            f"pictures of {width} x {height} cannot be drawn: {error}"
+        ) from error
+    _open.add(renderer)
+    _register()
+    return renderer
 
 
 class Renderer:
@@ -69,18 +90,7 @@ class Renderer:
         shadows: bool = False,
         balance: bool = False,
     ) -> None:
-        try:
-            self._renderer = mujoco.Renderer(model, height=height, width=width)
-        except (ImportError, AttributeError, RuntimeError, mujoco.FatalError) as error:
-            raise MissingDependencyError(
-                "pictures need an off-screen renderer: install libegl1 and libgl1-mesa-dri and set "
-                f"MUJOCO_GL=egl, or libosmesa6 and MUJOCO_GL=osmesa ({error})"
-            ) from error
-        except ValueError as error:
-            raise InvalidValueError(
-                f"pictures of {width} x {height} cannot be drawn: {error}"
-            ) from error
-        close_at_exit(self._renderer)
+        self._renderer = open_renderer(model, width, height)
         self._meter = BalanceMeter(model) if balance else None
         self.camera = mujoco.MjvCamera()
         self.camera.azimuth = azimuth_deg

@@ -20,6 +20,7 @@ from .feet import SOLES, below
 
 _LEVEL = 0.995  # least cosine between the floor and the foot of a robot at attention
 _HALF_SOLE_M = 0.01
+_NEARLY_RAD = 0.1  # so far from zero a hinge may stand at attention without being told
 
 
 def read_spec(source: str | Path, name: str) -> Any:
@@ -71,8 +72,9 @@ def move_zero(spec: Any, attention: Mapping[str, float], name: str) -> None:
         for joint in reversed(body.joints):
             if joint.type == mujoco.mjtJoint.mjJNT_FREE:
                 continue
-            angle = attention.get(joint.name, 0.0)
             low, high = joint.range if joint.range[0] < joint.range[1] else (-np.pi, np.pi)
+            nearest = float(np.clip(0.0, low, high))  # many a knee is never quite straight
+            angle = attention.get(joint.name, nearest if abs(nearest) < _NEARLY_RAD else 0.0)
             if not low - 1e-9 <= angle <= high + 1e-9:
                 raise RobotError(
                     f"robot {name!r} cannot stand at attention: {joint.name!r} at {angle:.3g} rad "

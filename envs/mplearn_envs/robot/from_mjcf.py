@@ -32,6 +32,7 @@ from .foreign import (
 )
 from .roles import NEEDED_ROLES, ROLES
 
+_UPRIGHT = 0.9999  # least real part of the base's quaternion
 _LOOSE = "hand_l"  # hinges that carry no segment (fingers) are driven like a hand's
 
 
@@ -54,6 +55,7 @@ def described(
     for hinge in attention:
         if hinge not in hinges:
             raise RobotError(f"robot {name!r} has no hinge {hinge!r}; it has {sorted(hinges)}")
+    _require_humanoid(compiled(spec, name), segments, name)
     take_out_drives(spec)
     move_zero(spec, attention, name)
     feet = (segments["foot_l"], segments["foot_r"])
@@ -80,6 +82,41 @@ def described(
         "segments": tuple((role, segments[role]) for role in ROLES if role in segments),
         "toes": foot_hinges(model, feet),
     }
+
+
+def _require_humanoid(model: mujoco.MjModel, segments: Mapping[str, str], name: str) -> None:
+    """Check that a model's joints are those of a humanoid on two feet.
+
+    Raises:
+        RobotError: They are not; it says all that is missing.
+    """
+    pelvis, found = segments["pelvis"], []
+    kinds = {int(mujoco.mjtJoint.mjJNT_BALL): "ball", int(mujoco.mjtJoint.mjJNT_SLIDE): "slide"}
+    free = [
+        model.body(int(model.jnt_bodyid[j])).name
+        for j in range(model.njnt)
+        if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE
+    ]
+    if free != [pelvis]:
+        found.append(
+            f"its pelvis {pelvis!r} must float, by the only free joint; there float {free}"
+        )
+    elif abs(model.body(pelvis).quat[0]) < _UPRIGHT:
+        turned = model.body(pelvis).quat.round(3).tolist()
+        found.append(
+            f"{pelvis!r} must stand with its x axis ahead and its z axis up; it is turned by the "
+            f"quaternion {turned}"
+        )
+    for j in range(model.njnt):
+        if int(model.jnt_type[j]) in kinds:
+            kind = kinds[int(model.jnt_type[j])]
+            found.append(f"{model.joint(j).name!r} is a {kind} joint, no hinge")
+    for side in "lr":
+        shank, foot = segments[f"shank_{side}"], segments[f"foot_{side}"]
+        if foot != shank and not _hinges_above(model, foot, shank):
+            found.append(f"there is no ankle, a hinge from {shank!r} to {foot!r}")
+    if found:
+        raise RobotError(f"robot {name!r} cannot be driven here: " + "; ".join(found))
 
 
 def hinge_roles(model: mujoco.MjModel, segments: Mapping[str, str]) -> dict[str, str]:

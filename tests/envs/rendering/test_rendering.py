@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import gymnasium
+import mujoco
 import numpy as np
 import pytest
 from standing_library import standing_library
@@ -97,3 +98,21 @@ def test_making_an_environment_is_light():
         f"print([m for m in {unwanted} if m in sys.modules])"
     )
     assert done.stdout.strip() == "[]"
+
+
+def test_what_could_not_be_drawn_is_not_tried_again(monkeypatch):
+    """A second attempt without a graphics library would abort the process."""
+    tried = []
+
+    def refuse(*args, **kwargs):
+        tried.append(args)
+        raise mujoco.FatalError("no graphics library")
+
+    monkeypatch.setattr("mplearn_envs.rendering.renderer._refusal", [])
+    monkeypatch.setattr(mujoco, "Renderer", refuse)
+    env = gymnasium.make(ID, library=standing_library(), render_mode="rgb_array")
+    env.reset()
+    for _ in range(3):
+        with pytest.raises(MissingDependencyError, match=r"install libegl1.*no graphics library"):
+            env.render()
+    assert len(tried) == 1

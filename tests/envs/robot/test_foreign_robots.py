@@ -4,6 +4,7 @@ import importlib.util
 import re
 from dataclasses import replace
 from math import pi
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -157,6 +158,43 @@ def test_hinges_within_the_feet_and_soles_must_be_described():
         replace(robot, toes=())
     with pytest.raises(RobotError, match="'sole_l' must be a box on body 'foot_r'"):
         replace(robot, feet=("foot_r", "foot_l"), toes=robot.toes)
+
+
+LIMBS = {"thigh": "{s}_thigh", "shank": "{s}_shin", "foot": "{s}_foot"}
+TORSO = {"pelvis": "pelvis", "chest": "torso"} | {
+    f"{role}_{s[0]}": body.format(s=s) for s in ("left", "right") for role, body in LIMBS.items()
+}
+CMU = {"pelvis": "root"} | {
+    f"{role}_{s}": f"{s}{bone}"
+    for s in "lr"
+    for role, bone in (("thigh", "femur"), ("shank", "tibia"), ("foot", "foot"))
+}
+
+
+@pytest.mark.parametrize(
+    ("package", "file", "segments", "missing"),
+    [
+        ("gymnasium", "envs/mujoco/assets/humanoid.xml", TORSO,
+         r"'pelvis' must float.*\['torso'\].*no ankle, a hinge from 'right_shin'"),
+        ("dm_control", "suite/humanoid.xml", TORSO, r"'pelvis' must float.*\['torso'\]"),
+        ("dm_control", "suite/humanoid_CMU.xml", CMU, r"'root' must stand with its x axis ahead"),
+        ("dm_control", "locomotion/walkers/assets/humanoid_CMU_V2020.xml", CMU,
+         r"'root' must float.*there float \[\]"),
+    ],
+)  # fmt: skip
+def test_known_humanoids_are_refused_with_all_that_is_missing(package, file, segments, missing):
+    folder = Path(importlib.util.find_spec(package).origin).parent
+    with pytest.raises(RobotError, match=missing):
+        Robot.from_mjcf(folder / file, "theirs", segments)
+
+
+def test_a_knee_that_is_never_quite_straight_stands_nearly_so():
+    text = biped().replace('range="-5 150"', 'range="1 150"')
+    robot = Robot.from_mjcf(text, "biped", BIPED_SEGMENTS)
+    knee = robot.joint_names.index("knee_l")
+    np.testing.assert_allclose(robot.position_limits[knee], np.radians([0, 149]), atol=1e-5)
+    with pytest.raises(RobotError, match="'knee_l' at 0 rad is outside"):
+        Robot.from_mjcf(biped().replace('range="-5 150"', 'range="20 150"'), "x", BIPED_SEGMENTS)
 
 
 def test_a_robot_without_a_foot_and_other_broken_descriptions():
