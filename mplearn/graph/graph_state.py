@@ -8,13 +8,13 @@ from typing import Annotated
 import numpy as np
 
 from ..recording import IntArray
-from ..state import WHOLE, Array, Range, State, require
+from ..state import WHOLE, Array, Range, SharedState, require
 
 _LONGEST_MS = 86_400_000
 
 
 @dataclass(frozen=True, eq=False)
-class GraphState(State):
+class GraphState(SharedState):
     """The counts of a graph.
 
     Attributes:

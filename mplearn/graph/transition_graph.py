@@ -59,6 +59,7 @@ class TransitionGraph:
     """
 
     _snapshot: TransitionGraph | None
+    _state: GraphState | None
     _usual: dict[int, FloatArray]  # by length of history: how surprising transitions were
     _view: nx.DiGraph | None
     _sampler: WalkSampler | None
@@ -450,15 +451,17 @@ class TransitionGraph:
     # ---- keeping
 
     def state(self) -> GraphState:
-        """Return all that was counted."""
-        return GraphState(
-            order=self.order,
-            concentration=self.concentration,
-            history_capacity=self.history_capacity,
-            ids=np.array(self.ids, dtype=np.int64),
-            edges=self._edges.rows,
-            histories=self._histories.to_array(),
-        )
+        """Return all that was counted: the same object as long as nothing more is."""
+        if self._state is None:
+            self._state = GraphState(
+                order=self.order,
+                concentration=self.concentration,
+                history_capacity=self.history_capacity,
+                ids=np.array(self.ids, dtype=np.int64),
+                edges=self._edges.rows,
+                histories=self._histories.to_array(),
+            )
+        return self._state
 
     @classmethod
     def from_state(cls, state: GraphState) -> TransitionGraph:
@@ -511,7 +514,7 @@ class TransitionGraph:
 
     def _forget(self) -> None:
         """Forget what was derived from the counts."""
-        self._snapshot = None
+        self._snapshot = self._state = None
         self._usual = {}
         self._view = None
         self._sampler = None

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 from ..errors import InvalidValueError
 from ..state import newer
 
+_MOST_POINTS, _MOST_SAMPLED = 1_000, 4_096  # all distances of the sample are kept
+
 
 @dataclass(frozen=True)
 class FormConfig:
@@ -29,8 +31,10 @@ class FormConfig:
     centring: float = 0.5
 
     def __post_init__(self) -> None:
-        if self.n_points < 2:
-            raise InvalidValueError(f"n_points must be at least 2, not {self.n_points}")
+        if not 2 <= self.n_points <= _MOST_POINTS:
+            raise InvalidValueError(
+                f"n_points must lie in [2, {_MOST_POINTS}], not {self.n_points}"
+            )
         if not (self.head >= 0 and self.ramp >= 0 and self.head + self.ramp < 1):
             raise InvalidValueError(
                 f"head and ramp must be at least 0 and below 1 together, "
@@ -164,6 +168,10 @@ class TreeConfig:
             "min_branch": 2,
             "merge_ratio": 0,
         }
+        if self.n_sampled > _MOST_SAMPLED:
+            raise InvalidValueError(
+                f"n_sampled must be at most {_MOST_SAMPLED}, not {self.n_sampled}"
+            )
         for name, low in lowest.items():
             if not getattr(self, name) >= low:
                 raise InvalidValueError(f"{name} must be at least {low}, not {getattr(self, name)}")

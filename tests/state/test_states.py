@@ -151,6 +151,15 @@ def test_what_is_wrong_is_named_with_its_place(changes, place, said):
     assert isinstance(caught.value, MPLearnError)
 
 
+def test_a_field_that_is_newer_than_a_file_takes_its_default():
+    older = to_plain(whole())
+    del older["form"]
+    assert from_plain(Whole, older) == whole()
+    del older["n_seen"]
+    with pytest.raises(StateError, match="n_seen: is missing"):
+        from_plain(Whole, older)
+
+
 def bad_part(**changes):
     return to_plain(whole()) | {"parts": [to_plain(part(0)), to_plain(part(1)) | changes]}
 
