@@ -53,7 +53,7 @@ class GapsState(State):
     """
 
     position: Annotated[FloatArray, Array("m", 3, nan=True)]
-    velocity: Annotated[FloatArray, Array("m", 3)]
+    velocity: Annotated[FloatArray, Array("m", 3, nan=True)]
     last: Annotated[FloatArray, Array("m", 3, nan=True)]
     unseen_frames: Annotated[IntArray, Array("m", low=0)]
     neighbours: RigidityState
@@ -63,8 +63,9 @@ class GapsState(State):
         lost = np.isnan(self.last)
         whole = bool((lost.all(axis=1) == lost.any(axis=1)).all())
         require(whole, "last", "must be finite, or missing, in all of x, y, z")
-        known = bool((lost | np.isfinite(self.position)).all())
-        require(known, "position", "must be finite where a marker is tracked")
+        for name in ("position", "velocity"):
+            known = bool((lost | np.isfinite(getattr(self, name))).all())
+            require(known, name, "must be finite where a marker is tracked")
         frames = self.neighbours.frames
         fits = bool((self.unseen_frames <= frames).all())
         require(fits, "unseen_frames", f"must be at most {frames}")
