@@ -7,6 +7,7 @@ import pytest
 from standing_library import standing_library
 
 from mplearn.errors import InvalidValueError
+from mplearn.library import PrimitiveLibrary
 from mplearn_agents.cli import main
 from mplearn_agents.rl import ProjectIllegal, TrainedPolicy, TrainingConfig
 from mplearn_agents.rl.config import VERSION
@@ -62,6 +63,22 @@ def test_an_agent_is_loaded_as_it_was_left(folder, agent):
         np.testing.assert_array_equal(weights(loaded)[name], value)
     assert loaded.config == agent.config
     assert loaded.slots == agent.slots == {3: 1, 4: 2, 5: 3, 6: 4}
+
+
+def test_an_agent_is_refused_on_another_library_of_the_same_ids(folder, config):
+    """Ids and slots agree, and what they stand for does not."""
+    library = PrimitiveLibrary.load(config.library)
+    others = library.primitives[2:] + library.primitives[:2]
+    swapped = tuple(
+        replace(other, id=own.id, name=own.name)
+        for own, other in zip(library.primitives, others, strict=True)
+    )
+    agent = TrainedPolicy.load(folder / "whole")
+    agent.require_fit(make_environment(config))
+    path = replace(library, primitives=swapped).save(folder / "swapped.mplearn")
+    env = make_environment(replace(config, library=str(path)))
+    with pytest.raises(InvalidValueError, match=r"another library: the primitives \[3, 4, 5, 6\]"):
+        agent.require_fit(env)
 
 
 def test_no_agent_ever_takes_an_illegal_action(folder, config):

@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> None:
 
     trained = TrainingConfig(task="free")
     if args.agent is not None:
-        trained, _ = TrainingConfig.load(args.agent / CONFIG)
+        trained, *_ = TrainingConfig.load(args.agent / CONFIG)
     env = gymnasium.make(
         "mplearn/PrimitiveHumanoid-v0",
         library=args.library or trained.library,

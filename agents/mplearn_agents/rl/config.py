@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
@@ -11,6 +12,7 @@ from mplearn.errors import InvalidValueError, MPLearnError
 from mplearn_agents.suited import PriorUse as PriorUse
 
 VERSION = 2  # of agents: changes with networks, what they see, and what tasks show
+Ends: TypeAlias = list[list[float]]  # the tracked coordinates where a motion begins and ends
 AlgorithmName: TypeAlias = Literal["maskable-ppo", "ppo", "dqn"]
 
 
@@ -60,14 +62,15 @@ class TrainingConfig:
         if self.seed < 0:
             raise InvalidValueError(f"seed must not be negative, but is {self.seed}")
 
-    def save(self, path: Path, slots: dict[int, int]) -> None:
-        """Write this as JSON, with the slot of each primitive that the agent knows."""
-        kept = {str(id): slot for id, slot in slots.items()}
-        values = {"version": VERSION, **asdict(self), "slots": kept}
+    def save(self, path: Path, slots: Mapping[int, int], ends: Mapping[int, Ends]) -> None:
+        """Write this as JSON, with the slot and the ends of each primitive that the agent knows."""
+        values = {"version": VERSION, **asdict(self)}
+        values["slots"] = {str(id): slot for id, slot in slots.items()}
+        values["ends"] = {str(id): both for id, both in ends.items()}
         path.write_text(json.dumps(values, indent=2) + "\n", "utf-8")
 
     @classmethod
-    def load(cls, path: Path) -> tuple[TrainingConfig, dict[int, int]]:
+    def load(cls, path: Path) -> tuple[TrainingConfig, dict[int, int], dict[int, Ends]]:
         """Return what `save` wrote.
 
         Raises:
@@ -82,7 +85,8 @@ class TrainingConfig:
                     f"version {VERSION}, whose networks differ: train it again"
                 )
             slots = {int(id): int(slot) for id, slot in values.pop("slots").items()}
-            return cls(**values), slots
+            ends = {int(id): both for id, both in values.pop("ends", {}).items()}
+            return cls(**values), slots, ends
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             if isinstance(error, MPLearnError):
                 raise

@@ -14,7 +14,7 @@ from mplearn.errors import InvalidValueError
 
 from .algorithms import new_model
 from .features import features_of
-from .trained import TrainedPolicy
+from .trained import TrainedPolicy, ends_of, same_motion
 
 
 def grow(agent: TrainedPolicy, env: gymnasium.Env[Any, Any]) -> TrainedPolicy:
@@ -35,7 +35,12 @@ def grow(agent: TrainedPolicy, env: gymnasium.Env[Any, Any]) -> TrainedPolicy:
     if agent.config.algorithm == "dqn":
         raise InvalidValueError("agents of maskable-ppo and ppo can grow, not of dqn")
     slots: dict[int, int] = dict(env.unwrapped.repertoire.slots)  # type: ignore[attr-defined]
-    moved = {0: 0} | {agent.slots[id]: slots[id] for id in agent.slots if id in slots}
+    ends = ends_of(env)
+    moved = {0: 0} | {
+        agent.slots[id]: slots[id]
+        for id in agent.slots
+        if id in slots and same_motion(agent.ends.get(id, ends[id]), ends[id])
+    }
     model = new_model(agent.config, DummyVecEnv([lambda: env]), agent.scaling)
     known: dict[str, Tensor] = agent.model.policy.state_dict()
     grown: dict[str, Tensor] = model.policy.state_dict()
@@ -51,7 +56,7 @@ def grow(agent: TrainedPolicy, env: gymnasium.Env[Any, Any]) -> TrainedPolicy:
                 _copy_actions(old, new, moved)
             elif not name.startswith(("features_extractor.", "pi_features", "vf_features")):
                 new.copy_(old)
-    return TrainedPolicy(model, agent.config, slots, agent.deterministic)
+    return TrainedPolicy(model, agent.config, slots, agent.deterministic, ends)
 
 
 def _columns(old: Any, new: Any, moved: Mapping[int, int]) -> dict[int, int]:

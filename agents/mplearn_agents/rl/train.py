@@ -22,7 +22,7 @@ from mplearn_agents.extras import require
 from .config import TrainingConfig
 from .encoding import measure_scaling
 from .projection import ProjectIllegal
-from .trained import CONFIG, POLICY, TrainedPolicy
+from .trained import CONFIG, POLICY, TrainedPolicy, ends_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -99,7 +99,8 @@ def train(
     tested = make_environment(config)
     slots = dict(tested.unwrapped.repertoire.slots)  # type: ignore[attr-defined]
     out.mkdir(parents=True, exist_ok=True)
-    config.save(out / CONFIG, slots)
+    ends = ends_of(tested)
+    config.save(out / CONFIG, slots, ends)
     if done:
         model = load_model(config.algorithm, out / _CHECKPOINT.format(done), envs)
     else:
@@ -109,7 +110,7 @@ def train(
             start.require_fit(tested)
             model.policy.load_state_dict(start.model.policy.state_dict())
     model.set_logger(configure(str(out / "log" / f"from-{done:09d}"), ["csv", "tensorboard"]))
-    policy = TrainedPolicy(model, config, slots)
+    policy = TrainedPolicy(model, config, slots, ends=ends)
     progress = ShowProgress(config, console)
     evaluation = Evaluation(policy, tested, config, out / "evaluation.csv")
     rollout = rollout_steps(config.algorithm)
@@ -138,7 +139,7 @@ def _steps_done(config: TrainingConfig, out: Path, resume: bool) -> int:
         return 0
     if not resume:
         raise InvalidValueError(f"{out} holds a training: resume it, or take another folder")
-    before, _ = TrainingConfig.load(out / CONFIG)
+    before, *_ = TrainingConfig.load(out / CONFIG)
     if replace(before, steps=config.steps) != config:
         raise InvalidValueError(f"{out} holds another training, {before}, not {config}")
     found = sorted(out.glob("checkpoint-*.zip"))

@@ -12,8 +12,9 @@ import numpy as np
 from mplearn.errors import InvalidValueError
 from mplearn_agents.extras import require
 from mplearn_agents.policies import Policy, legal_actions
+from mplearn_envs.skills.repertoire import ENTRY_GAP
 
-from .config import TrainingConfig
+from .config import Ends, TrainingConfig
 from .encoding import Scaling
 from .projection import project
 
@@ -29,6 +30,8 @@ class TrainedPolicy(Policy):
         config: How it is trained.
         slots: Slot of each primitive that it knows, by id.
         deterministic: Whether to take the best action, or to draw one.
+        ends: Where the motion of each primitive that it knows begins and ends, see `ends_of`; None
+            where that is not known.
     """
 
     def __init__(
@@ -37,11 +40,13 @@ class TrainedPolicy(Policy):
         config: TrainingConfig,
         slots: Mapping[int, int],
         deterministic: bool = True,
+        ends: Mapping[int, Ends] | None = None,
     ) -> None:
         self.model = model
         self.config = config
         self.slots = dict(slots)
         self.deterministic = deterministic
+        self.ends = dict(ends or {})
 
     @classmethod
     def load(cls, folder: str | Path, deterministic: bool = True) -> TrainedPolicy:
@@ -55,10 +60,11 @@ class TrainedPolicy(Policy):
         from .algorithms import load_model
 
         folder = Path(folder)
-        config, slots = TrainingConfig.load(folder / CONFIG)
+        config, slots, ends = TrainingConfig.load(folder / CONFIG)
         if not (folder / POLICY).is_file():
             raise InvalidValueError(f"{folder} holds no {POLICY}: the training has not ended")
-        return cls(load_model(config.algorithm, folder / POLICY), config, slots, deterministic)
+        model = load_model(config.algorithm, folder / POLICY)
+        return cls(model, config, slots, deterministic, ends)
 
     @property
     def scaling(self) -> Scaling:
@@ -84,6 +90,13 @@ class TrainedPolicy(Policy):
                 f"the agent was trained on another library: the primitives {other} are new, gone, "
                 "or in other slots; take it along with mplearn_agents.rl.growing.grow"
             )
+        here = ends_of(env)
+        moved = [id for id, both in self.ends.items() if not same_motion(both, here[id])]
+        if moved:
+            raise InvalidValueError(
+                f"the agent was trained on another library: the primitives {moved} have the same "
+                "ids here, but begin or end in other postures; train an agent on this one"
+            )
 
     def reset(self, seed: int | None = None) -> None:
         """Seed torch, from which a policy that is not deterministic draws."""
@@ -97,3 +110,16 @@ class TrainedPolicy(Policy):
         given = {"action_masks": mask} if self.config.algorithm == "maskable-ppo" else {}
         action, _ = self.model.predict(kept, deterministic=self.deterministic, **given)
         return project(int(action), mask)
+
+
+def ends_of(env: gymnasium.Env[Any, Any]) -> dict[int, Ends]:
+    """Return where the motion of each primitive of an environment begins and ends, by id."""
+    repertoire = env.unwrapped.repertoire  # type: ignore[attr-defined]
+    return {
+        id: repertoire.skills[id].motion.frames[[0, -1]].round(3).tolist() for id in repertoire.ids
+    }
+
+
+def same_motion(ours: Ends, theirs: Ends) -> bool:
+    """Return whether two motions begin and end in about the same postures."""
+    return bool(np.abs(np.subtract(ours, theirs)).max() <= ENTRY_GAP)
