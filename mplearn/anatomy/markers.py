@@ -17,6 +17,7 @@ from ..errors import BodyError
 from ..mocap.options import option
 from ..recording import FloatArray, Recording
 from .body_map import BodyMap
+from .facing import check_facing
 from .labels import landmarks_of, names_joints
 
 SOME_FRAMES = 120  # of a recording are looked at
@@ -78,6 +79,9 @@ def recognise_markers(recording: Recording, names: Mapping[str, str] | None = No
             f"and shoulders, and how the trunk stands cannot be told from fewer than "
             f"{FEWEST_ON_TRUNK}; {option('names')} says which marker sits where"
         )
+    check_facing(
+        recording.name, {place: some[:, labels.index(label)] for label, place in found.items()}
+    )
     return _map(labels, found, warnings=tuple(warnings))
 
 

@@ -24,6 +24,7 @@ from .person import Person
 from .placing import Placing
 from .plan import find_plan
 
+MOST_NODES = 400  # joints at different places; the largest skeletons of people have 165 joints
 SOME_FRAMES = 120  # of a recording are looked at
 
 
@@ -47,7 +48,7 @@ def recognise_skeleton(recording: Recording, names: Mapping[str, str] | None = N
     if not len(some):
         raise BodyError(f"recording {recording.name!r} has no frame in which all joints are known")
     tree = JointTree.of(body, some[:, : len(body)])
-    plan = find_plan(tree)
+    plan = find_plan(tree) if len(tree) <= MOST_NODES else None
     if plan is None or plan.legs is None or plan.arms is None:
         if names:
             return recognise_markers(recording, names)

@@ -54,3 +54,11 @@ def test_labels_that_nobody_knows_are_refused_with_the_option(truth):
     told = dict(zip(unknown.marker_names, SETS["cast"].values(), strict=True))
     body = recognise(unknown, names=told)
     assert body.places == tuple(SETS["cast"].values())
+
+
+@pytest.mark.parametrize("name", [name for name in SETS if name != "plug_in_gait_virtual"])
+def test_nobody_is_mirrored(truth, name):
+    recording = labelled(name, truth.body, truth.postures, 25.0)
+    mirrored = recording.markers * (1, -1, 1)
+    with pytest.raises(BodyError, match="mirrored"):
+        recognise(replace(recording, frames=mirrored.reshape(len(mirrored), -1)))

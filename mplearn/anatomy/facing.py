@@ -1,0 +1,60 @@
+"""Whether a person in landmarks faces where feet, face and pelvis say, or is mirrored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..errors import BodyError
+from ..mocap.options import option
+from ..recording import FloatArray
+
+# from what lies behind to what lies ahead of it
+_AHEAD = (
+    *((f"heel_back_{s}", toe) for s in "lr" for toe in (f"toe_tip_{s}", f"metatarsal2_{s}")),
+    *((f"ankle_{s}", f"toe_tip_{s}") for s in "lr"),
+    *((f"ankle_outer_{s}", f"metatarsal2_{s}") for s in "lr"),
+    *((f"iliac_back_{s}", f"iliac_front_{s}") for s in "lr"),
+    *(("sacrum", f"iliac_front_{s}") for s in "lr"),
+    *((f"ear_{s}", "nose") for s in "lr"),
+    *(("c7", "jugular_notch"), ("t10", "xiphoid"), ("head_rear", "head_front")),
+)
+_ACROSS = ("hip", "iliac_front", "iliac_back", "trochanter", "acromion", "shoulder", "knee_outer")
+MIRRORED = -0.3  # mean cosine between ahead by the sides' names and ahead by the landmarks
+
+
+def check_facing(name: str, at: Mapping[str, FloatArray]) -> None:
+    """Refuse a person whose left and right are exchanged.
+
+    Args:
+        name: What the recording is called.
+        at: Where each landmark is in some frames, shape (T, 3) [m], z up; NaN where missing.
+
+    Raises:
+        BodyError: Feet, face and pelvis point backwards if left is where the names say.
+    """
+    across = [
+        at[f"{place}_l"] - at[f"{place}_r"]
+        for place in _ACROSS
+        if f"{place}_l" in at and f"{place}_r" in at
+    ]
+    ways = [at[ahead] - at[behind] for behind, ahead in _AHEAD if {behind, ahead} <= at.keys()]
+    if not across or not ways:
+        return
+    left = across[0] * (1.0, 1.0, 0.0)
+    forward = np.cross(left, (0.0, 0.0, 1.0))
+    cosines = []
+    for way in ways:
+        level = way * (1.0, 1.0, 0.0)
+        lengths = np.linalg.norm(level, axis=1) * np.linalg.norm(forward, axis=1)
+        each = (level * forward).sum(axis=1) / np.maximum(lengths, 1e-9)
+        each = each[np.isfinite(each)]
+        if len(each):
+            cosines.append(float(np.median(each)))
+    if cosines and np.mean(cosines) < MIRRORED:
+        raise BodyError(
+            f"{name!r} is mirrored: with left and right as the labels say, feet and face point "
+            f"backwards; is an axis turned round, or are the labels exchanged? {option('names')} "
+            "says which marker sits where"
+        )
