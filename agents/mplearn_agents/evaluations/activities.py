@@ -18,6 +18,15 @@ def exercises(setting: Setting) -> Iterator[Table]:
     yield exercise_table(setting.annotated)
 
 
+def rhythm(setting: Setting) -> Iterator[Table]:
+    """Cuts a cycle, and the spread of their phase, in walking and in whatever repeats."""
+    from mplearn.evaluation.experiments import rhythm_table
+
+    table = rhythm_table(setting.described)
+    if table.rows:
+        yield table
+
+
 def activities(setting: Setting) -> Iterator[Table]:
     """Which activity goes on when, the number of activities not given."""
     from mplearn.evaluation.experiments import activity_table
@@ -25,4 +34,4 @@ def activities(setting: Setting) -> Iterator[Table]:
     yield activity_table(setting.takes)
 
 
-EVALUATIONS = {"exercises": exercises, "activities": activities}
+EVALUATIONS = {"exercises": exercises, "rhythm": rhythm, "activities": activities}

@@ -89,6 +89,12 @@ class Setting:
         groups += [(table.name, self._labelled(table, self.bodies)) for table in self.annotations]
         return [(name, takes) for name, takes in groups if takes]
 
+    @property
+    def described(self) -> tuple[Recording, ...]:
+        """All bodies, each once, with the first labels that there are of it."""
+        labelled = {take.name: take for _, takes in reversed(self.annotated) for take in takes}
+        return tuple(labelled.get(take.name, take) for take in self.bodies)
+
     @cached_property
     def kind(self) -> LabelKind:
         """What the labels of the recordings are."""

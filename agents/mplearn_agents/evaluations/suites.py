@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, TypeAlias
 
 from .activities import EVALUATIONS as ACTIVITIES
+from .activities import rhythm
 from .people import EVALUATIONS as PEOPLE
 from .people import inverse_kinematics
 from .robot import EVALUATIONS as ROBOT
@@ -30,7 +31,10 @@ OF_LABELS: Mapping[LabelKind, Mapping[str, Evaluation]] = {
 }
 
 #: Experiments on people without labels.
-UNLABELLED: Mapping[str, Evaluation] = {"inverse-kinematics": inverse_kinematics}
+UNLABELLED: Mapping[str, Evaluation] = {
+    "rhythm": rhythm,
+    "inverse-kinematics": inverse_kinematics,
+}
 
 
 def evaluations_for(setting: Setting) -> Mapping[str, Evaluation]:

@@ -21,6 +21,7 @@ from .prediction import foretell_sessions as foretell_sessions
 from .prediction import prediction_table as prediction_table
 from .presentations import presentation_table as presentation_table
 from .rejection import rejection_table as rejection_table
+from .rhythm import rhythm_table as rhythm_table
 from .scaffolding import scaffolding_table as scaffolding_table
 from .seen import Seen as Seen
 from .sessions import by_person as by_person

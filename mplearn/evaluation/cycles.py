@@ -1,0 +1,180 @@
+"""Where the cycles of rhythmic motion turn, found with look-ahead, and how cuts lie in them.
+
+The truth knows what no on-line segmenter may: the whole motion. Steps turn where one ankle is
+farthest ahead of the other, which is about where a foot strikes; other motion where its main
+oscillation, the first principal component of the posture, is at an extreme. Only what repeats
+counts: a bout ends where a half of a cycle lasts much longer, or leads much farther, than the one
+a cycle before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import butter, find_peaks, sosfiltfilt
+
+from ..recording import FloatArray, IntArray
+
+BAND_HZ = (0.2, 4.0)
+"""Cycles are sought from a fifth to four in a second [1/s]."""
+
+STEP_M = 0.1
+"""Least prominence of an extreme of one ankle ahead of the other: half of a short step [m]."""
+
+PROMINENCE = 0.35  # of the oscillation's usual height, for other motion
+LEAST_CYCLES = 1.5  # of a bout of labelled motion
+LEAST_STRIDES = 2.0  # of a bout of steps, which nobody says are steps
+_LONGEST_S = 2.5  # half of a cycle
+_LONGER, _FARTHER = 1.7, 2.0  # than a cycle before, at most
+_EDGE_S = 0.1  # cuts this near to an end of a bout belong half to it
+
+
+@dataclass(frozen=True)
+class Bout:
+    """A stretch of rhythmic motion.
+
+    Attributes:
+        label: What goes on.
+        turns: Frames at which the motion turns, twice a cycle, length n >= 4.
+    """
+
+    label: str
+    turns: IntArray
+
+    @property
+    def n_cycles(self) -> float:
+        """How many cycles it holds."""
+        return 0.5 * (len(self.turns) - 1)
+
+
+@dataclass(frozen=True)
+class CutScore:
+    """How cuts lie in the cycles of a bout.
+
+    Attributes:
+        bout: The bout.
+        per_cycle: Cuts a cycle.
+        spread: Root mean square distance of the cuts' phases from the mean of their half of the
+            cycle [cycle]; NaN for fewer than three cuts.
+    """
+
+    bout: Bout
+    per_cycle: float
+    spread: float
+
+
+def find_steps(ahead: FloatArray, rate_hz: float) -> list[Bout]:
+    """Return the bouts of walking and running.
+
+    Args:
+        ahead: How far the left ankle is ahead of the right one, shape (T,) [m].
+        rate_hz: Frames per second [1/s].
+    """
+    band = _band(ahead, rate_hz)
+    return [] if band is None else _bouts("steps", band, STEP_M, LEAST_STRIDES, rate_hz)
+
+
+def find_oscillation(label: str, posture: FloatArray, rate_hz: float) -> list[Bout]:
+    """Return the bouts of the main oscillation of a motion.
+
+    Args:
+        label: What goes on.
+        posture: The motion, shape (T, D).
+        rate_hz: Frames per second [1/s].
+    """
+    band = _band(posture, rate_hz)
+    if band is None:
+        return []
+    main = band @ np.linalg.svd(band, full_matrices=False)[2][0]
+    height = 2 * np.sqrt(2) * float(main.std())
+    return _bouts(label, main, PROMINENCE * height, LEAST_CYCLES, rate_hz) if height > 0 else []
+
+
+def shifted(bout: Bout, frames: int) -> Bout:
+    """Return a bout that was found in a piece of a take, in frames of the take."""
+    return Bout(bout.label, bout.turns + frames)
+
+
+def score_cuts(bout: Bout, cuts: Iterable[int], rate_hz: float) -> CutScore:
+    """Return how cuts lie in the cycles of a bout.
+
+    A phase is linear between turns. The cuts are divided into halves of the cycle, so that cuts at
+    both turns, as at one, have a small spread.
+
+    Args:
+        bout: The bout.
+        cuts: Frames of all boundaries of the take.
+        rate_hz: Frames per second [1/s].
+    """
+    edge = _EDGE_S * rate_hz
+    first, last = bout.turns[0], bout.turns[-1]
+    found = np.asarray(sorted(cuts), dtype=np.float64)
+    found = found[(found >= first - edge) & (found <= last + edge)]
+    inner = int(((found > first + edge) & (found < last - edge)).sum())
+    per_cycle = (inner + 0.5 * (len(found) - inner)) / bout.n_cycles
+    if len(found) < 3:
+        return CutScore(bout, per_cycle, float("nan"))
+    phase = np.interp(found, bout.turns, 0.5 * np.arange(len(bout.turns)))
+    centre = np.angle(np.exp(4j * np.pi * phase).mean()) / (4 * np.pi)
+    halves = 2 * (phase - centre)
+    half = np.round(halves)
+    off = 0.5 * (halves - half)
+    for parity in (0, 1):
+        of_one = half % 2 == parity
+        if of_one.any():
+            off[of_one] -= off[of_one].mean()
+    return CutScore(bout, per_cycle, float(np.sqrt((off**2).mean())))
+
+
+def _band(motion: FloatArray, rate_hz: float) -> FloatArray | None:
+    """Return the part of a motion in which cycles lie; None where it is too short."""
+    if len(motion) < max(30, round(rate_hz)):
+        return None
+    high = min(BAND_HZ[1], 0.4 * rate_hz)
+    filt = butter(2, [BAND_HZ[0], high], "bandpass", fs=rate_hz, output="sos")
+    centred = motion - motion.mean(axis=0)
+    return np.asarray(
+        sosfiltfilt(filt, centred, axis=0, padlen=min(len(motion) - 2, round(rate_hz)))
+    )
+
+
+def _bouts(
+    label: str, motion: FloatArray, prominence: float, least: float, rate_hz: float
+) -> list[Bout]:
+    turns, heights = _turns(motion, prominence)
+    lasts, leads = np.diff(turns), np.abs(np.diff(heights))
+    found: list[Bout] = []
+    start = 0
+    for i in range(len(lasts) + 1):
+        if i < len(lasts) and lasts[i] <= _LONGEST_S * rate_hz and _repeats(lasts, leads, start, i):
+            continue
+        if 0.5 * (i - start) >= least:
+            found.append(Bout(label, turns[start : i + 1]))
+        start = i if i < len(lasts) and lasts[i] <= _LONGEST_S * rate_hz else i + 1
+    return found
+
+
+def _repeats(lasts: IntArray, leads: FloatArray, start: int, i: int) -> bool:
+    """Whether a half of a cycle is like the one a cycle before, and leads as far as the last."""
+    if i - 2 >= start and not 1 / _LONGER <= lasts[i] / lasts[i - 2] <= _LONGER:
+        return False
+    return i - 1 < start or bool(1 / _FARTHER <= leads[i] / leads[i - 1] <= _FARTHER)
+
+
+def _turns(motion: FloatArray, prominence: float) -> tuple[IntArray, FloatArray]:
+    """Return the extremes of a motion, high and low in turn: frames and heights, length n each."""
+    found = [
+        (int(at), sign)
+        for sign in (1, -1)
+        for at in find_peaks(sign * motion, prominence=prominence)[0]
+    ]
+    kept: list[tuple[int, int]] = []
+    for at, sign in sorted(found):
+        if not kept or kept[-1][1] != sign:
+            kept.append((at, sign))
+        elif sign * motion[at] > sign * motion[kept[-1][0]]:  # of two alike, the farther one
+            kept[-1] = (at, sign)
+    turns = np.array([at for at, _ in kept], dtype=np.int64)
+    return turns, motion[turns]
