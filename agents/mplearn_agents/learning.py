@@ -14,6 +14,7 @@ from mplearn.learner import (
     FramesLost,
     MotionLearner,
     PrimitiveBorn,
+    PrimitiveForgotten,
     PrimitiveMerged,
     PrimitiveSplit,
     Recognised,
@@ -95,6 +96,9 @@ class LearningLog:
                 self.known.append((segment.end, len(self._alive)))
             case PrimitiveMerged(segment, _, absorbed):
                 self._alive.discard(absorbed)
+                self.known.append((segment.end, len(self._alive)))
+            case PrimitiveForgotten(segment, primitive):
+                self._alive.discard(primitive)
                 self.known.append((segment.end, len(self._alive)))
             case PrimitiveSplit(_, primitive, _):  # the new ones are born right after
                 self._alive.discard(primitive)

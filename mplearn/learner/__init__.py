@@ -8,6 +8,8 @@ from .events import Event as Event
 from .events import FramesLost as FramesLost
 from .events import PersonChanged as PersonChanged
 from .events import PrimitiveBorn as PrimitiveBorn
+from .events import PrimitiveConfirmed as PrimitiveConfirmed
+from .events import PrimitiveForgotten as PrimitiveForgotten
 from .events import PrimitiveMerged as PrimitiveMerged
 from .events import PrimitiveSplit as PrimitiveSplit
 from .events import Recognised as Recognised

@@ -186,10 +186,6 @@ class Chain:
 
     def revise(self, change: Change) -> list[Event]:
         """Follow a change of the tree that a person asked for, and count what is known by it."""
-        for id in change.removed:
-            if id in self.graph:
-                self.graph.remove_node(id)
-            self._rename({id}, None)
         return self._revise(change, dict(change.moved))
 
     def _revise(self, change: Placement | Change, moved: Mapping[int, int]) -> list[Event]:
@@ -200,6 +196,10 @@ class Chain:
         for split in change.splits:
             self.graph.remove_node(split.node)
             self._rename({split.node}, None)
+        for id in change.removed:
+            if id in self.graph:
+                self.graph.remove_node(id)
+            self._rename({id}, None)
         for link in self._links:
             link.primitive = moved.get(link.number, link.primitive)
             if link.primitive == ROOT:

@@ -49,11 +49,42 @@ class PrimitiveBorn:
         segment: The segment whose arrival formed it.
         primitive: Its id, for life.
         exemplars: How many demonstrations it was formed from.
+        provisional: Whether it is yet to be confirmed by more (`TreeConfig.confirmed`); it is
+            recognised all the same.
     """
 
     segment: Segment
     primitive: int
     exemplars: int
+    provisional: bool = False
+
+
+@dataclass(frozen=True)
+class PrimitiveConfirmed:
+    """A provisional primitive has been shown often enough to be sure.
+
+    Attributes:
+        segment: The segment that confirmed it.
+        primitive: Its id.
+        exemplars: How many demonstrations it has by now.
+    """
+
+    segment: Segment
+    primitive: int
+    exemplars: int
+
+
+@dataclass(frozen=True)
+class PrimitiveForgotten:
+    """A provisional primitive was never confirmed, and is gone.
+
+    Attributes:
+        segment: The segment whose arrival made it too old.
+        primitive: Id that it had.
+    """
+
+    segment: Segment
+    primitive: int
 
 
 @dataclass(frozen=True)
@@ -172,6 +203,8 @@ Event: TypeAlias = (
     SegmentClosed
     | Recognised
     | PrimitiveBorn
+    | PrimitiveConfirmed
+    | PrimitiveForgotten
     | PrimitiveMerged
     | PrimitiveSplit
     | TransitionSeen

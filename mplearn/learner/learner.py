@@ -5,6 +5,7 @@ frame of markers -> gap tracking -> inverse kinematics -> segmentation -> tree -
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -32,6 +33,8 @@ from .events import (
     FramesLost,
     PersonChanged,
     PrimitiveBorn,
+    PrimitiveConfirmed,
+    PrimitiveForgotten,
     PrimitiveMerged,
     PrimitiveSplit,
     Recognised,
@@ -437,9 +440,22 @@ class MotionLearner:
         events += [PrimitiveSplit(segment, each.node, each.into) for each in placement.splits]
         events += [PrimitiveMerged(segment, *each) for each in placement.merges]
         for id in placement.born:
-            events += [PrimitiveBorn(segment, id, len(self.tree.node(id).members))]
+            shown, provisional = self.tree.n_placed(id), self.tree.is_provisional(id)
+            events += [PrimitiveBorn(segment, id, shown, provisional)]
+        events += self._judged(segment, placement)
         events.extend(self.chain.follow(segment, placement, self.config.false_alarms))
         return events
+
+    def _judged(self, segment: Segment, placement: Placement) -> list[Event]:
+        """Return which provisional primitives a segment confirmed, and which are forgotten."""
+        came = Counter([placement.node_id, *(to for _, to in placement.moved)])
+        events: list[Event] = []
+        for id in sorted((came.keys() - set(placement.born)) & set(self.tree.leaves)):
+            shown = self.tree.n_placed(id)
+            if shown - came[id] < self.config.tree.confirmed <= shown:
+                events.append(PrimitiveConfirmed(segment, id, shown))
+        gone = [id for id in placement.removed if id in self.graph]  # inner nodes are not
+        return events + [PrimitiveForgotten(segment, id) for id in gone]
 
     def _unlike(self, segment: Segment, placement: Placement) -> list[Event]:
         """Return the anomaly of a segment that was not recognised, if it is one."""

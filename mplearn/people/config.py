@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from ..errors import InvalidValueError
+from ..state import newer
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,10 @@ class PeopleConfig:
         reach: Distance up to which the next candidate counts in a tension.
         sided: A motion is another's mirror image, not the same, if its distance to the mirror image
             is below its distance to the motion itself times this.
+        min_exemplars: Members from which on a cluster becomes a leaf while there are several
+            people, if that is more than by the rules of the trees. Which leaves are one motion is
+            judged by their means, and those of two or three are too rough for it; a newcomer's
+            motions are known from others meanwhile.
         offset_prior: Primitives that a person must share before half of his or her usual deviation
             in posture is allowed for.
     """
@@ -39,11 +44,14 @@ class PeopleConfig:
     join: float = 0.85
     reach: float = 1.5
     sided: float = 0.75
+    min_exemplars: int = newer(4, absent=2)
     offset_prior: float = 1.0
 
     def __post_init__(self) -> None:
         for name in ("repertoire", "link", "link_own", "join", "reach", "sided", "offset_prior"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InvalidValueError(f"{name} must be positive, not {getattr(self, name)}")
+        if self.min_exemplars < 2:
+            raise InvalidValueError(f"min_exemplars must be at least 2, not {self.min_exemplars}")
         if not 0 <= self.posture <= 1:
             raise InvalidValueError(f"posture must lie in [0, 1], not {self.posture}")

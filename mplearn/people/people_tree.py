@@ -19,6 +19,7 @@ from ..tree import (
     Placement,
     PrimitiveTree,
     Recogniser,
+    Repetition,
     TreeConfig,
 )
 from ..tree.tree import TreeState
@@ -146,6 +147,12 @@ class PeopleTree:
         self._common = CommonRecogniser(config)
         self._models: dict[int, tuple[tuple[LeftRightHMM, ...], LeftRightHMM]] = {}
 
+    def _require_exemplars(self) -> None:
+        """Let births be as rare as several people need them to be."""
+        if self._sharing is not None:
+            for tree in self._trees.values():
+                tree.require_exemplars(self.people_config.min_exemplars)
+
     def _new_tree(self) -> PrimitiveTree:
         return PrimitiveTree(self.config, self.n_channels, self.rate_hz, self.groups)
 
@@ -219,6 +226,30 @@ class PeopleTree:
             known = self._models[id] = models, common_model(models, self.exemplars(id))
         return known[1]
 
+    def n_placed(self, id: int) -> int:
+        """Return how many segments were ever placed in a node, those of all people.
+
+        Raises:
+            UnknownPrimitiveError: There is no such node.
+        """
+        if self._sharing is None:
+            return self._only.node(id).n_placed
+        return sum(self._trees[p].node(leaf).n_placed for p, leaf in self._leaves_of(id))
+
+    def most_repeated(self) -> Repetition:
+        """Return what comes nearest to a primitive among the segments that wait to become one."""
+        found = [tree.most_repeated() for tree in self._trees.values()]
+        best = max(found, key=lambda each: (each.times, -each.apart))
+        return best._replace(n_waiting=sum(each.n_waiting for each in found))
+
+    def is_provisional(self, id: int) -> bool:
+        """Return whether too few demonstrations have confirmed a primitive as yet.
+
+        Raises:
+            UnknownPrimitiveError: There is no such node.
+        """
+        return self.n_placed(id) < self.config.confirmed
+
     def matrices(self, person: int) -> dict[int, FloatArray]:
         """Return the distances among a person's own exemplars of each primitive, shape (k, k).
 
@@ -269,6 +300,7 @@ class PeopleTree:
         elif person not in self._trees:
             self.sharing()
             self._trees[person] = self._new_tree()
+            self._require_exemplars()
         placement = self._trees[person].insert(frames)
         if placement.refused:
             return placement
@@ -353,12 +385,14 @@ class PeopleTree:
             self._sharing = Sharing(
                 self.config, self.people_config, self._trees, self._next_id, self.mirror
             )
+            self._require_exemplars()
         return self._sharing
 
     def adopt(self, trees: dict[int, PrimitiveTree], n_seen: int) -> None:
         """Go on with other trees, by person, that have seen so many segments."""
         self._trees, self.n_seen = trees, n_seen
         self._next_id = 1 + max(node.id for node in self.nodes)
+        self._require_exemplars()
 
     def copy(self) -> PeopleTree:
         """Return a tree that knows the same, and goes on apart; exemplars are shared."""
@@ -401,6 +435,7 @@ class PeopleTree:
             self._sharing = Sharing(*rules, {}, self._next_id, self.mirror)
             self._sharing.trees = trees
             self._sharing.load_state(state.sharing)
+            self._require_exemplars()
 
     def _check_widths(self, state: SharingState) -> None:
         """Check that shapes are such as this tree takes."""

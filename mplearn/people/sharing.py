@@ -114,7 +114,7 @@ class Sharing(SharedPrimitives):
             self.leaves, groups, before, self.trees, self.numbers, joined, person, placement
         )
         ids = identities(held)
-        born, merges, splits = [], [], []
+        born, merges, splits, removed = [], [], [], []
         for group in dict.fromkeys(groups):
             if group not in ids:
                 ids[group] = self.new_id()
@@ -130,6 +130,8 @@ class Sharing(SharedPrimitives):
                 self.put_above(id, [child for child in into if child in born])
             elif heirs:
                 merges.append(Merge(ids[heirs.most_common(1)[0][0]], id))
+            else:
+                removed.append(id)
         moved: list[tuple[int, int]] = []
         absorbed = {merge.absorbed: merge.kept for merge in merges}
         for leaf, group in zip(self.leaves, groups, strict=True):
@@ -140,7 +142,9 @@ class Sharing(SharedPrimitives):
         homes = [ids.get(group, ROOT) for group in of_waiting]
         moved += self.waiting.move(homes, absorbed, self.own())
         self.name_leaves()
-        change = Change(tuple(born), tuple(splits), tuple(merges), tuple(moved))
+        change = Change(
+            tuple(born), tuple(splits), tuple(merges), tuple(moved), removed=tuple(removed)
+        )
         return change.then(tidied(self.above, self.parents, self.primitives))
 
     def _tidy(self, person: int) -> None:

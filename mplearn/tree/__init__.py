@@ -21,4 +21,5 @@ from .recogniser import Recogniser as Recogniser
 from .recogniser import Recognition as Recognition
 from .relations import Relation as Relation
 from .relations import related as related
+from .repetitions import Repetition as Repetition
 from .tree import PrimitiveTree as PrimitiveTree

@@ -7,34 +7,42 @@ import numpy as np
 from ..recording import FloatArray, IntArray
 from .spread import pairs
 
-_COPY = 1e-6  # share of the mean distance below which one segment is a copy of another
 
-
-def clusters_below(matrix: FloatArray, cutoff: float, least: int) -> list[IntArray]:
+def clusters_below(
+    matrix: FloatArray, cutoff: float, least: int, pair_share: float = 1.0
+) -> list[IntArray]:
     """Return the clusters whose largest distance is at most ``cutoff``, tightest first.
+
+    Two that are near each other say less than three that are: pairs count only where there is no
+    larger cluster, and only below a share of the cutoff.
 
     Args:
         matrix: Distances, shape (n, n).
         cutoff: D_cutoff.
         least: Fewest members of a cluster.
+        pair_share: Largest distance of a pair over the cutoff.
 
     Returns:
         Positions of the members, in order.
     """
-    from scipy.cluster.hierarchy import fcluster, linkage
+    from scipy.cluster.hierarchy import linkage
 
     if len(matrix) < least or not cutoff >= 0:
         return []
-    labels = fcluster(linkage(pairs(matrix), "complete"), cutoff, "distance")
+    merges = linkage(pairs(matrix), "complete")
+    found = _cut(merges, matrix, cutoff, max(least, 3))
+    if found or least > 2:
+        return found
+    return _cut(merges, matrix, pair_share * cutoff, least)
+
+
+def _cut(merges: FloatArray, matrix: FloatArray, cutoff: float, least: int) -> list[IntArray]:
+    from scipy.cluster.hierarchy import fcluster
+
+    labels = fcluster(merges, cutoff, "distance")
     groups = [np.flatnonzero(labels == label) for label in np.unique(labels)]
-    large = [group for group in groups if evidence(matrix[np.ix_(group, group)]) >= least]
+    large = [group for group in groups if len(group) >= least]
     return sorted(large, key=lambda group: float(matrix[np.ix_(group, group)].max()))
-
-
-def evidence(matrix: FloatArray) -> float:
-    """Return how many demonstrations a group is worth; a copy of an earlier member counts half."""
-    copies = np.tril(matrix <= _COPY * matrix.mean(), -1).any(axis=1)
-    return len(matrix) - 0.5 * float(copies.sum())
 
 
 def two_branches(matrix: FloatArray, least: int) -> tuple[IntArray, IntArray] | None:

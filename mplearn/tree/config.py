@@ -65,12 +65,26 @@ class TreeConfig:
         local: Whether a cluster is formed below mu - cutoff * sigma of the node that grew, as
             printed (eq. 7), or below a scale taken from a sample of all segments ever seen.
         cutoff: K_cutoff of eq. 7.
-        spread: That scale over the lower quartile of the distances to the nearest neighbour, which
-            does not depend on how many primitives there are.
-        mean_share: Largest such scale, as a share of the mean distance; it holds while hardly any
-            motion has been seen twice.
-        min_exemplars: Members from which on a cluster becomes a node.
+        scale_share: That scale over the mean distance, times r to the `scale_power`, r being the
+            lower quartile of the distances to the nearest neighbour over the mean distance: small
+            where repetitions are very like, and yet never nothing.
+        scale_power: That power; 1 makes the scale a multiple of the quartile, 0 of the mean.
+        spread: Largest scale over that quartile; inf for no such bound.
+        mean_share: Largest scale over the mean distance; it holds while hardly any motion has been
+            seen twice.
+        min_exemplars: Members from which on a cluster becomes a node. With 2 a motion is known as
+            soon as it comes again, and a chance pair can take its place for a while; on people's
+            takes 3 halves those and costs one demonstration, 4 leaves hardly any and costs two.
+        pair_share: Two members alone become a node only below this share of the scale, and only
+            while no larger cluster is below it.
+        confirmed: Members from which on a primitive is sure; with fewer it is provisional.
+        patience: A provisional primitive that nothing has joined after so many further segments is
+            forgotten; after four times as many as there are primitives, if that is more.
         reach: K_maxGD of eq. 6: a node's radius over the largest distance between its exemplars.
+        young_reach: Smallest radius of a leaf of at most 3 exemplars over that scale, since few say
+            little of how much executions vary; 0 for none.
+        least_reach: Smallest radius of any other leaf over that scale: exemplars that are copies of
+            each other say nothing of it, either.
         reach_cap: Largest radius over the median of that distance over all leaves.
         reach_limit: Largest radius over the scale below which clusters are formed.
         n_nearest: A segment's distance to a node is the mean of that to so many exemplars.
@@ -103,10 +117,17 @@ class TreeConfig:
     tempo: float = 1.5
     local: bool = False
     cutoff: float = 1.0
-    spread: float = 6.0
-    mean_share: float = 0.28
-    min_exemplars: int = 4
+    scale_share: float = newer(0.69, absent=1.0)
+    scale_power: float = newer(0.3, absent=0.0)
+    spread: float = math.inf
+    mean_share: float = 0.45
+    min_exemplars: int = 2
+    pair_share: float = newer(0.6, absent=1.0)
+    confirmed: int = newer(3, absent=1)
+    patience: int = newer(64, absent=64)
     reach: float = 1.5
+    young_reach: float = newer(0.8, absent=0.0)
+    least_reach: float = newer(0.4, absent=0.0)
     reach_cap: float = 1.75
     reach_limit: float = 1.0
     n_nearest: int = 2
@@ -132,6 +153,11 @@ class TreeConfig:
             power=1.0,
             tempo=math.inf,
             local=True,
+            min_exemplars=4,
+            pair_share=1.0,
+            confirmed=1,
+            young_reach=0.0,
+            least_reach=0.0,
             reach_cap=math.inf,
             n_nearest=1_000,
             split_ratio=math.inf,
@@ -144,8 +170,10 @@ class TreeConfig:
             "variance_floor",
             "power",
             "tempo",
+            "scale_share",
             "spread",
             "mean_share",
+            "pair_share",
             "reach",
             "reach_cap",
             "reach_limit",
@@ -155,7 +183,12 @@ class TreeConfig:
         lowest = {
             "n_states": 1,
             "max_chains": 1,
+            "scale_power": 0,
             "min_exemplars": 2,
+            "confirmed": 1,
+            "patience": 1,
+            "young_reach": 0,
+            "least_reach": 0,
             "n_nearest": 1,
             "n_candidates": 0,
             "max_exemplars": self.min_exemplars,

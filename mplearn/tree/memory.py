@@ -119,7 +119,7 @@ class SegmentMemory:
 
     def scale(self) -> float:
         """Return the largest distance expected between executions of one motion."""
-        return self._sample.scale(self.config.spread, self.config.mean_share)
+        return self._sample.scale(self.config)
 
     def variances(self) -> FloatArray:
         """Return the variance of each channel over all motion, shape (D,)."""

@@ -103,7 +103,8 @@ class Placement(NamedTuple):
         moved: Earlier segments that its arrival moved: number and new node.
         refused: Why it was not taken up at all; empty where it was.
         reparented: Nodes that its arrival hung below another.
-        removed: Inner nodes that are gone, for they held nothing else.
+        removed: Nodes that are gone: provisional primitives that nothing confirmed, and inner nodes
+            that held nothing else.
         nearest: The primitive that it was nearest to when it came, within its radius or not; None
             where there was none.
         like: Number of the segment that it is most like among those that wait to become a

@@ -58,6 +58,11 @@ class IndexState(State):
         require_no_cycle(parents, lambda id: f"parents[{list(parents).index(id)}]")
 
 
+_YOUNG = 3  # exemplars of a leaf up to which little is known of how much executions vary
+_YOUNG_GROWTH = np.array([1.0, 1.0, 1.35, 1.1, 1.0])
+# by number of exemplars: the largest of a few distances is smaller than that of many
+
+
 class NodeIndex:
     """What the search knows of the nodes below the root; one more costs as much as one less.
 
@@ -130,13 +135,30 @@ class NodeIndex:
         It is 0 where there is no leaf.
         """
         chosen = self.leaves & (self.ids != but) if but is not None else self.leaves
-        return float(np.median(self._known["diameter"][chosen])) if chosen.any() else 0.0
+        return float(np.median(self._diameters()[chosen])) if chosen.any() else 0.0
+
+    def _sizes(self) -> IntArray:
+        return np.array([len(group) for group in self.members], dtype=np.int64)
+
+    def _diameters(self) -> FloatArray:
+        """Return the diameters of the nodes, those of young ones as they will be, shape (n,)."""
+        diameters = np.asarray(self._known["diameter"])
+        if not self.config.young_reach:
+            return diameters
+        return np.asarray(
+            diameters * _YOUNG_GROWTH[np.minimum(self._sizes(), len(_YOUNG_GROWTH) - 1)]
+        )
 
     def radii(self) -> FloatArray:
         """Return the radius of each node: eq. 6, capped by the scale that the leaves share."""
-        radii = self.config.reach * self._known["diameter"]
-        if np.isfinite(self.config.reach_cap):
-            radii = np.minimum(radii, min(self.config.reach_cap * self.scale(), self.limit))
+        config = self.config
+        sizes, diameters = self._sizes(), self._diameters()
+        radii = config.reach * diameters
+        if np.isfinite(config.reach_cap):
+            radii = np.minimum(radii, min(config.reach_cap * self.scale(), self.limit))
+            if np.isfinite(self.limit):
+                least = np.where(sizes <= _YOUNG, config.young_reach, config.least_reach)
+                radii = np.minimum(np.maximum(radii, least * self.limit), self.limit)
         return np.asarray(radii if self.caps is None else np.minimum(radii, self.caps))
 
     def radius(self, id: int) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 from ..recording import FloatArray, IntArray
 from ..state import Array, Blob, SharedState, State, require
 from .bank import ExemplarBank
+from .config import TreeConfig
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,14 +141,14 @@ class DistanceSample:
         self._matrix[: len(matrix), : len(matrix)] = matrix
         self._state = None
 
-    def scale(self, spread: float, mean_share: float) -> float:
+    def scale(self, config: TreeConfig) -> float:
         """Return the largest distance expected between executions of one motion.
 
         Once motions recur, most segments have another of their kind for a nearest neighbour.
 
-        Args:
-            spread: Scale over the lower quartile of the distances to the nearest neighbour.
-            mean_share: Largest scale over the mean distance.
+        A motion's executions lie about as far apart as nearest neighbours do; where those are very
+        near, as in a recording played twice, or far, as in a person's free motion, the scale
+        follows with a power below 1.
         """
         n = len(self.numbers)
         matrix = self._matrix[:n, :n]
@@ -157,7 +158,9 @@ class DistanceSample:
         nearest = nearest[np.isfinite(nearest)]
         if not len(nearest):
             return 0.0
-        return float(min(spread * np.percentile(nearest, 25), mean_share * mean))
+        quartile = float(np.percentile(nearest, 25))
+        share = config.scale_share * (quartile / mean) ** config.scale_power
+        return float(min(config.spread * quartile, min(share, config.mean_share) * mean))
 
     def state(self, blob_of: Callable[[int], Blob]) -> SampleState:
         """Return everything, with the frames of the segments."""

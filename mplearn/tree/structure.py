@@ -24,6 +24,7 @@ class Structure:
     Attributes:
         nodes: The nodes by id, in the order of their birth.
         next_id: Id of the node that is formed next.
+        least: Members from which on a cluster becomes a node.
         index: What the search knows of them.
     """
 
@@ -32,6 +33,7 @@ class Structure:
         self.memory = memory
         self.nodes = {ROOT: Node(ROOT, None, 0)}
         self.next_id = ROOT + 1
+        self.least = config.min_exemplars
         self.index = NodeIndex(config, memory.bank)
 
     @property

@@ -23,7 +23,7 @@ from ..state import (
     validated,
 )
 from .bank import ExemplarBank
-from .births import form_primitives
+from .births import forget_chances, form_primitives
 from .config import TreeConfig
 from .editing import chosen_groups, leaf_of, pair_of, place_below
 from .memory import SegmentMemory
@@ -32,6 +32,7 @@ from .node import Node, NodeState
 from .placement import ROOT, Change, Placement
 from .recogniser import Recogniser, refusal
 from .renewal import RenewalState
+from .repetitions import Repetition, most_repeated
 from .revision import merge_duplicates, split_mixed
 from .spread import SampleState, SpreadState
 from .structure import Structure
@@ -242,6 +243,22 @@ class PrimitiveTree:
         frozen = Recogniser(self.config, bank, index, self.shortest_frames)
         return frozen.calibrated(self.config.false_acceptance)
 
+    def most_repeated(self) -> Repetition:
+        """Return what comes nearest to a primitive among the segments that wait to become one."""
+        return most_repeated(self._structure.root.matrix, self._memory.scale())
+
+    def is_provisional(self, id: int) -> bool:
+        """Return whether too few demonstrations have confirmed a primitive as yet.
+
+        Raises:
+            UnknownPrimitiveError: There is no such node.
+        """
+        return self.node(id).n_placed < self.config.confirmed
+
+    def require_exemplars(self, least: int) -> None:
+        """Let clusters become nodes from so many members on, if that is more than by the rules."""
+        self._structure.least = max(self.config.min_exemplars, least)
+
     # ---- learning
 
     def insert(self, frames: FloatArray) -> Placement:
@@ -273,6 +290,7 @@ class PrimitiveTree:
             change = split_mixed(structure, node, self.n_seen)
             if not change.splits:
                 change = merge_duplicates(structure, matches, self.n_seen)
+        change = change.then(forget_chances(structure, self.n_seen))
         self._memory.release(number)
         self._renew()
         structure.tune()

@@ -58,11 +58,23 @@ def crowded(seed, n_motions):
     return motions
 
 
+WIDE = TreeConfig(
+    reach=3.0,
+    reach_cap=3.0,
+    reach_limit=2.0,
+    scale_power=0.0,
+    scale_share=1.0,
+    spread=6.0,
+    mean_share=0.28,
+    min_exemplars=4,
+)
+
+
 def test_a_recogniser_holds_the_rate_that_was_stated():
     accepted, missed = {}, {}
     for seed in range(3):
         known, strangers = crowded(seed, 24), crowded(100 + seed, 40)
-        tree = PrimitiveTree(TreeConfig(reach=3.0, reach_cap=3.0, reach_limit=2.0), 2, RATE_HZ)
+        tree = PrimitiveTree(WIDE, 2, RATE_HZ)
         for _, frames in known.session(6):
             tree.insert(frames)
         strange = [strangers.perform(m) for m in range(40)]

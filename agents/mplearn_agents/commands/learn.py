@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +21,9 @@ from mplearn_agents.reading import (
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from mplearn.learner import MotionLearner
     from mplearn.recording import Recording
+    from mplearn_agents.learning import LearningLog
 
 _SAME_RATE = 1e-3  # rates that differ by a smaller share are one
 
@@ -90,11 +93,31 @@ def run(args: argparse.Namespace) -> None:
         f"{log.watched_s / 60:.1f} minutes of motion in {len(log.moving)} segments, "
         f"{log.times_real_time:.0f} x real time; written to {args.out}"
     )
+    if not len(library):
+        console.print(why_nothing(learner, log))
     if log.lost:
         console.print(
             f"{log.n_lost / first.rate_hz:.1f} s in {len(log.lost)} stretches were left out: "
             f"{log.reasons}"
         )
+
+
+def why_nothing(learner: MotionLearner, log: LearningLog) -> str:
+    """Return why nothing became a primitive, and what would help."""
+    if not log.moving:
+        return (
+            f"Why: nothing moved in {log.watched_s:.1f} s, or too little was seen of it. Record "
+            "longer, with the whole body in view."
+        )
+    found, least = learner.tree.most_repeated(), learner.config.tree.min_exemplars
+    came = f"the most repeated came {found.times} times" if found.times > 1 else "none came twice"
+    apart = f"{found.apart:.1f} times as far apart as executions of one motion may be"
+    if not math.isfinite(found.apart):
+        apart = "nothing to compare with"
+    return (
+        f"Why: of {found.n_waiting} segments {came}, the nearest {apart}. Show each motion at "
+        f"least {least} times, more where it varies widely; or let the recording be learned twice."
+    )
 
 
 def _of_persons(

@@ -13,6 +13,7 @@ from mplearn.learner import (
     LearnerConfig,
     MotionLearner,
     PrimitiveBorn,
+    PrimitiveForgotten,
     PrimitiveMerged,
     PrimitiveSplit,
     Recognised,
@@ -140,7 +141,7 @@ class OnlinePrimitiveHumanoidEnv(MacroStepEnv):
     def _meanwhile(self, duration_s: float) -> None:
         before = dict(self.repertoire.slots)
         self.events = tuple(self._watch(duration_s))
-        kinds = (PrimitiveBorn, PrimitiveMerged, PrimitiveSplit, TransitionSeen)
+        kinds = (PrimitiveBorn, PrimitiveForgotten, PrimitiveMerged, PrimitiveSplit, TransitionSeen)
         if any(isinstance(event, kinds) for event in self.events):
             self._left_out = self.repertoire.update(self.learner.snapshot())
         now = self.repertoire.slots
