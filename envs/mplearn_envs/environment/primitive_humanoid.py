@@ -82,6 +82,8 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
     T being ``info["duration_s"]`` and ``discount`` per second; see the tasks: `FreeTask` (the
     default), `GoalTask`, `FollowTask`, `ReciteTask`, or your own `Task`. ``info["discount"]`` is
     discount^T, for whoever bootstraps.
+    A learner with one discount a step needs `EndInsteadOfDiscount`: without it, holding (short
+    steps) seems better than it is.
 
     ## Start, end
 
