@@ -77,6 +77,11 @@ class Person:
         self._measure()
         self._stand()
 
+    @property
+    def one_hip(self) -> bool:
+        """Whether both legs begin at one point."""
+        return self.legs.nodes[0][0] == self.legs.nodes[1][0]
+
     def at(self, node: int) -> FloatArray:
         """Return where a node is in each frame, shape (T, 3)."""
         at: FloatArray = self.tree.points[:, node]
@@ -132,7 +137,10 @@ class Person:
     def _trunk_axes(self, points: FloatArray) -> FloatArray:
         """Return x ahead, y left, z up of the trunk as columns, (T, N, 3) to (T, 3, 3)."""
         left, right = (points[:, side[0]] for side in self.legs.nodes)
-        return axes_along(points[:, self.neck] - 0.5 * (left + right), left - right)
+        up = points[:, self.neck] - 0.5 * (left + right)
+        if self.one_hip:
+            left, right = (points[:, side[0]] for side in self.arms.nodes)
+        return axes_along(up, left - right)
 
     def _stand(self) -> None:
         """Choose the zero pose, or the most upright frames, as what standing is like."""
@@ -157,7 +165,8 @@ class Person:
         up = rest[self.neck] - 0.5 * (rest[self.legs.nodes[0][0]] + rest[self.legs.nodes[1][0]])
         if np.linalg.norm(up) < 0.8 * _REFERENCE_M["trunk"] * self.size:
             return False
-        across = rest[self.legs.nodes[0][0]] - rest[self.legs.nodes[1][0]]
+        pair = self.arms if self.one_hip else self.legs
+        across = rest[pair.nodes[0][0]] - rest[pair.nodes[1][0]]
         bones = [rest[a] - rest[b] for side in self.legs.nodes for a, b in pairwise(side)]
         bent = [float(cosines(bone, up)) for bone in bones]
         return min(bent) > STRAIGHT and abs(float(cosines(across, up))) < 0.3

@@ -123,7 +123,10 @@ class Placing:
         for pair, names in ((self.person.legs, _LEG), (self.person.arms, _ARM)):
             for side, nodes in zip("lr", pair.nodes, strict=True):
                 for name, node in zip(names, nodes, strict=True):
-                    self._joint(f"{name}_{side}", node)
+                    if name == "hip" and self.person.one_hip:
+                        self._joint("pelvis", node)
+                    else:
+                        self._joint(f"{name}_{side}", node)
 
     def _trunk(self) -> None:
         self._joint("neck", self.person.neck)

@@ -16,6 +16,7 @@ from ..recording import BoolArray, FloatArray
 
 BENT = 0.03  # how much of its length a bone may seem to lose by bending
 STRAIGHT_DEG, STIFF = 2.0, 3.0  # a joint that bends less is hardly a knee or a wrist: what it costs
+AT_ROOT = 4.0  # what it costs that both limbs begin at one point, as in a matchstick man
 STRANGE = 12.0  # what a limb costs that no person has
 
 
@@ -47,8 +48,7 @@ def fit_limb(chain: FloatArray, law: LimbLaw) -> Limb:
         law: What the limb is like.
 
     Returns:
-        The likeliest places (of chains of three joints the trunk's joint may be the limb's first),
-        and minus the logarithm of its likelihood.
+        The likeliest places, and minus the logarithm of its likelihood.
     """
     n = chain.shape[1]
     bones = np.median(np.linalg.norm(np.diff(chain, axis=1), axis=2), axis=0)  # (n - 1,)
@@ -56,9 +56,8 @@ def fit_limb(chain: FloatArray, law: LimbLaw) -> Limb:
     along = np.concatenate(([0.0], np.cumsum(bones)))
     best = Limb((0, 1, 2), np.inf)
     for first, middle, last in combinations(range(n), 3):
-        if first == 0 and n > 3:
-            continue
         cost = _cost(chain, along, (first, middle, last), law)
+        cost += AT_ROOT if first == 0 and n > 3 else 0.0
         cost += STIFF * float(stiff[middle] + stiff[last])
         if cost < best.cost:
             best = Limb((first, middle, last), cost)

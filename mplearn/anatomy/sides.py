@@ -83,8 +83,12 @@ def _names(tree: JointTree, pair: LimbPair) -> tuple[list[str], list[str]]:
 
 
 def _between(tree: JointTree, pair: LimbPair) -> FloatArray:
-    between: FloatArray = tree.points[:, pair.nodes[0][0]] - tree.points[:, pair.nodes[1][0]]
-    return between
+    """Return the way from the second limb to the first, shape (T, 3)."""
+    ways: list[FloatArray] = [
+        tree.points[:, one] - tree.points[:, other] for one, other in zip(*pair.nodes, strict=True)
+    ]
+    # limbs that begin at one point part further down
+    return ways[1] + ways[2] if pair.nodes[0][0] == pair.nodes[1][0] else ways[0]
 
 
 def _exchanged(pair: LimbPair) -> LimbPair:
@@ -115,7 +119,7 @@ def _trunk_axes(tree: JointTree, plan: Plan) -> tuple[FloatArray, FloatArray]:
     """Return up and from the second limb to the first, along the trunk, (T, 3) each."""
     pair = plan.legs or plan.arms
     assert pair is not None
-    across = tree.points[:, pair.nodes[0][0]] - tree.points[:, pair.nodes[1][0]]
+    across = _between(tree, pair)
     if plan.legs is not None and plan.arms is not None:
         low = 0.5 * (tree.points[:, plan.legs.nodes[0][0]] + tree.points[:, plan.legs.nodes[1][0]])
         high = 0.5 * (tree.points[:, plan.arms.nodes[0][0]] + tree.points[:, plan.arms.nodes[1][0]])

@@ -1,8 +1,11 @@
 """Recorded skeletons become a body: upright, of the person's size, on the right side."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from data_folder import DATA, needs_data
+from rigs import Rig, write_rig
 
 from mplearn.anatomy import as_bodies, recognise
 from mplearn.body import MotionObserver
@@ -38,3 +41,24 @@ def test_takes_join_by_the_places_of_the_body():
     bodies = as_bodies(takes)
     assert bodies.recordings[0].channels == bodies.recordings[1].channels
     assert not bodies.refused
+
+
+def test_legs_that_begin_at_one_point_are_legs(tmp_path, truth):
+    """A matchstick man: thighs start in the middle of the pelvis, as some ASF files have them."""
+    path = write_rig(tmp_path / "rig.bvh", truth.body, truth.postures[:100], 25.0, Rig())
+    recording = open_recording(path, positions=True, hints=AXES)
+    points, names = recording.markers.copy(), recording.marker_names
+    offsets = recording.skeleton.offsets.copy()
+    for hip, knee in (("LeftUpLeg", "LeftLeg"), ("RightUpLeg", "RightLeg")):
+        i, j = names.index(hip), names.index(knee)
+        offsets[j] += offsets[i]
+        offsets[i] = 0.0
+        points[:, i] = points[:, 0]
+    one = replace(
+        recording,
+        frames=points.reshape(len(points), -1),
+        skeleton=replace(recording.skeleton, offsets=offsets),
+    )
+    body = recognise(one)
+    assert dict(body.parts)["knee_l"] == ("LeftLeg",) and "pelvis" in body.places
+    assert "hip_l" not in body.places
