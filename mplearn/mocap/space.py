@@ -119,10 +119,11 @@ def placed(
         RecordingError: No person can be meant by the points.
     """
     unit = hints.unit_m or _settled_unit(points, names, space, findings, sized)
-    metres = checked_markers(path, points * unit, names)
+    metres = checked_markers(path, points if unit == 1.0 else points * unit, names)
     up = hints.up_axis or _settled_up(metres, names, rate_hz, space, findings)
     turn = to_z_up(up, space.forward) if up == space.up else upright(up)
-    return Placed(metres @ turn.T, unit, up, turn)
+    turned = metres if np.array_equal(turn, np.eye(3)) else metres @ turn.T
+    return Placed(turned, unit, up, turn)
 
 
 def _settled_unit(

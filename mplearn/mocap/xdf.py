@@ -40,7 +40,7 @@ class XDFReader(Reader):
         streams, cut = parse_xdf(path, read_bytes(path))
         if cut:
             findings.warn("the file is cut off; what is there is read")
-        found = [(_markers(stream), stream) for stream in streams if stream.rows]
+        found = [(_markers(stream), stream) for stream in streams if stream.times]
         found = sorted(((m, s) for m, s in found if m), key=lambda pair: -len(pair[0]))
         if not found:
             raise bad_file(
@@ -117,6 +117,8 @@ def _even(
         lost[i + 1] = max(int(np.rint(steps[i] * rate_hz)) - 1, 0)
     if lost.sum() > 10 * len(times) + 1000:
         raise bad_file(path, "most of the time has no frames", "a stream with few gaps")
+    if not lost.any():
+        return rate_hz, values
     frames = np.full((len(times) + int(lost.sum()), values.shape[1]), np.nan)
     frames[np.arange(len(times)) + np.cumsum(lost)] = values
     return rate_hz, frames

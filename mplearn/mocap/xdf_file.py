@@ -38,7 +38,7 @@ class Stream:
         n_channels: How many values a sample has.
         rate_hz: Its nominal rate [1/s]; 0 for none.
         times: Time stamp of each sample [s]; where the file leaves it out, one step on.
-        rows: The samples, as bytes.
+        raw: The samples' values, as bytes.
     """
 
     info: ElementTree.Element
@@ -46,7 +46,7 @@ class Stream:
     n_channels: int
     rate_hz: float
     times: list[float] = field(default_factory=list)
-    rows: list[bytes] = field(default_factory=list)
+    raw: bytearray = field(default_factory=bytearray)
 
     @property
     def name(self) -> str:
@@ -55,7 +55,7 @@ class Stream:
 
     def values(self) -> FloatArray:
         """Return the samples, shape (T, n_channels)."""
-        flat = np.frombuffer(b"".join(self.rows), self.dtype)
+        flat = np.frombuffer(self.raw, self.dtype)
         return flat.reshape(-1, self.n_channels).astype(np.float64)
 
 
@@ -130,5 +130,5 @@ def _take_samples(path: Path, data: bytes, at: int, end: int, stream: Stream) ->
         if at + size > end:
             raise bad_file(path, f"a sample cut off at byte {end}", _EXPECTED)
         stream.times.append(time_s)
-        stream.rows.append(data[at : at + size])
+        stream.raw += data[at : at + size]
         at += size

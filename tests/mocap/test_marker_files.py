@@ -154,6 +154,23 @@ def test_c3d_of_every_machine(tmp_path: Path, processor: int, scale: float | Non
         assert recording.markers == pytest.approx(theirs / 1000.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("processor", [85, 86])
+def test_c3d_whose_last_parameter_has_its_offset_in_another_order(
+    tmp_path: Path, processor: int
+) -> None:
+    points = person(20, 5)
+    path = write_c3d(tmp_path / "a.c3d", points)
+    data = bytearray(other_machines(path.read_bytes(), 5, processor, None))
+    order = ">" if processor == 86 else "<"
+    at = last = 516
+    while data[at]:
+        link = at + 2 + abs(struct.unpack_from("b", data, at)[0])
+        last, at = link, link + struct.unpack_from(order + "h", data, link)[0]
+    data[last : last + 2] = data[last : last + 2][::-1]
+    path.write_bytes(data)
+    assert open_recording(path).markers == pytest.approx(points, abs=1e-6)
+
+
 def test_c3d_cut_off(tmp_path: Path) -> None:
     path = write_c3d(tmp_path / "a.c3d", person(300, 20))
     path.write_bytes(path.read_bytes()[:-2000])

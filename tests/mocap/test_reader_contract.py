@@ -98,6 +98,37 @@ def test_a_readers_own_format_joins_by_one_line(tmp_path: Path) -> None:
     assert len(readers()) == n_readers
 
 
+@pytest.mark.usefixtures("shouting")
+def test_an_installed_package_brings_readers_of_its_own(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    class Point:
+        name = "quiet"
+        brings: object = None
+
+        def load(self) -> object:
+            return self.brings
+
+    class QuietReader(ShoutReader):
+        format = "QUIET"
+        suffixes = (".quiet",)
+
+    point = Point()
+    point.brings = QuietReader
+    monkeypatch.setattr(registry, "entry_points", lambda group: [point])
+    registry._load_entry_points.cache_clear()
+    (tmp_path / "a.quiet").write_text("1\n2\n")
+    report = open_recording(tmp_path / "a.quiet").report
+    assert report is not None
+    assert report.format == "QUIET"
+    point.brings = None  # a package that is broken is named
+    registry._load_entry_points.cache_clear()
+    with pytest.raises(RecordingError, match="'quiet' of an installed package"):
+        open_recording(tmp_path / "a.quiet")
+    monkeypatch.undo()
+    registry._load_entry_points.cache_clear()
+
+
 @pytest.mark.parametrize("wrong", [(), ("abc",), (".ABC",), (".gz",)])
 def test_a_reader_without_a_suffix_is_refused(wrong: tuple[str, ...]) -> None:
     class Wrong(ShoutReader):
