@@ -7,6 +7,7 @@ import numpy as np
 from mplearn.errors import BodyError
 from mplearn.maths.rigid_fit import fit_similarity
 from mplearn.maths.rotations import matrix_to_quaternion
+from mplearn.mocap.options import option
 from mplearn.recording import FloatArray, IntArray
 
 from .follower import Follower
@@ -87,7 +88,7 @@ def place_trunk(
         lean = np.degrees(np.arccos(np.clip(up, -1, 1)))
         raise BodyError(
             f"the trunk leans {lean:.0f} deg from upright in the first frames: calibrate on a "
-            f"standing person, with z up"
+            f"standing person, with z up ({option('up_axis')} says which axis of the file is)"
         )
     q = follower.tree.rest
     q[:3] = fit.apply(q[:3])
