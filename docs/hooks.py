@@ -12,6 +12,11 @@ from mkdocs.structure.files import File, Files
 
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
 
+KEYS = re.findall(
+    r"^\| \[(\w+)\]", (Path(__file__).parent / "references.md").read_text("utf-8"), re.MULTILINE
+)
+SOURCE = re.compile(rf"\[({'|'.join(KEYS)})\b")
+
 #: Where the packages lie whose rooms get a page of the reference each.
 PACKAGES = {"mplearn": "mplearn", "mplearn_envs": "envs/mplearn_envs"}
 
@@ -19,9 +24,11 @@ PACKAGES = {"mplearn": "mplearn", "mplearn_envs": "envs/mplearn_envs"}
 MODULES = ("mplearn.errors", "mplearn.recording", "mplearn_envs.checks")
 
 
-def on_page_content(content: str, **_: Any) -> str:
-    """Replace each formula by MathML, which browsers draw without a script."""
-    return FORMULA.sub(_mathml, content)
+def on_page_content(content: str, page: Any, **_: Any) -> str:
+    """Replace each formula by MathML, which browsers draw without a script; link the sources."""
+    up = "../" * page.url.count("/")
+    linked = rf'[<a href="{up}references.html">\1</a>'
+    return SOURCE.sub(linked, FORMULA.sub(_mathml, content))
 
 
 def _mathml(found: re.Match[str]) -> str:
@@ -41,6 +48,7 @@ def on_files(files: Files, config: Any) -> Files:
                 pages[room] = "\n\n".join((f"# {room}", *parts)) + "\n"
     for name, page in pages.items():
         files.append(File.generated(config, f"reference/{name}.md", content=page))
+    config["nav"].append({"Reference": [f"reference/{name}.md" for name in sorted(pages)]})
     return files
 
 
