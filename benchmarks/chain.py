@@ -3,8 +3,11 @@
 import time
 from collections.abc import Callable
 
+import numpy as np
+
 from mplearn import LearnerConfig, MotionLearner
 from mplearn.body import InverseKinematics, robot_body, view_of
+from mplearn.body.observer import BLOCK_FRAMES
 from mplearn.demonstrator import paper_session
 from mplearn.evaluation import observe
 from mplearn.learner import SegmentClosed
@@ -20,6 +23,11 @@ def timed(function: Callable[[], object]) -> float:
     begin = time.process_time()
     function()
     return time.process_time() - begin
+
+
+def blocks(frames: np.ndarray) -> list[np.ndarray]:
+    """Return frames in the blocks that a learner passes on."""
+    return [frames[start : start + BLOCK_FRAMES] for start in range(0, len(frames), BLOCK_FRAMES)]
 
 
 def rows() -> list[tuple[str, str, str, str]]:
@@ -48,9 +56,9 @@ def rows() -> list[tuple[str, str, str, str]]:
         if isinstance(event, SegmentClosed) and not event.segment.still
     ]
     stages = {
-        "gap tracking": lambda: [gaps.update(each) for each in markers],
-        "inverse kinematics, without gaps": lambda: [ik.update(each) for each in markers],
-        "view": lambda: [view.see(each[None]) for each in features.frames],
+        "gap tracking": lambda: [gaps.update_many(each) for each in blocks(markers)],
+        "inverse kinematics, without gaps": lambda: [ik.update_many(x) for x in blocks(markers)],
+        "view": lambda: [view.see(each) for each in blocks(features.frames)],
         "tree": lambda: [tree.insert(seen[s.start : s.end]) for s in segments],
     }
     for name in ("kohlmorgen-lemm", "zero-velocity"):
@@ -63,6 +71,12 @@ def rows() -> list[tuple[str, str, str, str]]:
         )
     )
     took["the whole chain, from markers"] = whole
+    live, noisy = MotionLearner(config), MotionLearner(config)
+    took["the same, a frame at a time"] = timed(
+        lambda: [live.learn_one(frame) for frame in recording.frames]
+    )
+    shaken = recording.frames + np.random.default_rng(0).normal(0, 0.01, recording.frames.shape)
+    took["the same, with 1 cm of white noise"] = timed(lambda: noisy.learn_many(shaken))
     frame_s, segment_s = _slowest(features)
     n = len(recording)
     table = [

@@ -21,6 +21,7 @@ from .inverse_kinematics import FEWEST_MARKERS, FollowedState, IKConfig
 from .resuming import ResumingKinematics
 from .robot import robot_body
 
+BLOCK_FRAMES = 128  # that are handed on at once, at most
 PATIENCE = 5  # times the calibration's length that a stream may take to show its markers
 FARTHEST = 1e9  # no marker is, in any unit
 NEWCOMER = 2  # times that length for which another body must be seen to be somebody new's
@@ -198,14 +199,18 @@ class MotionObserver:
             BodyError: The markers cannot be a person's, with the reason.
         """
         frame = np.asarray(frame, dtype=np.float64)
-        if frame.shape != (3 * len(self.marker_names),):
+        return self._features(self.watch(self._checked(frame[None])))
+
+    def _checked(self, frames: FloatArray) -> FloatArray:
+        width = 3 * len(self.marker_names)
+        if frames.shape[1:] != (width,):
             raise FrameError(
-                f"a frame must have shape ({3 * len(self.marker_names)},) for "
-                f"{len(self.marker_names)} markers, not {frame.shape}"
+                f"a frame must have shape ({width},) for {len(self.marker_names)} markers, not "
+                f"{frames.shape[1:]}"
             )
-        if np.isinf(frame).any():
+        if np.isinf(frames).any():
             raise FrameError("a frame holds infinite values; a missing marker is NaN")
-        return self._features(self.watch(frame[None]))
+        return frames
 
     def watch(self, frames: FloatArray) -> Watched:
         """Take the first of some frames, as many as belong together, and say what became of them.
@@ -252,7 +257,12 @@ class MotionObserver:
 
     def observe(self, frames: FloatArray) -> FloatArray:
         """Return the features of a whole recording, shape (T, 3M) to (T, D), as the loop does."""
-        parts = [self.update(frame) for frame in frames]
+        frames = self._checked(np.asarray(frames, dtype=np.float64))
+        parts = []
+        while len(frames):
+            watched = self.watch(frames[:BLOCK_FRAMES])
+            parts.append(self._features(watched))
+            frames = frames[watched.taken :]
         parts.append(self.flush())
         return np.concatenate(parts)
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..body import BodyView, MotionObserver, Watched, view_of
+from ..body.observer import BLOCK_FRAMES
 from ..errors import InvalidValueError, StateError
 from ..graph import TransitionGraph
 from ..library import MotionNovelty, PrimitiveLibrary
@@ -48,7 +49,6 @@ STILL_M = (
     0.02  # a segment in which no part of the body, and no joint's lever, goes farther: a pause
 )
 BRIDGED_S = 0.3  # a motion goes on through what is lost, if it is no longer
-BLOCK_FRAMES = 128  # that the stages hand on at once, at most
 ABSURD = "a value is not finite, or far beyond all that was seen"
 
 FILES = FileFormat("mplearn-learner", "learner", StateError, compression=1)
