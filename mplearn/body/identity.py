@@ -10,7 +10,6 @@ posture is learned from the people themselves.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
@@ -36,6 +35,7 @@ from .rigid import (
     follow_steadily,
     goes_on,
     jumped,
+    middle_of,
     rigid_pairs,
     usual_distances,
 )
@@ -162,8 +162,8 @@ class BodyIdentity:
         seen = self._distances(frames)
         if 3 * np.count_nonzero((seen == seen).any(axis=0)) < seen.shape[1]:
             return None
-        middle = _middle(seen)
-        swing = 1.4826 * _middle(np.abs(seen - middle))
+        middle = middle_of(seen)
+        swing = 1.4826 * middle_of(np.abs(seen - middle))
         noise = 0.5 * np.pi * swing**2 / np.maximum((seen == seen).sum(axis=0), 1)
         scores = self.bodies.scores(middle, noise)
         if self.person >= 0:
@@ -188,7 +188,7 @@ class BodyIdentity:
         if not len(frames):
             return np.zeros(0, dtype=np.bool_)
         seen = self._distances(frames)
-        middle = self._memory.near if back else _middle(seen[-(like or len(seen)) :])
+        middle = self._memory.near if back else middle_of(seen[-(like or len(seen)) :])
         off = np.abs(seen - middle) > self.config.unlike * middle + 10 * NOISE
         known = np.maximum((np.isfinite(seen) & np.isfinite(middle)).sum(axis=1), 1)
         wrong: BoolArray = 2 * off.sum(axis=1) > known
@@ -197,8 +197,8 @@ class BodyIdentity:
             for k in np.flatnonzero(~wrong):
                 wrong[k] = not goes_on(frames[k], *rules, int(k), 1.0)
         elif not back:
-            places = _middle(frames.reshape(len(frames), -1)).reshape(frames.shape[1:])
-            way = _middle(np.linalg.norm(frames - places, axis=2).T)
+            places = middle_of(frames.reshape(len(frames), -1)).reshape(frames.shape[1:])
+            way = middle_of(np.linalg.norm(frames - places, axis=2).T)
             wrong |= way > self._rules.reach_m * len(frames) + SHAKE
         return wrong
 
@@ -258,17 +258,15 @@ class BodyIdentity:
         """Say whether distances, shape (k, K) and their medians, can be those of one body."""
         if np.count_nonzero(middle == middle) < max(4, len(middle) / 3):
             return True  # for all that is seen
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # nothing is seen
-            ratio = np.maximum(middle, NOISE) / self._usual
-            size = float(np.nanmedian(ratio))
-            shape = float(np.nanmedian(np.abs(np.log(ratio / size))))
-            swing = np.nanmedian(np.abs(seen - middle), axis=0) / np.maximum(middle, 10 * NOISE)
-            return (
-                SMALLEST < size < LARGEST
-                and shape < self.config.misshapen
-                and float(np.nanmedian(swing)) < self.config.unlike
-            )
+        ratio = np.maximum(middle, NOISE) / self._usual
+        size = _median(ratio)
+        shape = _median(np.abs(np.log(ratio / size)))
+        swing = middle_of(np.abs(seen - middle)) / np.maximum(middle, 10 * NOISE)
+        return (
+            SMALLEST < size < LARGEST
+            and shape < self.config.misshapen
+            and _median(swing) < self.config.unlike
+        )
 
     def _unchanged(self, seen: FloatArray, middle: FloatArray) -> float:
         """Return how well it explains frames in doubt that nothing has changed, shape (k, K).
@@ -325,8 +323,5 @@ class BodyIdentity:
 NOBODY = -2
 
 
-def _middle(seen: FloatArray) -> FloatArray:
-    """Return the median over frames, shape (k, K) to (K,); NaN where nothing is seen."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of a column of NaN
-        return np.asarray(np.nanmedian(seen, axis=0))
+def _median(values: FloatArray) -> float:
+    return float(middle_of(values[:, None])[0])

@@ -137,7 +137,7 @@ class KnownBodies:
                 mean, self._means[person], doubt * variance + noise, self.config.slips
             )
         people = self._means[: self.n_people]
-        usual = np.nanmean(people, axis=0) if self.n_people else mean
+        usual = _mean(people) if self.n_people else mean
         scores[-1] = self.fit(mean, usual, self.anybody(usual) + variance + noise, 0.5)
         return scores
 
@@ -180,3 +180,11 @@ class KnownBodies:
         self.n_people = state.n_people
         self._means, self.blocks = state.means.copy(), state.blocks.copy()
         self._squares, self._counts = state.squares.copy(), state.counts.copy()
+
+
+def _mean(people: FloatArray) -> FloatArray:
+    """Return the mean over people, shape (P, K) to (K,); NaN where nobody's is known."""
+    known = np.isfinite(people)
+    count = known.sum(axis=0)
+    mean = np.where(known, people, 0.0).sum(axis=0) / np.maximum(count, 1)
+    return np.where(count > 0, mean, np.nan)

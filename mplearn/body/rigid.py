@@ -61,6 +61,23 @@ def distances_of(markers: FloatArray, pairs: IntArray) -> FloatArray:
     return out
 
 
+@njit(cache=True)
+def middle_of(rows: FloatArray) -> FloatArray:
+    """Return the median of each column, shape (k, K) to (K,), of what is seen; NaN for nothing."""
+    out = np.full(rows.shape[1], np.nan)
+    seen = np.empty(len(rows))
+    for j in range(rows.shape[1]):
+        n = 0
+        for i in range(len(rows)):
+            if rows[i, j] == rows[i, j]:
+                seen[n] = rows[i, j]
+                n += 1
+        if n:
+            ordered = np.sort(seen[:n])
+            out[j] = 0.5 * (ordered[(n - 1) // 2] + ordered[n // 2])
+    return out
+
+
 class Memory(NamedTuple):
     """What was seen lately, for kernels, which change it in place.
 
