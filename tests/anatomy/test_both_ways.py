@@ -15,6 +15,7 @@ SCRIPT = ("BAR", "BAL", "SQD", "SQR", "RAR", "RAL", "BAD", "BAU") * 8
 @pytest.mark.parametrize(
     "rig", [Rig(fingers=True), Rig(names="numbers", zero="A", order="YXZ", spine=5, bends=True)]
 )
+@pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")  # an axis in doubt
 def test_what_was_learned_from_bvh_is_recognised_in_markers(tmp_path, rig):
     shown = demonstrate(SCRIPT, seed=2, person=Person(), rate_hz=25.0)
     path = write_rig(tmp_path / "rig.bvh", human_body(), shown.posture.frames, 25.0, rig)
