@@ -229,6 +229,12 @@ class BodyIdentity:
             return True
         return not (self.absent or jumped(frames[0], self._memory, self._rules.reach_m, 0))
 
+    def about_there(self, frame: FloatArray) -> bool:
+        """Say whether a frame in doubt, shape (M, 3), is in the place and unit of those before."""
+        size = _median(distances_of(frame, self._pairs) / np.maximum(self._memory.near, NOISE))
+        jump = jumped(frame, self._memory, self._rules.reach_m, 0)
+        return bool(0.5 < size < 2.0 and not jump)
+
     def stay(self, frames: FloatArray) -> None:
         """Go on with the same person after a doubt, from the frames of it, shape (k, M, 3)."""
         memory = self._memory

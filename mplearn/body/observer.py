@@ -218,6 +218,8 @@ class MotionObserver:
         Args:
             frames: Shape (T, 3M) [m], T > 0; NaN where missing.
         """
+        if self._measuring or self._held:
+            frames = frames[:1]
         markers = _possible(frames).reshape(len(frames), -1, 3)
         if self.axes is not None:
             markers = self.axes.undo(markers)
@@ -321,7 +323,8 @@ class MotionObserver:
 
     def _axes_changed(self, held: FloatArray) -> Axes | None:
         """Return the change of the stream's axes that explains frames in doubt, if one does."""
-        if self.identity.absent or self.identity.went_on(held):
+        identity = self.identity
+        if identity.absent or identity.went_on(held) or identity.about_there(held[0]):
             return None
         change = axes_changed(held[0], self.identity.places)
         fits = change is not None and self.identity.went_on(change.undo(held))
