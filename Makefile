@@ -38,7 +38,7 @@ bench: setup                        ## timings, as ratios against named peers, i
 evaluate: setup                     ## the paper's experiments and ours: tables on synthetic and real motion, and the robot
 	$(BIN)/mplearn evaluate paper-session --out $(OUT)/evaluate
 	$(BIN)/mplearn evaluate robot --out $(OUT)/evaluate
-	@for data in ui_prmd cmu; do \
+	@for data in ui_prmd cmu c3d bandai_namco; do \
 	    if [ -d "$(MPLEARN_DATA)/$$data" ]; then \
 	        $(BIN)/mplearn evaluate "$(MPLEARN_DATA)/$$data" --out $(OUT)/evaluate || exit 1; \
 	    else \

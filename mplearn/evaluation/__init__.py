@@ -4,6 +4,7 @@ from .annotations import Annotations as Annotations
 from .annotations import read_annotations as read_annotations
 from .boundaries import BoundaryScore as BoundaryScore
 from .boundaries import score_boundaries as score_boundaries
+from .contents import content_of as content_of
 from .matching import Matching as Matching
 from .matching import match_segments as match_segments
 from .observing import observe as observe

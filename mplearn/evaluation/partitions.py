@@ -69,6 +69,11 @@ def agreement(truth: Labels, found: Labels, tolerance: float = 0.01) -> Agreemen
     )
 
 
+def adjusted_rand(one: Labels, other: Labels) -> float:
+    """Return the adjusted Rand index of two partitions of the same things, shape (n,) each."""
+    return _adjusted_rand(_contingency(one, other))
+
+
 def _contingency(truth: Labels, found: Labels) -> FloatArray:
     rows, columns = (np.unique(each, return_inverse=True)[1] for each in (truth, found))
     table = np.zeros((rows.max() + 1, columns.max() + 1))

@@ -13,7 +13,7 @@ from ..errors import RecordingError
 from ..mocap import resample
 from ..recording import Recording
 
-LabelKind: TypeAlias = Literal["repetitions", "primitives", "activities"]
+LabelKind: TypeAlias = Literal["repetitions", "primitives", "activities", "contents"]
 SHOWN = 4  # times that a class comes in a recording whose labels are primitives, in the median
 _SHORTEST = 10  # frames of a repetition
 _SAME_RATE = 1e-3  # share by which clocks may differ

@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "data",
         help=f"{' or '.join(repr(name) for name in BUILT_IN)}; a recording or folder whose labels "
-        "are repetitions of movements, primitives, or activities",
+        "are repetitions of movements, primitives, or activities, or whose names tell contents",
     )
     parser.add_argument("--out", type=Path, help="folder to write the tables to, as Markdown")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="run these experiments only")

@@ -27,6 +27,22 @@ def rhythm(setting: Setting) -> Iterator[Table]:
         yield table
 
 
+def loops(setting: Setting) -> Iterator[Table]:
+    """A minute of each take played three times in a loop."""
+    from mplearn.evaluation.experiments import loop_table
+
+    yield loop_table(setting.described)
+
+
+def glitches(setting: Setting) -> Iterator[Table]:
+    """Recognition after one bad frame, against none."""
+    from mplearn.evaluation.experiments import glitch_table
+
+    table = glitch_table(take for take in setting.described if take.is_markers)
+    if table.rows:
+        yield table
+
+
 def activities(setting: Setting) -> Iterator[Table]:
     """Which activity goes on when, the number of activities not given."""
     from mplearn.evaluation.experiments import activity_table
@@ -34,4 +50,10 @@ def activities(setting: Setting) -> Iterator[Table]:
     yield activity_table(setting.takes)
 
 
-EVALUATIONS = {"exercises": exercises, "rhythm": rhythm, "activities": activities}
+EVALUATIONS = {
+    "exercises": exercises,
+    "rhythm": rhythm,
+    "loops": loops,
+    "glitches": glitches,
+    "activities": activities,
+}

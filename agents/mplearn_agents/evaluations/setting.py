@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -91,30 +91,41 @@ class Setting:
 
     @property
     def described(self) -> tuple[Recording, ...]:
-        """All bodies, each once, with the first labels that there are of it."""
+        """All bodies, each once, with the first labels that there are of it.
+
+        Where names tell contents, these are the labels.
+        """
+        if not self.unlabelled and self.kind == "contents":
+            return tuple(_by_name(take) for take in self.bodies)
         labelled = {take.name: take for _, takes in reversed(self.annotated) for take in takes}
         return tuple(labelled.get(take.name, take) for take in self.bodies)
 
     @cached_property
     def kind(self) -> LabelKind:
         """What the labels of the recordings are."""
-        from mplearn.evaluation import kind_of_labels
+        from mplearn.evaluation import content_of, kind_of_labels
 
         labelled = any(each.labels for each in self.recordings)
         if not labelled and any(
             each.name in table.stretches for table in self.annotations for each in self.recordings
         ):
             return "activities"
+        told = sum(content_of(each.name) is not None for each in self.recordings)
+        if not labelled and 2 * told > len(self.recordings):
+            return "contents"
         return kind_of_labels(self.recordings)
 
     @property
     def unlabelled(self) -> bool:
         """Whether there are people, and no labels at all."""
-        if any(each.labels for each in self.recordings):
-            return False
+        from mplearn.evaluation import content_of
+
         known = {name for table in self.annotations for name in table.stretches}
-        return not any(each.name in known for each in self.recordings) and any(
-            each.is_markers or each.skeleton is not None for each in self.recordings
+        told = sum(content_of(each.name) is not None for each in self.recordings)
+        return (
+            not any(each.labels or each.name in known for each in self.recordings)
+            and 2 * told <= len(self.recordings)
+            and any(each.is_markers or each.skeleton is not None for each in self.recordings)
         )
 
     @property
@@ -158,7 +169,7 @@ class Setting:
     def _suitable(self, recordings: Sequence[Recording]) -> tuple[Recording, ...]:
         from mplearn.evaluation import alike, lost_throughout, repeating
 
-        if self.unlabelled:
+        if self.unlabelled or self.kind == "contents":
             return self.bodies
         if self.kind == "repetitions":
             whole = []
@@ -226,3 +237,14 @@ class Setting:
 
         shown = (paper_session(seed) for seed in self.seeds)
         return [("paper_session", Seen.of(each.recording, each.truth)) for each in shown]
+
+
+def _by_name(take: Recording) -> Recording:
+    """Return a take labelled with the content that its name tells, where it tells one."""
+    from mplearn.evaluation import content_of
+    from mplearn.recording import LabelledSegment
+
+    told = content_of(take.name)
+    if told is None:
+        return take
+    return replace(take, labels=(LabelledSegment(0, len(take), told.content, take.person),))

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, TypeAlias
 
 from .activities import EVALUATIONS as ACTIVITIES
-from .activities import rhythm
+from .activities import glitches, loops, rhythm
+from .contents import EVALUATIONS as CONTENTS
 from .people import EVALUATIONS as PEOPLE
 from .people import inverse_kinematics
 from .robot import EVALUATIONS as ROBOT
@@ -28,11 +29,14 @@ OF_LABELS: Mapping[LabelKind, Mapping[str, Evaluation]] = {
     "repetitions": PEOPLE,
     "primitives": SESSIONS,
     "activities": ACTIVITIES,
+    "contents": CONTENTS,
 }
 
 #: Experiments on people without labels.
 UNLABELLED: Mapping[str, Evaluation] = {
     "rhythm": rhythm,
+    "loops": loops,
+    "glitches": glitches,
     "inverse-kinematics": inverse_kinematics,
 }
 

@@ -16,6 +16,8 @@ from .learning import learning_table as learning_table
 from .peers import peers_table as peers_table
 from .people import learn_together as learn_together
 from .people import people_table as people_table
+from .playback import glitch_table as glitch_table
+from .playback import loop_table as loop_table
 from .prediction import foretell_paper_sessions as foretell_paper_sessions
 from .prediction import foretell_sessions as foretell_sessions
 from .prediction import prediction_table as prediction_table
@@ -28,3 +30,4 @@ from .sessions import by_person as by_person
 from .sessions import learn_paper_sessions as learn_paper_sessions
 from .sessions import learn_people as learn_people
 from .sessions import observed_sessions as observed_sessions
+from .told_apart import content_table as content_table
