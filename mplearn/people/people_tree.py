@@ -27,8 +27,8 @@ from . import editing
 from .common import CommonRecogniser, common_model
 from .config import PeopleConfig
 from .pins import Key
-from .shared_primitives import SharingState
 from .sharing import Sharing
+from .sharing_state import SharingState
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,99 @@
+"""What people share, as it is kept."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from ..recording import FloatArray, IntArray
+from ..state import Array, Count, Range, State, require, require_no_cycle
+from ..tree import ROOT
+from ..tree.node import Happening
+from .leaf import LeafState
+from .pins import PinsState
+from .waiting import WaitingState
+
+
+@dataclass(frozen=True, eq=False)
+class NumbersState(State):
+    """Numbers of segments in a person's tree, and in the tree of all people, shape (n,) each."""
+
+    person: Count
+    there: Annotated[IntArray, Array("n", low=0)]
+    here: Annotated[IntArray, Array("n", low=0)]
+
+
+@dataclass(frozen=True, eq=False)
+class AboveState(State):
+    """A node above primitives; attributes are those of `Node`."""
+
+    id: Annotated[int, Range(1)]
+    born_at: Count
+    history: tuple[tuple[Happening, Count], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class OffsetState(State):
+    """A person's usual deviation in posture, shape (D,)."""
+
+    person: Count
+    offset: Annotated[FloatArray, Array(None)]
+
+
+@dataclass(frozen=True, eq=False)
+class SharingState(State):
+    """What people share; attributes are those of `Sharing`."""
+
+    next_id: Annotated[int, Range(1)]
+    n_seen: Count
+    unit: Annotated[float, Range(0.0, math.inf)]
+    leaves: tuple[LeafState, ...]
+    waiting: tuple[WaitingState, ...]
+    numbers: tuple[NumbersState, ...]
+    above: tuple[AboveState, ...]
+    parents: tuple[tuple[Count, Count], ...]
+    pins: PinsState
+    offsets: tuple[OffsetState, ...]
+
+    def check(self) -> None:
+        """Check that ids name what is there."""
+        keys = {(leaf.person, leaf.local) for leaf in self.leaves}
+        require(len(keys) == len(self.leaves), "leaves", "must differ")
+        primitives = {leaf.primitive for leaf in self.leaves}
+        above = {node.id for node in self.above}
+        named = {leaf.id for leaf in self.leaves} | primitives | above
+        founded = {leaf.founded for leaf in self.leaves}
+        require(max(named | founded, default=0) < self.next_id, "next_id", "must exceed all ids")
+        require(len(above) == len(self.above), "above", "must differ")
+        require(not above & primitives, "above", "must be no primitives")
+        parents: dict[int, int | None] = dict(self.parents)
+        require(
+            len(parents) == len(self.parents) and parents.keys() == above | primitives,
+            "parents",
+            f"must be of {sorted(above | primitives)}, each once, not {sorted(parents)}",
+        )
+        for k, (id, parent) in enumerate(self.parents):
+            require(
+                parent == ROOT or parent in above,
+                f"parents[{k}]",
+                f"node {id} must lie below one of {sorted({ROOT, *above})}, not {parent}",
+            )
+        require_no_cycle(parents, lambda id: f"parents[{list(parents).index(id)}]")
+        for k, each in enumerate(self.waiting):
+            require(each.primitive in primitives, f"waiting[{k}].primitive", "must be a primitive")
+        waiting = {(each.person, each.primitive) for each in self.waiting}
+        require(len(waiting) == len(self.waiting), "waiting", "must differ")
+        for name in ("together", "apart"):
+            for k, pair in enumerate(getattr(self.pins, name)):
+                require(keys.issuperset(pair), f"pins.{name}[{k}]", "must name leaves")
+        seen: set[int] = set()
+        for k, own in enumerate(self.numbers):
+            here = set(own.here.tolist())
+            fine = len(here) == len(own.here) == len(set(own.there.tolist()))
+            require(
+                fine and not here & seen and max(here, default=-1) < self.n_seen,
+                f"numbers[{k}]",
+                f"must differ from all others, and be below {self.n_seen}",
+            )
+            seen |= here
