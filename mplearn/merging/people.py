@@ -56,7 +56,8 @@ def merged_into(first: PeopleTree, second: PeopleTree, people: Mapping[int, int]
     """Merge two trees of several people, both of which are used up; see `merge_people`."""
     if not second.n_seen:
         return MergedPeople(first, {id: id for id in first.leaves}, {}, first.n_seen, {}, {})
-    if {*first.people, *(people[each] for each in second.people)} == {first.people[0]}:
+    everyone = {*first.people, *(people[each] for each in second.people)}
+    if everyone == {first.people[0]}:
         return _of_one_person(first, second)
     return _of_several(first, second, people)
 

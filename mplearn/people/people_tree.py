@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from operator import is_not
 from typing import Annotated
 
-from ..errors import InvalidValueError, UnknownPrimitiveError
+from ..errors import InvalidValueError
 from ..hmm import LeftRightHMM
 from ..recording import FloatArray
 from ..state import Count, Range, State, require, validated, within
@@ -23,10 +22,8 @@ from ..tree import (
     TreeConfig,
 )
 from ..tree.tree import TreeState
-from . import editing
-from .common import CommonRecogniser, common_model
 from .config import PeopleConfig
-from .pins import Key
+from .primitives import OnePersonsPrimitives, Primitives, SharedPrimitives
 from .sharing import Sharing
 from .sharing_state import SharingState
 
@@ -142,19 +139,7 @@ class PeopleTree:
         self.mirror = mirror
         self.n_seen = 0
         self._trees: dict[int, PrimitiveTree] = {0: self._new_tree()}
-        self._next_id = ROOT + 1
-        self._sharing: Sharing | None = None
-        self._common = CommonRecogniser(config)
-        self._models: dict[int, tuple[tuple[LeftRightHMM, ...], LeftRightHMM]] = {}
-
-    def _require_exemplars(self) -> None:
-        """Let births be as rare as several people need them to be."""
-        if self._sharing is not None:
-            for tree in self._trees.values():
-                tree.require_exemplars(self.people_config.min_exemplars)
-
-    def _new_tree(self) -> PrimitiveTree:
-        return PrimitiveTree(self.config, self.n_channels, self.rate_hz, self.groups)
+        self._primitives: Primitives = OnePersonsPrimitives(self._trees[0], ROOT + 1)
 
     # ---- looking
 
@@ -176,12 +161,12 @@ class PeopleTree:
     @property
     def leaves(self) -> tuple[int, ...]:
         """Ids of the primitives, in the order of their birth."""
-        return self._only.leaves if self._sharing is None else self._sharing.primitives
+        return self._primitives.leaves
 
     @property
     def nodes(self) -> tuple[Node, ...]:
         """All nodes, the root first: primitives, and below them a leaf for each person."""
-        return self._only.nodes if self._sharing is None else self._sharing.nodes
+        return self._primitives.nodes
 
     def node(self, id: int) -> Node:
         """Return a node.
@@ -189,42 +174,19 @@ class PeopleTree:
         Raises:
             UnknownPrimitiveError: There is none of this id.
         """
-        if self._sharing is None:
-            return self._only.node(id)
-        for node in self._sharing.nodes:
-            if node.id == id:
-                return node
-        raise UnknownPrimitiveError(
-            f"no node {id} in the tree; it holds {[node.id for node in self._sharing.nodes]}"
-        )
+        return self._primitives.node(id)
 
     def radius(self, id: int) -> float:
         """Return the radius of a node below the root: of a primitive, its widest leaf's."""
-        if self._sharing is None:
-            return self._only.radius(id)
-        return max(self._trees[p].radius(leaf) for p, leaf in self._leaves_of(id))
+        return self._primitives.radius(id)
 
     def exemplars(self, id: int) -> tuple[FloatArray, ...]:
         """Return the kept segments of a node as they came, shape (L, D) each."""
-        if self._sharing is None:
-            return self._only.exemplars(id)
-        return tuple(
-            frames for p, leaf in self._leaves_of(id) for frames in self._trees[p].exemplars(leaf)
-        )
+        return self._primitives.exemplars(id)
 
     def model(self, id: int) -> LeftRightHMM:
         """Return a node's group model: fitted to its exemplars as they came, at their rate."""
-        if self._sharing is None:
-            return self._only.model(id)
-        leaves = self._leaves_of(id)
-        if len(leaves) == 1:
-            person, leaf = leaves[0]
-            return self._trees[person].model(leaf)
-        models = tuple(self._trees[p].model(leaf) for p, leaf in leaves)
-        known = self._models.get(id)
-        if known is None or len(known[0]) != len(models) or any(map(is_not, known[0], models)):
-            known = self._models[id] = models, common_model(models, self.exemplars(id))
-        return known[1]
+        return self._primitives.model(id)
 
     def n_placed(self, id: int) -> int:
         """Return how many segments were ever placed in a node, those of all people.
@@ -232,9 +194,7 @@ class PeopleTree:
         Raises:
             UnknownPrimitiveError: There is no such node.
         """
-        if self._sharing is None:
-            return self._only.node(id).n_placed
-        return sum(self._trees[p].node(leaf).n_placed for p, leaf in self._leaves_of(id))
+        return self._primitives.n_placed(id)
 
     def most_repeated(self) -> Repetition:
         """Return what comes nearest to a primitive among the segments that wait to become one."""
@@ -256,27 +216,11 @@ class PeopleTree:
         They are the lengths of `Placement.distance` (`Distance.length`). Empty for a person of whom
         nothing was seen; of several leaves in one primitive the fullest counts.
         """
-        if person not in self._trees:
-            return {}
-        tree = self._trees[person]
-        if self._sharing is None:
-            return {id: tree.node(id).matrix for id in tree.leaves}
-        found: dict[int, FloatArray] = {}
-        for leaf in self._sharing.leaves:
-            if leaf.person == person:
-                own = tree.node(leaf.local).matrix
-                if len(own) > len(found.get(leaf.primitive, ())):
-                    found[leaf.primitive] = own
-        return found
+        return self._primitives.matrices(person) if person in self._trees else {}
 
     def recogniser(self) -> Recogniser:
         """Return what would be recognised now, whoever moves, frozen."""
-        if self._sharing is None:
-            return self._only.recogniser()
-        leaves: dict[int, list[Key]] = {}
-        for leaf in self._sharing.leaves:
-            leaves.setdefault(leaf.primitive, []).append(leaf.key)
-        return self._common.of(self._trees, leaves, self._sharing.numbers)
+        return self._primitives.recogniser()
 
     # ---- learning
 
@@ -305,10 +249,7 @@ class PeopleTree:
         if placement.refused:
             return placement
         self.n_seen += 1
-        if self._sharing is None:
-            self._next_id = max((self._next_id, *(id + 1 for id in placement.born)))
-            return placement
-        return self._sharing.follow(person, placement, frames)
+        return self._primitives.follow(person, placement, frames)
 
     def pass_time(self) -> None:
         """Let a frame pass; see `PrimitiveTree.pass_time`."""
@@ -332,9 +273,7 @@ class PeopleTree:
             UnknownPrimitiveError: There is no such primitive.
             InvalidValueError: The groups are wrong, or there are too few exemplars.
         """
-        if self._sharing is None:
-            return self._edited(self._only.split(id, groups))
-        return self._edited(editing.split(self._sharing, id, groups))
+        return self._primitives.split(id, groups)
 
     def merge(self, first: int, second: int) -> Change:
         """Merge two primitives into the older one, which the rules never split again.
@@ -345,9 +284,7 @@ class PeopleTree:
             UnknownPrimitiveError: There is no such primitive.
             InvalidValueError: They are the same.
         """
-        if self._sharing is None:
-            return self._edited(self._only.merge(first, second))
-        return self._edited(editing.merge(self._sharing, first, second))
+        return self._primitives.merge(first, second)
 
     def reparent(self, id: int, parent: int) -> Change:
         """Hang a node below the root or another inner node; a person's leaf below a primitive.
@@ -359,9 +296,7 @@ class PeopleTree:
             UnknownPrimitiveError: There is no such node.
             InvalidValueError: The parent lies below the node, or cannot be above it.
         """
-        if self._sharing is None:
-            return self._edited(self._only.reparent(id, parent))
-        return self._edited(editing.move(self._sharing, id, parent))
+        return self._primitives.reparent(id, parent)
 
     def remove(self, id: int, *, forget: bool = False) -> Change:
         """Take a primitive out, or a person's leaf of it; see `PrimitiveTree.remove`.
@@ -369,30 +304,30 @@ class PeopleTree:
         Raises:
             UnknownPrimitiveError: There is no such primitive.
         """
-        if self._sharing is None:
-            return self._edited(self._only.remove(id, forget=forget))
-        return self._edited(editing.remove(self._sharing, id, forget=forget))
-
-    def _edited(self, change: Change) -> Change:
-        self._next_id = max((self._next_id, *(id + 1 for id in change.born)))
-        return change
+        return self._primitives.remove(id, forget=forget)
 
     # ---- being merged, see `mplearn.merging`
 
     def sharing(self) -> Sharing:
         """Return what people share; where there is one person, as if others were to come."""
-        if self._sharing is None:
-            self._sharing = Sharing(
-                self.config, self.people_config, self._trees, self._next_id, self.mirror
-            )
+        primitives = self._primitives
+        if not isinstance(primitives, SharedPrimitives):
+            rules = self.config, self.people_config
+            sharing = Sharing(*rules, self._trees, primitives.next_id, self.mirror)
+            self._primitives = primitives = SharedPrimitives(sharing)
             self._require_exemplars()
-        return self._sharing
+        return primitives.sharing
 
     def adopt(self, trees: dict[int, PrimitiveTree], n_seen: int) -> None:
         """Go on with other trees, by person, that have seen so many segments."""
         self._trees, self.n_seen = trees, n_seen
-        self._next_id = 1 + max(node.id for node in self.nodes)
-        self._require_exemplars()
+        if isinstance(self._primitives, SharedPrimitives):
+            self._primitives.sharing.trees = trees
+            self._require_exemplars()
+        else:
+            tree = next(iter(trees.values()))
+            next_id = 1 + max(node.id for node in tree.nodes)
+            self._primitives = OnePersonsPrimitives(tree, next_id)
 
     def copy(self) -> PeopleTree:
         """Return a tree that knows the same, and goes on apart; exemplars are shared."""
@@ -407,9 +342,9 @@ class PeopleTree:
         """Return all that is known: `load_state` resumes bit for bit."""
         return PeopleState(
             n_seen=self.n_seen,
-            next_id=self._next_id,
+            next_id=self._primitives.next_id,
             trees=tuple(PersonState(person, tree.state()) for person, tree in self._trees.items()),
-            sharing=None if self._sharing is None else self._sharing.state(),
+            sharing=self._primitives.state(),
         )
 
     def load_state(self, state: PeopleState) -> None:
@@ -427,15 +362,16 @@ class PeopleTree:
             trees[each.person] = self._new_tree()
             with within(f"trees[{k}].tree"):
                 trees[each.person].load_state(each.tree)
-        self.n_seen, self._next_id, self._trees = state.n_seen, state.next_id, trees
-        self._sharing = None
-        self._common = CommonRecogniser(self.config)
-        if state.sharing is not None:
-            rules = self.config, self.people_config
-            self._sharing = Sharing(*rules, {}, self._next_id, self.mirror)
-            self._sharing.trees = trees
-            self._sharing.load_state(state.sharing)
-            self._require_exemplars()
+        self.n_seen, self._trees = state.n_seen, trees
+        if state.sharing is None:
+            only = next(iter(trees.values()))
+            self._primitives = OnePersonsPrimitives(only, state.next_id)
+            return
+        sharing = Sharing(self.config, self.people_config, {}, state.next_id, self.mirror)
+        sharing.trees = trees
+        sharing.load_state(state.sharing)
+        self._primitives = SharedPrimitives(sharing)
+        self._require_exemplars()
 
     def _check_widths(self, state: SharingState) -> None:
         """Check that shapes are such as this tree takes."""
@@ -453,14 +389,10 @@ class PeopleTree:
 
     # ---- inside
 
-    @property
-    def _only(self) -> PrimitiveTree:
-        return next(iter(self._trees.values()))
+    def _new_tree(self) -> PrimitiveTree:
+        return PrimitiveTree(self.config, self.n_channels, self.rate_hz, self.groups)
 
-    def _leaves_of(self, id: int) -> list[tuple[int, int]]:
-        """Return the leaves of a primitive, or that one leaf, as person and id in its tree."""
-        assert self._sharing is not None
-        found = [leaf.key for leaf in self._sharing.leaves_of(id)]
-        if not found:
-            raise UnknownPrimitiveError(f"no primitive {id}; known are {list(self.leaves)}")
-        return found
+    def _require_exemplars(self) -> None:
+        """Let births be as rare as several people need them to be."""
+        for tree in self._trees.values():
+            tree.require_exemplars(self.people_config.min_exemplars)

@@ -47,7 +47,7 @@ def sound(tree):
 
 
 def people_of(tree, id):
-    return sorted(person for person, _ in tree._leaves_of(id))
+    return sorted(person for person, _ in [each.key for each in tree.sharing().leaves_of(id)])
 
 
 def lasts(tree, learned, check):
@@ -67,7 +67,10 @@ def lasts(tree, learned, check):
 def test_split_sends_each_persons_leaf_to_one_side(tree, learned):
     id = shared(tree)
     before, exemplars = count(tree), len(tree.exemplars(id))
-    own = [len(tree.of(person).exemplars(leaf)) for person, leaf in tree._leaves_of(id)]
+    own = [
+        len(tree.of(person).exemplars(leaf))
+        for person, leaf in [each.key for each in tree.sharing().leaves_of(id)]
+    ]
     groups = [range(own[0]), range(own[0], exemplars)]
     change = tree.split(id, [list(group) for group in groups])
     assert change.splits[0].node == id
@@ -129,7 +132,7 @@ def test_merge_joins_leaf_by_leaf_and_undoes_a_split(tree, learned):
 def test_a_leaf_moves_from_one_primitive_to_another(tree, learned):
     source, target = [id for id in tree.leaves if len(tree.node(id).children) == 3][:2]
     leaf = tree.node(source).children[1]
-    person = next(p for p, _ in tree._leaves_of(leaf))
+    person = next(p for p, _ in [each.key for each in tree.sharing().leaves_of(leaf)])
     members = set(tree.node(leaf).members)
     change = tree.reparent(leaf, target)
     assert {number for number, to in change.moved if to == target} == members

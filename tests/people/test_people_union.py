@@ -83,7 +83,7 @@ def test_the_order_of_the_two_changes_names_only(shards):
         return {
             motion: sorted(
                 (people[person], united.tree.of(person).node(leaf).n_placed)
-                for person, leaf in united.tree._leaves_of(id)
+                for person, leaf in [each.key for each in united.tree.sharing().leaves_of(id)]
             )
             for id, motion in meanings(united, first, second).items()
         }
@@ -129,9 +129,9 @@ def test_what_a_person_said_holds_in_the_union(shards):
     tree.split(id)
     united = merge_people(one.tree, tree, {1: 3, 0: 2}).tree
     sound(united)
-    keys = [set(united._leaves_of(id)) for id in united.leaves]
+    keys = [{each.key for each in united.sharing().leaves_of(id)} for id in united.leaves]
     assert sum(len({key for key in group if key[0] in (2, 3)}) > 1 for group in keys) == len(
-        [id for id in tree.leaves if len(tree._leaves_of(id)) > 1]
+        [id for id in tree.leaves if len([each.key for each in tree.sharing().leaves_of(id)]) > 1]
     )
 
 

@@ -1,0 +1,274 @@
+"""The primitives of one person, and those of several, behind one protocol."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from operator import is_not
+from typing import Protocol
+
+from ..errors import UnknownPrimitiveError
+from ..hmm import LeftRightHMM
+from ..recording import FloatArray
+from ..tree import Change, Node, Placement, PrimitiveTree, Recogniser
+from . import editing
+from .common import CommonRecogniser, common_model
+from .pins import Key
+from .sharing import Sharing
+from .sharing_state import SharingState
+
+
+class Primitives(Protocol):
+    """What a `PeopleTree` asks of its primitives, whoever performs them."""
+
+    @property
+    def next_id(self) -> int:
+        """First id that was never used."""
+
+    @property
+    def leaves(self) -> tuple[int, ...]:
+        """Ids of the primitives, in the order of their birth."""
+
+    @property
+    def nodes(self) -> tuple[Node, ...]:
+        """All nodes, the root first."""
+
+    def node(self, id: int) -> Node:
+        """Return a node."""
+
+    def radius(self, id: int) -> float:
+        """Return the radius of a node below the root."""
+
+    def exemplars(self, id: int) -> tuple[FloatArray, ...]:
+        """Return the kept segments of a node, shape (L, D) each."""
+
+    def model(self, id: int) -> LeftRightHMM:
+        """Return a node's group model."""
+
+    def n_placed(self, id: int) -> int:
+        """Return how many segments were ever placed in a node."""
+
+    def matrices(self, person: int) -> dict[int, FloatArray]:
+        """Return the distances among a person's exemplars of each primitive, shape (k, k)."""
+
+    def recogniser(self) -> Recogniser:
+        """Return what would be recognised now, frozen."""
+
+    def follow(self, person: int, placement: Placement, frames: FloatArray) -> Placement:
+        """Take note of what a person's tree did with a segment; return what it means for all."""
+
+    def split(self, id: int, groups: Sequence[Sequence[int]] | None) -> Change:
+        """Split a primitive."""
+
+    def merge(self, first: int, second: int) -> Change:
+        """Merge two primitives."""
+
+    def reparent(self, id: int, parent: int) -> Change:
+        """Hang a node below another."""
+
+    def remove(self, id: int, *, forget: bool) -> Change:
+        """Take a primitive out."""
+
+    def state(self) -> SharingState | None:
+        """Return what is kept beside the trees."""
+
+
+class OnePersonsPrimitives:
+    """The primitives of one person: the leaves of that person's tree.
+
+    Args:
+        tree: The tree.
+        next_id: First id that was never used.
+    """
+
+    def __init__(self, tree: PrimitiveTree, next_id: int) -> None:
+        self.tree = tree
+        self.next_id = next_id
+
+    @property
+    def leaves(self) -> tuple[int, ...]:
+        """Ids of the primitives, in the order of their birth."""
+        return self.tree.leaves
+
+    @property
+    def nodes(self) -> tuple[Node, ...]:
+        """All nodes of the tree, the root first."""
+        return self.tree.nodes
+
+    def node(self, id: int) -> Node:
+        """Return a node of the tree."""
+        return self.tree.node(id)
+
+    def radius(self, id: int) -> float:
+        """Return the radius of a node of the tree."""
+        return self.tree.radius(id)
+
+    def exemplars(self, id: int) -> tuple[FloatArray, ...]:
+        """Return the kept segments of a node of the tree."""
+        return self.tree.exemplars(id)
+
+    def model(self, id: int) -> LeftRightHMM:
+        """Return the model of a node of the tree."""
+        return self.tree.model(id)
+
+    def n_placed(self, id: int) -> int:
+        """Return how many segments were ever placed in a node of the tree."""
+        return self.tree.node(id).n_placed
+
+    def matrices(self, person: int) -> dict[int, FloatArray]:
+        """Return the distances among the exemplars of each primitive."""
+        return {id: self.tree.node(id).matrix for id in self.tree.leaves}
+
+    def recogniser(self) -> Recogniser:
+        """Return what the tree would recognise now."""
+        return self.tree.recogniser()
+
+    def follow(self, person: int, placement: Placement, frames: FloatArray) -> Placement:
+        """Return what the tree said."""
+        self._count(placement.born)
+        return placement
+
+    def split(self, id: int, groups: Sequence[Sequence[int]] | None) -> Change:
+        """Split a leaf of the tree."""
+        return self._edited(self.tree.split(id, groups))
+
+    def merge(self, first: int, second: int) -> Change:
+        """Merge two leaves of the tree."""
+        return self._edited(self.tree.merge(first, second))
+
+    def reparent(self, id: int, parent: int) -> Change:
+        """Hang a node of the tree below another."""
+        return self._edited(self.tree.reparent(id, parent))
+
+    def remove(self, id: int, *, forget: bool) -> Change:
+        """Take a leaf out of the tree."""
+        return self._edited(self.tree.remove(id, forget=forget))
+
+    def state(self) -> None:
+        """Return nothing: all is in the tree."""
+
+    def _edited(self, change: Change) -> Change:
+        self._count(change.born)
+        return change
+
+    def _count(self, born: Sequence[int]) -> None:
+        self.next_id = max((self.next_id, *(id + 1 for id in born)))
+
+
+class SharedPrimitives:
+    """The primitives of several people: each is a leaf a person, or several, of their trees.
+
+    Args:
+        sharing: Which leaves are one primitive.
+    """
+
+    def __init__(self, sharing: Sharing) -> None:
+        self.sharing = sharing
+        self._common = CommonRecogniser(sharing.config)
+        self._models: dict[int, tuple[tuple[LeftRightHMM, ...], LeftRightHMM]] = {}
+
+    @property
+    def next_id(self) -> int:
+        """First id that was never used."""
+        return self.sharing.next_id
+
+    @property
+    def leaves(self) -> tuple[int, ...]:
+        """Ids of the primitives, in the order of their birth."""
+        return self.sharing.primitives
+
+    @property
+    def nodes(self) -> tuple[Node, ...]:
+        """All nodes, the root first: primitives, and below them a leaf for each person."""
+        return self.sharing.nodes
+
+    def node(self, id: int) -> Node:
+        """Return a node.
+
+        Raises:
+            UnknownPrimitiveError: There is none of this id.
+        """
+        nodes = self.sharing.nodes
+        for node in nodes:
+            if node.id == id:
+                return node
+        raise UnknownPrimitiveError(
+            f"no node {id} in the tree; it holds {[node.id for node in nodes]}"
+        )
+
+    def radius(self, id: int) -> float:
+        """Return the radius of a primitive's widest leaf."""
+        return max(self._trees[p].radius(leaf) for p, leaf in self._leaves_of(id))
+
+    def exemplars(self, id: int) -> tuple[FloatArray, ...]:
+        """Return the kept segments of all leaves."""
+        return tuple(
+            frames for p, leaf in self._leaves_of(id) for frames in self._trees[p].exemplars(leaf)
+        )
+
+    def model(self, id: int) -> LeftRightHMM:
+        """Return the group model of all leaves together."""
+        leaves = self._leaves_of(id)
+        if len(leaves) == 1:
+            person, leaf = leaves[0]
+            return self._trees[person].model(leaf)
+        models = tuple(self._trees[p].model(leaf) for p, leaf in leaves)
+        known = self._models.get(id)
+        if known is None or len(known[0]) != len(models) or any(map(is_not, known[0], models)):
+            known = self._models[id] = models, common_model(models, self.exemplars(id))
+        return known[1]
+
+    def n_placed(self, id: int) -> int:
+        """Return how many segments were ever placed in any of the leaves."""
+        return sum(self._trees[p].node(leaf).n_placed for p, leaf in self._leaves_of(id))
+
+    def matrices(self, person: int) -> dict[int, FloatArray]:
+        """Return the distances among a person's exemplars; of several leaves the fullest counts."""
+        found: dict[int, FloatArray] = {}
+        for leaf in self.sharing.leaves:
+            if leaf.person == person:
+                own = self._trees[person].node(leaf.local).matrix
+                if len(own) > len(found.get(leaf.primitive, ())):
+                    found[leaf.primitive] = own
+        return found
+
+    def recogniser(self) -> Recogniser:
+        """Return what would be recognised now, whoever moves."""
+        leaves: dict[int, list[Key]] = {}
+        for leaf in self.sharing.leaves:
+            leaves.setdefault(leaf.primitive, []).append(leaf.key)
+        return self._common.of(self._trees, leaves, self.sharing.numbers)
+
+    def follow(self, person: int, placement: Placement, frames: FloatArray) -> Placement:
+        """Take note of what a person's tree did with a segment; return what it means for all."""
+        return self.sharing.follow(person, placement, frames)
+
+    def split(self, id: int, groups: Sequence[Sequence[int]] | None) -> Change:
+        """Split a primitive, and people's leaves where their exemplars go apart."""
+        return editing.split(self.sharing, id, groups)
+
+    def merge(self, first: int, second: int) -> Change:
+        """Merge two primitives, and the leaves of whoever has one in both."""
+        return editing.merge(self.sharing, first, second)
+
+    def reparent(self, id: int, parent: int) -> Change:
+        """Hang a primitive below a node, or a person's leaf below a primitive."""
+        return editing.move(self.sharing, id, parent)
+
+    def remove(self, id: int, *, forget: bool) -> Change:
+        """Take a primitive out, or a person's leaf of it."""
+        return editing.remove(self.sharing, id, forget=forget)
+
+    def state(self) -> SharingState:
+        """Return what people share."""
+        return self.sharing.state()
+
+    @property
+    def _trees(self) -> dict[int, PrimitiveTree]:
+        return self.sharing.trees
+
+    def _leaves_of(self, id: int) -> list[Key]:
+        """Return the leaves of a primitive, or that one leaf, as person and id in its tree."""
+        found = [leaf.key for leaf in self.sharing.leaves_of(id)]
+        if not found:
+            raise UnknownPrimitiveError(f"no primitive {id}; known are {list(self.leaves)}")
+        return found
