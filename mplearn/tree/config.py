@@ -126,7 +126,7 @@ class TreeConfig:
     confirmed: int = newer(3, absent=1)
     patience: int = newer(64, absent=64)
     reach: float = 1.5
-    young_reach: float = newer(0.8, absent=0.0)
+    young_reach: float = newer(0.85, absent=0.0)
     least_reach: float = newer(0.4, absent=0.0)
     reach_cap: float = 1.75
     reach_limit: float = 1.0

@@ -8,10 +8,12 @@ from mplearn import merge_learners as merge
 from mplearn.errors import InvalidValueError
 from mplearn.learner import LearnerConfig, MotionLearner, SegmentClosed
 from mplearn.recording import Recording
+from mplearn.tree import TreeConfig
 
 
 def learned(features: Recording, first: int, last: int) -> MotionLearner:
-    learner = MotionLearner(LearnerConfig(features.channels, features.rate_hz))
+    rules = TreeConfig(min_exemplars=4)  # primitives that are sure in both shards
+    learner = MotionLearner(LearnerConfig(features.channels, features.rate_hz, tree=rules))
     learner.learn_many(features.frames[first:last])
     learner.end_stream()
     return learner

@@ -15,6 +15,7 @@ from mplearn.errors import FrameError, InvalidValueError
 from mplearn.learner import Event, PrimitiveBorn, Recognised, SegmentClosed, TransitionSeen
 from mplearn.recording import Segment, marker_channels
 from mplearn.state import checkpoint
+from mplearn.tree import TreeConfig
 
 
 def learner_for(recording: Recording, **options: object) -> MotionLearner:
@@ -69,7 +70,9 @@ def test_the_past_of_a_new_primitive_counts(
     assert len({event.segment.start for event in seen}) == len(seen)  # none twice
     born = {e.primitive: e.segment.start for e in events if isinstance(e, PrimitiveBorn)}
     early = [event for event in seen if event.segment.start < born[event.primitive]]
-    assert len(early) >= 2 * len(born)
+    assert (
+        len(early) >= len(born) - 1
+    )  # one demonstration of each was before, none before the first
     # as many as there are neighbours that are known by now
     links = learner.chain._links
     known = [link.primitive is not None for link in links]
@@ -143,7 +146,7 @@ def test_the_library_recognises_what_the_learner_did(
 
 
 def test_a_stream_of_another_person_is_a_stream_of_its_own(features: Recording) -> None:
-    learner = learner_for(features)
+    learner = learner_for(features, tree=TreeConfig(min_exemplars=4))  # copies are no four
     list(learner.learn_recording(features))
     before = learner.graph.n_transitions, learner.n_frames
     events = [event for each in learner.learn_recording(features) for event in each]
