@@ -40,6 +40,8 @@ def learned(n_motions: int) -> tuple[PrimitiveTree, Repertoire, list[float]]:
         for _ in range(5):
             for motion in range(first, min(first + BLOCK, n_motions)):
                 frames = repertoire.perform(motion)
+                for _ in frames:
+                    tree.pass_time()
                 begin = time.process_time()
                 tree.insert(frames)
                 took.append(time.process_time() - begin)
