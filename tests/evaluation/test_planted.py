@@ -45,9 +45,9 @@ def test_motions_are_foretold_once_they_have_been_seen():
     assert foretold.shown[:5].tolist() == [0, 0, 0, 1, 1]
     assert foretold.perfect[4:, 0].all()  # a cycle: from the second round on all is known
     assert not foretold.learned[:3, 0].any()
-    assert not foretold.primitives[:10, 0].any()
+    assert not foretold.primitives[:6, 0].any()  # two rounds make primitives
     assert foretold.learned[4:, 0].mean() >= 0.9
     assert foretold.primitives[-8:, 0].mean() >= 0.75
     assert (foretold.learned[-8:, 2] < 0.5).mean() >= 0.75
-    assert foretold.at_most == pytest.approx(20 / 31)
+    assert foretold.at_most == pytest.approx(28 / 31)
     assert len(prediction_table("told", [("one", foretold)] * 2).rows) == 3
