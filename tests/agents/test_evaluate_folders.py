@@ -71,7 +71,13 @@ def test_markers_without_labels_show_inverse_kinematics():
     shown = replace(demonstrate(("BAD", "BAU"), 1).recording, labels=())
     markers, angles = Setting("markers"), Setting("angles")
     markers.__dict__["recordings"] = (shown,)
-    assert list(evaluations_for(markers)) == ["rhythm", "loops", "glitches", "inverse-kinematics"]
+    assert list(evaluations_for(markers)) == [
+        "rhythm",
+        "loops",
+        "glitches",
+        "peers",
+        "inverse-kinematics",
+    ]
     (table,) = evaluations_for(markers)["inverse-kinematics"](markers)
     assert [row[1] for row in table.rows] == ["human", "robot"]
     assert all(float(row[3].removesuffix(" mm")) < 20 for row in table.rows)

@@ -43,6 +43,13 @@ def glitches(setting: Setting) -> Iterator[Table]:
         yield table
 
 
+def peers(setting: Setting) -> Iterator[Table]:
+    """Segmenters of other libraries on the same takes, where they are installed."""
+    from mplearn.evaluation.experiments import segmenter_table
+
+    yield segmenter_table(setting.described)
+
+
 def activities(setting: Setting) -> Iterator[Table]:
     """Which activity goes on when, the number of activities not given."""
     from mplearn.evaluation.experiments import activity_table
@@ -55,5 +62,6 @@ EVALUATIONS = {
     "rhythm": rhythm,
     "loops": loops,
     "glitches": glitches,
+    "peers": peers,
     "activities": activities,
 }

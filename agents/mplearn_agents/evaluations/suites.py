@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, TypeAlias
 
 from .activities import EVALUATIONS as ACTIVITIES
-from .activities import glitches, loops, rhythm
+from .activities import glitches, loops, peers, rhythm
 from .contents import EVALUATIONS as CONTENTS
 from .people import EVALUATIONS as PEOPLE
 from .people import inverse_kinematics
@@ -37,6 +37,7 @@ UNLABELLED: Mapping[str, Evaluation] = {
     "rhythm": rhythm,
     "loops": loops,
     "glitches": glitches,
+    "peers": peers,
     "inverse-kinematics": inverse_kinematics,
 }
 

@@ -13,6 +13,7 @@ from .judged import anomaly_table as anomaly_table
 from .learning import Outcome as Outcome
 from .learning import learn_session as learn_session
 from .learning import learning_table as learning_table
+from .other_segmenters import segmenter_table as segmenter_table
 from .peers import peers_table as peers_table
 from .people import learn_together as learn_together
 from .people import people_table as people_table
