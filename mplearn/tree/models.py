@@ -17,7 +17,7 @@ _Members = tuple[int, ...]
 
 
 class GroupModels:
-    """Models of nodes, fitted when they are asked for and kept while their exemplars stay.
+    """Models of nodes, fitted when they are asked for; what they are follows from the tree's state.
 
     Args:
         config: Rules of the tree.
@@ -28,6 +28,7 @@ class GroupModels:
         self._config = config
         self._structure = structure
         self._kept: dict[tuple[_Members, _Members], LeftRightHMM | FactorialHMM] = {}
+        self._variances = self._floor()
 
     def of(self, id: int) -> LeftRightHMM | FactorialHMM:
         """Return a node's model: of one chain, or of as many as it needs to be told apart.
@@ -36,6 +37,9 @@ class GroupModels:
         trajectory is nearest, both get another one, fitted to what the others leave unexplained
         [Kulic2008b].
         """
+        floor = self._floor()
+        if not np.array_equal(floor, self._variances):
+            self._kept, self._variances = {}, floor
         node = self._structure.nodes[id]
         neighbour = self._neighbour(node) if self._config.max_chains > 1 else None
         key = tuple(node.members), tuple(neighbour.members) if neighbour else ()
@@ -88,4 +92,9 @@ class GroupModels:
         return min(self._config.n_states, *(len(each) for each in frames))
 
     def _floor(self) -> FloatArray:
-        return _FLOOR**2 * self._structure.memory.variances()
+        """Return the smallest variances: they change with the bank's, so that looking never does.
+
+        What all motion varies by at the moment would make a model depend on when it was asked for.
+        """
+        share = _FLOOR / self._config.variance_floor
+        return np.asarray(share**2 * self._structure.memory.bank.floor)

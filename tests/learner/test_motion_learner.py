@@ -274,3 +274,15 @@ def test_memory_stays_where_nothing_moves() -> None:
         learner.learn_one(frame)
     assert len(learner._buffer) < 2000
     assert learner.tree.leaves == ()
+
+
+def test_looking_changes_nothing_that_is_seen_later(four: Demonstration) -> None:
+    frames = four.recording.frames[:2500]
+    plain, watched = learner_for(four.recording), learner_for(four.recording)
+    plain.learn_many(frames)
+    for start in range(0, len(frames), 250):
+        watched.learn_many(frames[start : start + 250])
+        watched.snapshot()
+    resumed = MotionLearner.from_state(watched.state())
+    assert watched.snapshot().version == plain.snapshot().version
+    assert resumed.snapshot().version == plain.snapshot().version
