@@ -200,7 +200,7 @@ class Placing:
             self._stiff_hand(side, elbow, wrist)
             return
         thumb = self._thumb(wrist, fingers)
-        knuckles = tuple(node for node in fingers if node != thumb)
+        knuckles = tuple(self._knuckle(wrist, node) for node in fingers if node != thumb)
         self._towards(f"hand_{side}", wrist, knuckles, -_TABLE["hand_l"][1][2])
         if thumb is None:
             return
@@ -224,6 +224,12 @@ class Placing:
             way = unit(self.tree.rest[wrist] - self.tree.rest[elbow])
             length = -_TABLE["hand_l"][1][2]
             self._on(f"hand_{side}", wrist, joint, np.eye(3), length * way, self.person.size)
+
+    def _knuckle(self, wrist: int, finger: int) -> int:
+        """Return a finger's knuckle: its first joint, or its second where that one is the palm's."""
+        after = self.tree.longest(finger, wrist)[1][1:2]
+        far = -_TABLE["hand_l"][1][2] * self.person.size
+        return min((finger, *after), key=lambda node: abs(self.tree.length(wrist, node) - far))
 
     def _thumb(self, wrist: int, fingers: list[int]) -> int | None:
         """Return the finger that is the thumb: named so, or the one that stands off most."""

@@ -17,6 +17,7 @@ from ..recording import BoolArray, FloatArray
 BENT = 0.03  # how much of its length a bone may seem to lose by bending
 STRAIGHT_DEG, STIFF = 2.0, 3.0  # a joint that bends less is hardly a knee or a wrist: what it costs
 AT_ROOT = 4.0  # what it costs that both limbs begin at one point, as in a matchstick man
+SKIPPED, MOST_SKIPPED = 0.5, 3  # what a joint between ankle and ball costs, and how many there are
 STRANGE = 12.0  # what a limb costs that no person has
 
 
@@ -40,12 +41,14 @@ class Limb(NamedTuple):
     cost: float
 
 
-def fit_limb(chain: FloatArray, law: LimbLaw) -> Limb:
+def fit_limb(chain: FloatArray, law: LimbLaw, fans: BoolArray) -> Limb:
     """Find a limb's three joints on a chain.
 
     Args:
         chain: Where its joints are, the trunk's first, shape (T, n, 3) [m], n >= 3.
         law: What the limb is like.
+        fans: At which joints three or more bones go on, as fingers do, shape (n,): no wrist or
+            ankle lies beyond such a joint.
 
     Returns:
         The likeliest places, and minus the logarithm of its likelihood.
@@ -59,6 +62,7 @@ def fit_limb(chain: FloatArray, law: LimbLaw) -> Limb:
         cost = _cost(chain, along, (first, middle, last), law)
         cost += AT_ROOT if first == 0 and n > 3 else 0.0
         cost += STIFF * float(stiff[middle] + stiff[last])
+        cost += STRANGE * float(fans[middle + 1 : last].any())
         if cost < best.cost:
             best = Limb((first, middle, last), cost)
     return best
@@ -85,17 +89,24 @@ def _cost(
     for a, b in ((first, middle), (middle, last)):
         straight = np.linalg.norm(chain[:, b] - chain[:, a], axis=1).min()
         cost += 0.5 * ((1.0 - straight / (along[b] - along[a])) / BENT) ** 2 if b > a + 1 else 0.0
-    # a joint that is passed over bends less than the one that is taken for the knee or the elbow
     if last + 1 < len(along):
-        cost += _penalty(np.log((along[last + 1] - along[last]) / upper), law.outer)
+        # the ball and the knuckles may lie behind joints of the foot's and the hand's own bones
         bone = chain[:, last] - chain[:, middle]
-        after = chain[:, last + 1] - chain[:, last]
-        lengths = np.linalg.norm(bone, axis=1) * np.linalg.norm(after, axis=1)
-        cosine = float(np.median((bone * after).sum(axis=1) / np.maximum(lengths, 1e-9)))
-        cost += _penalty(cosine, law.cosine)
+        cost += min(
+            _penalty(np.log((along[k] - along[last]) / upper), law.outer)
+            + _penalty(_cosine(bone, chain[:, k] - chain[:, last]), law.cosine)
+            + SKIPPED * (k - last - 1)
+            for k in range(last + 1, min(last + 1 + MOST_SKIPPED, len(along)))
+        )
     else:
         cost += 1.0
     return min(float(cost), 4 * STRANGE)
+
+
+def _cosine(a: FloatArray, b: FloatArray) -> float:
+    """Return the usual cosine between vectors, shapes (T, 3)."""
+    lengths = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
+    return float(np.median((a * b).sum(axis=1) / np.maximum(lengths, 1e-9)))
 
 
 def _penalty(value: float, law: tuple[float, float]) -> float:

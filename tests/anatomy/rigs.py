@@ -92,6 +92,7 @@ class Rig:
         bends: Whether a longer spine shares out the bends, instead of having stiff joints.
         without: Parts left out: "clavicle", "toes", "ends".
         fingers, twists, helpers, face, prop: Joints that no body needs.
+        metacarpals: Whether each finger begins with a joint near the wrist.
         unit_m: Length of the file's unit [m].
         up: The file's vertical axis.
         yaw: Heading of the whole recording [rad].
@@ -105,6 +106,7 @@ class Rig:
     bends: bool = False
     without: tuple[str, ...] = ()
     fingers: bool = False
+    metacarpals: bool = False
     twists: bool = False
     helpers: bool = False
     face: bool = False
@@ -321,7 +323,8 @@ def _arm(rig, side, add, top, named, pos, mat, on, end, shift):  # type: ignore[
         end(thumb, on(hand, 0.055, -0.012 * out, -0.085) + shift, hand)
         for k, x in enumerate((0.026, 0.009, -0.009, -0.026)):
             base = wrist
-            for joint, z in enumerate((-0.09, -0.125, -0.15)):
+            places = (*((-0.03,) if rig.metacarpals else ()), -0.09, -0.125, -0.15)
+            for joint, z in enumerate(places):
                 where = on(hand, x, 0.0, z) + shift
                 base = add(f"finger{k}{joint}_{side}", base, where, mat[hand])
             end(base, on(hand, x, 0.0, -0.18) + shift, hand)
@@ -351,6 +354,7 @@ RIGS = (
     *(replace(Rig(), spine=n, bends=True) for n in (3, 4, 7)),
     *(replace(Rig(), without=w) for w in (("clavicle",), ("toes",), ("ends",), ("toes", "ends"))),
     Rig(fingers=True, face=True),
+    Rig(fingers=True, metacarpals=True, without=("ends",)),
     Rig(twists=True, helpers=True),
     Rig(names="numbers", zero="hang", prop=True, fingers=True),
     Rig(unit_m=1.0),

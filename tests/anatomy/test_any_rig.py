@@ -30,6 +30,7 @@ def drawn(rng: np.random.Generator) -> Rig:
         bends=bool(rng.integers(2)),
         without=tuple(part for part in ("clavicle", "toes", "ends") if rng.random() < 0.25),
         fingers=bool(rng.integers(2)),
+        metacarpals=bool(rng.integers(2)),
         twists=bool(rng.random() < 0.3),
         helpers=bool(rng.random() < 0.3),
         face=bool(rng.random() < 0.4),
