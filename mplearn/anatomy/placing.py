@@ -226,7 +226,7 @@ class Placing:
             self._on(f"hand_{side}", wrist, joint, np.eye(3), length * way, self.person.size)
 
     def _knuckle(self, wrist: int, finger: int) -> int:
-        """Return a finger's knuckle: its first joint, or its second where that one is the palm's."""
+        """Return a finger's knuckle: its first joint, or its second behind one of the palm."""
         after = self.tree.longest(finger, wrist)[1][1:2]
         far = -_TABLE["hand_l"][1][2] * self.person.size
         return min((finger, *after), key=lambda node: abs(self.tree.length(wrist, node) - far))

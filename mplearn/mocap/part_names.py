@@ -26,8 +26,8 @@ _PARTS = (
     ("pelvis", r"asi|psi|hip|pelv|ias$|ips$|sacr|[fb]wt|^root|trochant|iliac|waist"),
     ("head", r"head|[fb]?hd$|hd\d?$|nose|eye|ear(?!m)|mouth|vertex|ariel|jaw"),
     ("shoulder", r"sho|clav|acr|collar|neck|^c7|cv7|^sj?n?$|manub|ijn?$"),
-    ("trunk", r"t\d+$|tv\d|^l[1-5]$|strn|stern|spine|chest|thorax|back|rbak|rbac|abdom|torso|xiph|"
-              r"^px$|lumbar"),
+    ("trunk", r"(?<![a-z])t\d+$|tv\d|^l[1-5]$|strn|stern|spine|chest|thorax|back|rbak|rbac|abdom|"
+              r"torso|xiph|^px$|lumbar"),
 )  # fmt: skip
 _PATTERNS = tuple((part, re.compile(pattern)) for part, pattern in _PARTS)
 
@@ -70,7 +70,8 @@ def place_of(name: str) -> Place:
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name.split(":")[-1])
     plain = re.sub(r"[^a-z0-9]+", "_", spaced.lower()).strip("_")
     joined = plain.replace("_", "")
-    part = next((part for part, pattern in _PATTERNS if pattern.search(joined)), "")
+    spellings = (joined, plain)  # in one piece, T10 of Anna_T10 would look like the end of joint10
+    part = next((p for p, look in _PATTERNS if any(map(look.search, spellings))), "")
     side = re.match(r"[LR](?=[A-Z][a-z])", spaced)  # as in RBigToe
     return Place(part, side[0].lower() if side else _side(plain))
 

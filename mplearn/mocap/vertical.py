@@ -27,6 +27,7 @@ _USUAL = 1.5  # nat: its format does
 _NAMES = 5.0
 _TELLING = 2.0
 _LEVEL_SPREAD = 0.05  # of the stature: names closer than this in height tell little
+_MOST = 0.8  # of the points: so many names tell what there is
 _STANDS = frozenset(("toe", "heel", "ankle"))
 _FLOOR = 4.0
 _FLOOR_M = (-0.06, 0.13)  # height of the lowest points of a standing foot
@@ -86,8 +87,9 @@ def find_vertical(
     named = _by_names(first, seen, names)
     floor = np.zeros(6)
     evidence = prior + named
-    parts = {place_of(name).part for name in names} - {""}
-    if not parts or parts & _STANDS:  # what is lowest of an arm tells nothing
+    parts = [part for part in (place_of(name).part for name in names) if part]
+    # what is lowest of an arm tells nothing; among points whose names say nothing there may be feet
+    if len(parts) < _MOST * len(names) or not _STANDS.isdisjoint(parts):
         floor = _by_floor(first, seen)
         evidence += floor + _by_motion(first, after, seen, rate_hz) + _by_stature(first, seen)
     best = int(np.argmax(evidence))

@@ -193,6 +193,7 @@ def test_units_as_files_write_them(text: str, unit_m: float | None) -> None:
         *(("LeftForeArm", "elbow", "l"), ("RFRM", "arm", "r"), ("LFIN", "arm", "l")),
         *(("L_FCC", "heel", "l"), ("RHEE", "heel", "r"), ("LHeel", "heel", "l")),
         *(("RBigToe", "toe", "r"), ("L_FM5", "toe", "l"), ("LeftToeBase", "toe", "l")),
+        *(("Anna_T10", "trunk", ""), ("joint14", "", ""), ("Point 12", "", "")),
         *(("L_FAL", "ankle", "l"), ("RAnkle", "ankle", "r"), ("left ankle", "ankle", "l")),
         *(("C7", "shoulder", ""), ("LSHO", "shoulder", "l"), ("Neck", "shoulder", "")),
         *(("T10", "trunk", ""), ("Spine1", "trunk", ""), ("STRN", "trunk", "")),
