@@ -137,8 +137,8 @@ def _limbs(tree: JointTree, pair: _Ways | None, law: LimbLaw, legs: int) -> Limb
     if len(chains[0]) < 3:
         return None
     both = np.concatenate([tree.points[:, list(chain)] for chain in chains])
-    fans = np.array([[len(tree.edges[node]) > 3 for node in chain] for chain in chains])
-    limb = fit_limb(both, law, fans.all(axis=0))
+    edges = np.array([[len(tree.edges[node]) for node in chain] for chain in chains])
+    limb = fit_limb(both, law, np.asarray(edges.min(axis=0) > 3))
     first, middle, last = limb.places
     names = [name for chain in chains for node in chain[1:] for name in tree.names[node]]
     return LimbPair(
