@@ -23,6 +23,7 @@ BAND_HZ = (0.2, 4.0)
 STEP_M = 0.1
 """Least prominence of an extreme of one ankle ahead of the other: half of a short step [m]."""
 
+LEVEL = 0.6  # of how far ahead: an ankle is no higher above the other where a step turns
 PROMINENCE = 0.35  # of the oscillation's usual height, for other motion
 LEAST_CYCLES = 1.5  # of a bout of labelled motion
 LEAST_STRIDES = 2.0  # of a bout of steps, which nobody says are steps
@@ -65,15 +66,25 @@ class CutScore:
     spread: float
 
 
-def find_steps(ahead: FloatArray, rate_hz: float) -> list[Bout]:
+def find_steps(ahead: FloatArray, above: FloatArray, rate_hz: float) -> list[Bout]:
     """Return the bouts of walking and running.
+
+    Where a knee is raised, or a person jogs on the spot, an ankle rises about as far as it goes
+    ahead or back: these are no steps.
 
     Args:
         ahead: How far the left ankle is ahead of the right one, shape (T,) [m].
+        above: How far it is above it, shape (T,) [m].
         rate_hz: Frames per second [1/s].
     """
     band = _band(ahead, rate_hz)
-    return [] if band is None else _bouts("steps", band, STEP_M, LEAST_STRIDES, rate_hz)
+    if band is None:
+        return []
+    return [
+        bout
+        for bout in _bouts("steps", band, STEP_M, LEAST_STRIDES, rate_hz)
+        if np.abs(above[bout.turns]).mean() <= LEVEL * np.abs(ahead[bout.turns]).mean()
+    ]
 
 
 def find_oscillation(label: str, posture: FloatArray, rate_hz: float) -> list[Bout]:

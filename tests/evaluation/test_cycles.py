@@ -21,7 +21,7 @@ def swing(seconds, hz, amplitude=0.3):
 def test_steps_turn_where_a_cosine_does(hz):
     rng = np.random.default_rng(0)
     ahead = swing(20, hz) + rng.normal(0, 0.005, 1200) + 0.1
-    (bout,) = find_steps(ahead, RATE_HZ)
+    (bout,) = find_steps(ahead, 0 * ahead, RATE_HZ)
     phase = 2 * hz * bout.turns / RATE_HZ  # turns lie at whole numbers
     inner = phase[1:-1]
     assert np.abs(inner - np.round(inner)).max() < 0.1
@@ -32,12 +32,18 @@ def test_steps_turn_where_a_cosine_does(hz):
 def test_only_what_repeats_is_a_bout():
     still = np.zeros(300)
     ahead = np.concatenate([still, swing(6, 1.0), still, swing(6, 0.5), still])
-    bouts = find_steps(ahead, RATE_HZ)
+    bouts = find_steps(ahead, 0 * ahead, RATE_HZ)
     assert len(bouts) == 2
     assert 290 <= bouts[0].turns[0] <= 320 and 640 <= bouts[0].turns[-1] <= 690
-    assert find_steps(swing(10, 1.0, amplitude=0.02), RATE_HZ) == []
-    assert find_steps(still, RATE_HZ) == find_steps(still[:10], RATE_HZ) == []
+    assert find_steps(swing(10, 1.0, amplitude=0.02), np.zeros(600), RATE_HZ) == []
+    assert find_steps(still, still, RATE_HZ) == find_steps(still[:10], still[:10], RATE_HZ) == []
     assert find_oscillation("still", np.zeros((300, 2)), RATE_HZ) == []
+
+
+def test_raised_knees_are_no_steps():
+    ahead = swing(10, 0.8)
+    assert len(find_steps(ahead, 0.4 * ahead, RATE_HZ)) == 1  # running: the foot behind is up
+    assert find_steps(ahead, 1.1 * ahead, RATE_HZ) == []
 
 
 def test_the_main_oscillation_is_found_in_any_direction():

@@ -23,12 +23,13 @@ RATES_HZ = (60.0, 30.0)
 SHORTEST_S = 1.5  # of a labelled stretch in which cycles are sought
 NOTE = (
     "Truth is found with look-ahead. Steps turn where one ankle is farthest ahead of the other, "
-    "about where a foot strikes, wherever in a take that repeats by at least 10 cm; labelled "
-    "stretches without steps turn at the extremes of their main oscillation (first principal "
-    "component from 0.2 to 4 Hz). A bout holds at least 1.5 cycles that are alike, 2 of steps. "
-    "Cuts a cycle: all boundaries of the segmenter, those at a bout's ends count half; wanted are "
-    "2, one at each turn. Spread of the phase: root mean square distance from the mean phase of a "
-    "half of the cycle. Missed: bouts with fewer than 0.8 cuts a cycle. Median over bouts."
+    "about where a foot strikes, wherever in a take that repeats, more forth than up, by at least "
+    "10 cm; labelled stretches without steps turn at the extremes of their main oscillation (first "
+    "principal component from 0.2 to 4 Hz). A bout holds at least 1.5 cycles that are alike, 2 of "
+    "steps. Cuts a cycle: all boundaries of the segmenter, those at a bout's ends count half; "
+    "wanted are 2, one at each turn. Spread of the phase: root mean square distance from the mean "
+    "phase of a half of the cycle. Missed: bouts with fewer than 0.8 cuts a cycle. Median over "
+    "bouts."
 )
 
 
@@ -44,8 +45,11 @@ def bouts_of(take: Recording, seen: FloatArray, channels: Sequence[str]) -> list
     posture = seen[:, points] if points else seen
     bouts: list[Bout] = []
     if {"ankle_l.x", "ankle_r.x"} <= set(channels):
-        left, right = channels.index("ankle_l.x"), channels.index("ankle_r.x")
-        bouts = find_steps(seen[:, left] - seen[:, right], take.rate_hz)
+        ahead, above = (
+            seen[:, channels.index(f"ankle_l.{axis}")] - seen[:, channels.index(f"ankle_r.{axis}")]
+            for axis in "xz"
+        )
+        bouts = find_steps(ahead, above, take.rate_hz)
     stepping = np.zeros(len(seen), dtype=np.bool_)
     for bout in bouts:
         stepping[bout.turns[0] : bout.turns[-1]] = True
@@ -82,7 +86,10 @@ def rhythm_table(takes: Iterable[Recording], rates_hz: Sequence[float] = RATES_H
             for score in found:
                 scores[score.bout.label, f"{rate_hz:g} Hz"].append(score)
                 scores["all", f"{rate_hz:g} Hz"].append(score)
-    first = sorted(scores, key=lambda key: (key[0] != "steps", key[0] == "all"))  # stable
+    first = sorted(
+        scores,
+        key=lambda key: (key[0] != "steps", key[0] == "all", key[0], -float(key[1].split()[0])),
+    )
     return Table(
         "Cuts of rhythmic motion",
         (
