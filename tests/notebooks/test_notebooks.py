@@ -4,7 +4,11 @@ from pathlib import Path
 
 import pytest
 
-PRINTS = {"01-from-markers-to-a-walk": "SegmentClosed", "02-train-an-agent": "0 illegal"}
+PRINTS = {
+    "01-from-markers-to-a-walk": "SegmentClosed",
+    "02-train-an-agent": "0 illegal",
+    "03-the-papers-experiments": "primitives 4\n",
+}
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "notebooks").glob("*.ipynb"))
 
 
