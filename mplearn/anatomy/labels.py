@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import re
+from itertools import takewhile
 from typing import NamedTuple
 
 from .synonyms import JOINTS_MIDDLE, JOINTS_SIDED, SKIN_MIDDLE, SKIN_SIDED
@@ -50,6 +51,20 @@ def read_label(label: str) -> list[Label]:
         ways.append(Label(joined[:-1], joined[-1]))
     ways.append(Label(joined, ""))
     return list(dict.fromkeys(ways))
+
+
+def without_shared_prefix(labels: tuple[str, ...]) -> tuple[str, ...]:
+    """Return labels without what all begin with, as ``Skeleton_001_`` of Motive; a side stays."""
+    if len(labels) < 2:
+        return labels
+    pairs = takewhile(lambda pair: pair[0] == pair[1], zip(min(labels), max(labels), strict=False))
+    shared = "".join(letter for letter, _ in pairs)
+    start = shared[: shared.rfind("_") + 1]
+    words = {word for word in start.lower().split("_") if word}
+    named = [label[len(start) :] for label in labels]
+    if words & {"l", "r", "left", "right"}:
+        return labels
+    return tuple(named) if all(name[:1].isalpha() for name in named) else labels
 
 
 def landmarks_of(labels: tuple[str, ...], *, centres: bool) -> dict[str, tuple[str, ...]]:

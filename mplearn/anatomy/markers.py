@@ -18,7 +18,7 @@ from ..mocap.options import option
 from ..recording import FloatArray, Recording
 from .body_map import BodyMap
 from .facing import check_facing
-from .labels import landmarks_of, names_joints
+from .labels import landmarks_of, names_joints, without_shared_prefix
 
 SOME_FRAMES = 120  # of a recording are looked at
 TRUNK, FEWEST_ON_TRUNK = ("pelvis", "abdomen", "chest", "clavicle_l", "clavicle_r"), 4
@@ -52,7 +52,10 @@ def recognise_markers(recording: Recording, names: Mapping[str, str] | None = No
         if known is not None:
             return _map(labels, known, known_set=True)
     heights = _heights(labels, some)
-    candidates = landmarks_of(rest, centres=names_joints(rest))
+    plain = without_shared_prefix(rest)
+    read = landmarks_of(plain, centres=names_joints(plain))
+    pairs = zip(rest, plain, strict=True)
+    candidates = {label: read[short] for label, short in pairs if short in read}
     found = {label: place for label, place in names.items() if place and label in labels}
     taken = set(found.values())
     for label in sorted(candidates, key=lambda label: (label not in seen, len(candidates[label]))):
@@ -88,13 +91,14 @@ def recognise_markers(recording: Recording, names: Mapping[str, str] | None = No
 def _of_known_set(labels: tuple[str, ...]) -> dict[str, str] | None:
     """Return the names that a known set has for its markers, or None if they are of none."""
     try:
-        markers = find_marker_set(labels)
+        plain = without_shared_prefix(labels)
+        markers = find_marker_set(plain)
     except BodyError:
         return None
     names = {plain_name(name): name for name in markers.names}
     return {
-        label: names[plain_name(label)]
-        for label, knows in zip(labels, markers.knows(labels), strict=True)
+        label: names[plain_name(short)]
+        for label, short, knows in zip(labels, plain, markers.knows(plain), strict=True)
         if knows
     }
 

@@ -9,7 +9,10 @@ import numpy as np
 
 from ..recording import FloatArray
 from .files import bad_file
+from .findings import Findings
 
+# steps between frames from which on times count less than seconds: 2 ms are 500 Hz
+_FINER = ((1e-3, "milliseconds", 2.0), (1e-6, "microseconds", 2e3), (1e-9, "nanoseconds", 2e6))
 _EVEN = 0.3  # of a frame: what rounding leaves
 _UNEVEN, _MANY = 0.1, 0.2  # a clock jitters if such a share of its steps is off by such a share
 
@@ -100,3 +103,23 @@ def _jitters(times_s: FloatArray) -> bool:
     even = np.linspace(times_s[0], times_s[-1], len(times_s))
     off = np.abs(times_s - even).max() / steps.mean()
     return bool(uneven.mean() >= _MANY and off < 0.5 and steps.max() < 2.5 * steps.mean())
+
+
+def in_seconds(times: FloatArray, unit_s: float | None, findings: Findings) -> FloatArray:
+    """Return times in seconds.
+
+    Args:
+        times: Time of each frame, shape (T,).
+        unit_s: Their unit [s]; None where it is not said and their steps must tell.
+        findings: Where to tell which unit was taken.
+    """
+    if unit_s is not None:
+        return times * unit_s
+    if len(times) < 2 or np.isnan(times).any():
+        return times
+    step = float(np.median(np.diff(times)))
+    for unit, name, least in _FINER:
+        if least <= step < 500.0 * least:
+            findings.note(f"times are taken as {name}: their steps are {step:.6g}")
+            return times * unit
+    return times

@@ -30,7 +30,7 @@ OPENPOSE_BODY_25 = (
 # fmt: on
 _NUMBERED = {33: MEDIAPIPE_POSE, 25: OPENPOSE_BODY_25}
 
-_SEP = r"[\s._:|/\-]"
+_SEP = r"[\s,._:|/\-]"
 _UNIT_BEHIND = re.compile(r"(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]*?)\s*[\])]\s*$")
 _UNIT_JOINED = re.compile(rf"(?P<name>.*[^\s._]){_SEP}(?P<unit>mm|cm|deg|degrees|rad|m)$", re.I)
 _AXES = (
@@ -39,7 +39,7 @@ _AXES = (
     ),
     re.compile(r"(?P<name>.+?)\s*[\[(](?P<axis>[xyz])[\])]$", re.I),
     re.compile(r"(?P<name>.+?)(?P<axis>[xyz])$", re.I),
-    re.compile(rf"(?P<axis>[xyz]){_SEP}?(?P<name>.+)$", re.I),
+    re.compile(rf"(?:(?:pos|position){_SEP}+)?(?P<axis>[xyz]){_SEP}?(?P<name>.+)$", re.I),
 )  # fmt: skip
 # fmt: off
 _NO_POSITION = frozenset((
@@ -54,7 +54,7 @@ _CONFIDENCE = re.compile(
     re.I,
 )
 _TIME = re.compile(
-    rf"(time|times|timestamps?|time{_SEP}?stamps?|t|elapsed|elapsed{_SEP}?time|clock|secs?|seconds|"
+    rf"(time|times|zeit|temps|tiempo|tempo|tijd|timestamps?|time{_SEP}?stamps?|t|elapsed|elapsed{_SEP}?time|clock|secs?|seconds|"
     rf"ms|msec|milliseconds)({_SEP}?(s|secs?|seconds?|ms|msecs?|milliseconds|us|microseconds|ns|"
     r"nanoseconds|mean|unix))*$",
     re.I,

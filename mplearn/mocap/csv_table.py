@@ -31,7 +31,7 @@ import numpy as np
 
 from ..errors import RecordingError
 from ..recording import FloatArray, IntArray, LabelledSegment, Recording, marker_channels
-from .clock import Clock, even_clock
+from .clock import Clock, even_clock, in_seconds
 from .columns import MEDIAPIPE_POSE, Columns, angle_factor, meaning_of
 from .files import bad_file, head_text, read_text, stem
 from .findings import Findings
@@ -45,8 +45,6 @@ from .space import Space, placed
 
 _MARKERS_SHARE = 0.5  # of the measured columns: from there on it is a table of markers
 _LEAST_MARKERS = 3  # that a .txt file must name to be taken for a table
-# steps between frames from which on times count less than seconds: 2 ms are 500 Hz
-_FINER = ((1e-3, "milliseconds", 2.0), (1e-6, "microseconds", 2e3), (1e-9, "nanoseconds", 2e6))
 _SAME_STEP = 0.01
 _TURN = 2 * np.pi
 
@@ -308,7 +306,7 @@ def _person(path: Path, table: _Table) -> str:
 
 def _clock(path: Path, table: _Table, hints: Hints, findings: Findings) -> tuple[float, Clock]:
     """Return the rate, and where the rows lie on an even clock."""
-    times = [_in_seconds(values, unit, findings) for values, unit in table.times]
+    times = [in_seconds(values, unit, findings) for values, unit in table.times]
     if len(times) > 1 and not all(_same_steps(times[0], other) for other in times[1:]):
         raise bad_file(path, "several columns of times", "one")
     if times:
@@ -335,19 +333,6 @@ def _by_numbers(path: Path, numbers: FloatArray) -> Clock:
         row = int(np.argmax(off))
         raise bad_file(path, f"frame {numbers[row]:g} in row {row + 1}", "evenly numbered frames")
     return Clock(np.nan, places, False)
-
-
-def _in_seconds(times: FloatArray, unit_s: float | None, findings: Findings) -> FloatArray:
-    if unit_s is not None:
-        return times * unit_s
-    if len(times) < 2 or np.isnan(times).any():
-        return times
-    step = float(np.median(np.diff(times)))
-    for unit, name, least in _FINER:
-        if least <= step < 500.0 * least:
-            findings.note(f"times are taken as {name}: their steps are {step:.6g}")
-            return times * unit
-    return times
 
 
 def _same_steps(one: FloatArray, other: FloatArray) -> bool:

@@ -19,6 +19,7 @@ _UNIT = re.compile(
     r"[\[(]?(mm|cm|m|meters?|millimeters?|s|sec|seconds|ms|deg|degrees|°|rad)[\])]?", re.I
 )
 _LOOK = 40  # lines
+_COMMENT = "#%"
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +133,8 @@ def find_header(sheet: Sheet) -> Header:
             start = line
             break
         if line == 0 or not above:
+            if cells[0][:1] in _COMMENT and 2 * len(cells) < _width_below(sheet, line):
+                continue  # a remark, not the names
             cells = _uncommented(cells)
             if sheet.is_data(line):
                 raise bad_file(
@@ -146,8 +149,14 @@ def find_header(sheet: Sheet) -> Header:
 
 def _uncommented(cells: list[str]) -> list[str]:
     """Return a row without the mark of a comment before it, as numpy writes headers."""
-    first = cells[0].lstrip("#%").strip()
+    first = cells[0].lstrip(_COMMENT).strip()
     return [first, *cells[1:]]
+
+
+def _width_below(sheet: Sheet, line: int) -> int:
+    """Return how many cells the widest of the lines below has."""
+    below = range(line + 1, min(len(sheet.lines), line + _LOOK))
+    return max((len(sheet.cells(k)) for k in below), default=0)
 
 
 def _joined_names(above: list[list[str]]) -> tuple[str, ...]:

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from ..recording import FloatArray, Recording, marker_channels
-from .clock import even_clock
+from .clock import even_clock, in_seconds
 from .columns import meaning_of
 from .files import bad_file, cmu_subject, read_text, stem
 from .findings import Findings
 from .names import chosen_names
 from .numbers import measured_rows, number
 from .reader import Hints, Reader
+from .sheet import Sheet
 from .size import UNITS_M, named_unit
 from .space import Space, placed
 
@@ -33,9 +34,9 @@ class TRCReader(Reader):
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read the markers; see `Reader.read`."""
         findings = Findings(self.format)
-        lines = read_text(path).splitlines()
-        header = _Header.parse(path, lines)
-        values, labels = _table(path, lines, header, findings)
+        sheet = Sheet.of(path, read_text(path), separators="\t")
+        header = _Header.parse(path, sheet.lines)
+        values, labels = _table(sheet, header, findings)
         measured = values[:, 2:].reshape(len(values), -1, 3)
         measured[(measured == 0.0).all(axis=2)] = np.nan
         seen = (~np.isnan(measured).any(axis=2)).sum(axis=0)
@@ -59,7 +60,7 @@ class _Header:
     """What the lines above the table say.
 
     Attributes:
-        values: By name, as text.
+        values: By name in small letters, as text.
         names_at: Line of the markers' names, from 0.
     """
 
@@ -68,43 +69,37 @@ class _Header:
 
     @classmethod
     def parse(cls, path: Path, lines: list[str]) -> _Header:
-        if len(lines) < 6 or not lines[0].startswith("PathFileType"):
+        if len(lines) < 6 or not lines[0].lower().startswith("pathfiletype"):
             raise bad_file(path, f"starts with {lines[0][:40]!r}", _EXPECTED)
         first = [line.split("\t")[0].strip().lower() for line in lines[:12]]
-        at = next((i for i, cell in enumerate(first) if cell.strip("#") == "frame"), None)
+        at = next((i for i, cell in enumerate(first) if cell.strip("# ") == "frame"), None)
         if at is None:
             raise bad_file(path, f"line 4 starts with {lines[3][:40]!r}", _EXPECTED)
         names, values = (lines[at - 2], lines[at - 1]) if at >= 2 else ("", "")
         pairs = [(names.split("\t"), values.split("\t")), (names.split(), values.split())]
         # a value left empty shows between tabs only; without tabs, words are all there is
         names_, values_ = pairs[0] if len(pairs[0][0]) > 1 else pairs[1]
-        stripped = ((n.strip(), v.strip()) for n, v in zip(names_, values_, strict=False))
-        return cls(dict(stripped), at)
+        said = zip(names_, values_, strict=False)
+        return cls({n.strip().lower(): v.strip() for n, v in said}, at)
 
     def compare(self, path: Path, name: str, count: int, what: str, findings: Findings) -> None:
         """Warn where a count in the header is another than what is there."""
-        said = self.values.get(name, "")
+        said = self.values.get(name.lower(), "")
         if said.isascii() and said.isdecimal() and said.lstrip("0") == str(count):
             return
         findings.warn(f"{name} is {said[:20] or 'missing'}, but {count} {what} are there and read")
 
 
-def _table(
-    path: Path, lines: list[str], header: _Header, findings: Findings
-) -> tuple[FloatArray, list[str]]:
+def _table(sheet: Sheet, header: _Header, findings: Findings) -> tuple[FloatArray, list[str]]:
     """Return frame numbers, times and coordinates, shape (T, 2 + 3M), and the M names."""
+    path, lines = sheet.path, sheet.lines
     labels = _labels(lines[header.names_at].rstrip("\r\n").split("\t")[2:])
     if not labels:
         raise bad_file(path, "no marker names", "at least one")
     start = header.names_at + 1
     if start < len(lines) and _names_axes(lines[start]):
         start += 1
-    rows = (
-        (place, line.split("\t"))
-        for place, line in enumerate(lines[start:], start=start + 1)
-        if line.strip()
-    )
-    values = measured_rows(path, rows, 2 + 3 * len(labels), findings, group=3)
+    values = measured_rows(path, sheet.rows(start), 2 + 3 * len(labels), findings, group=3)
     if not len(values):
         raise bad_file(path, "0 frames", "at least one")
     return values, labels
@@ -116,6 +111,8 @@ def _labels(cells: list[str]) -> list[str]:
     while labels and not labels[-1]:
         labels.pop()
     if not any(name for i, name in enumerate(labels) if i % 3):
+        return labels[::3]
+    if len(labels) % 3 == 0 and labels[::3] == labels[1::3] == labels[2::3]:
         return labels[::3]
     triples = meaning_of(labels).markers  # a name for each column: nose_x, nose_y, nose_z
     if [i for axes in triples.values() for i in axes] == list(range(len(labels))):
@@ -137,13 +134,18 @@ def _in_time(
     findings: Findings,
 ) -> tuple[float, FloatArray]:
     """Return the rate and the points at even times, shape (T', M, 3)."""
-    said = header.values.get("DataRate", "")
-    rate_hz = number(path, said, "DataRate") if said or hints.rate_hz is None else np.nan
+    said = header.values.get("datarate", "")
+    rate_hz = (
+        number(path, said.replace(",", "."), "DataRate")
+        if said or hints.rate_hz is None
+        else np.nan
+    )
     clock = None
     if np.isnan(times_s).all() or not np.ptp(times_s):
         if len(points) > 1:
             findings.note("there are no times; frames are taken as even")
     else:
+        times_s = in_seconds(times_s, None, findings)
         clock = even_clock(path, times_s)
         points = clock.even(points.reshape(len(points), -1)).reshape(-1, *points.shape[1:])
         if clock.jitters:
@@ -166,7 +168,7 @@ def _in_time(
 
 
 def _space(path: Path, header: _Header, hints: Hints) -> Space:
-    text = header.values.get("Units", "")
+    text = header.values.get("units", "")
     unit = named_unit(text)
     if unit is None and text and hints.unit_m is None:
         raise bad_file(path, f"unit of length {text!r}", f"one of {', '.join(UNITS_M)}")

@@ -25,6 +25,15 @@ def test_labels_of_any_system_are_the_same_person(truth, name):
     assert np.median(points) < 15.0
 
 
+@pytest.mark.parametrize("name", ["cast", "helen_hayes", "opencap"])
+def test_what_all_labels_begin_with_says_nothing(truth, name):
+    recording = labelled(name, truth.body, truth.postures, 25.0)
+    labels = tuple(f"Skeleton_001_{label}" for label in recording.marker_names)
+    found = recognise(replace(recording, channels=marker_channels(labels)))
+    assert found.places == recognise(recording).places
+    assert set(found.points) <= set(labels)
+
+
 @pytest.mark.parametrize("name", ["helen_hayes", "cast", "sports", "opencap", "mediapipe"])
 def test_a_label_on_the_wrong_segment_is_left_out_and_said(truth, name):
     recording = labelled(name, truth.body, truth.postures, 25.0)

@@ -47,7 +47,8 @@ def spelling(draw: st.DrawFn) -> dict[str, object]:
     return {
         "name": draw(
             st.sampled_from(
-                ["{m}.{a}", "{m}_{A}", "{m} {a}", "{m}:{A}", "{m}-{a}", "{m}{A}", "{m}_pos_{a}",
+                ["{m}, {A}", "pos_{a}_{m}",
+                 "{m}.{a}", "{m}_{A}", "{m} {a}", "{m}:{A}", "{m}-{a}", "{m}{A}", "{m}_pos_{a}",
                  "{m} ({A})", "{a}_{m}", "Anna:{m}.{a}"]
             )
         ),
@@ -64,6 +65,7 @@ def spelling(draw: st.DrawFn) -> dict[str, object]:
         "missing": draw(st.sampled_from(["", "NaN", "NA", "null", "n/a"])),
         "trailing": draw(st.integers(0, 3)),
         "quoted": draw(st.booleans()),
+        "remark": draw(st.sampled_from(["", "# made by hand\n# in 2024\n"])),
         "rate_hz": draw(st.sampled_from([25.0, 30.0, 100.0, 240.0])),
     }  # fmt: skip
 
@@ -85,7 +87,9 @@ def test_tables_in_any_spelling(
         header += [str(how["name"]).format(m=name, a=axis, A=axis.upper()) + unit for axis in "xyz"]
     if how["quoted"]:
         header = [f'"{name}"' for name in header]
-    lines = [separator.join(header) + trailing]
+    elif separator == ",":
+        header = [f'"{name}"' if "," in name else name for name in header]
+    lines = [str(how["remark"]) + separator.join(header) + trailing]
     for i, frame in enumerate(points / unit_m):
         cells = [str(i + 5)] * bool(how["frame"]) + [f"{i / how['rate_hz'] / time_s:.4f}"]  # type: ignore[operator]
         cells += [str(how["missing"]) if np.isnan(x) else f"{x:.4f}" for x in frame.ravel()]
@@ -345,6 +349,11 @@ def test_qualisys_of_other_data(tmp_path: Path) -> None:
 # TRC -----------------------------------------------------------------------------------------
 
 
+def in_milliseconds(row: str) -> str:
+    cells = row.split("\t")
+    return "\t".join([cells[0], f"{1000 * float(cells[1]):.1f}", *cells[2:]]) if row else row
+
+
 def test_trc_spelled_otherwise(tmp_path: Path, standing: Recording) -> None:
     points = standing.markers[:, :8]
     path = write_trc(tmp_path / "a.trc", y_up(points), rate_hz=60.0, units="mm")
@@ -368,6 +377,15 @@ def test_trc_spelled_otherwise(tmp_path: Path, standing: Recording) -> None:
         "subject": text.replace("\tM", "\tAnna:M"),
         "no unit": text.replace("\tmm\t", "\t\t"),
         "frame from zero": text.replace("Frame#", "Frame"),
+        "frame with a blank": text.replace("Frame#", "Frame #"),
+        "capitals": text.replace("PathFileType", "PATHFILETYPE").replace("DataRate", "DATARATE"),
+        "decimal commas": "\n".join(
+            [*lines[:2], lines[2].replace(".", ","), *lines[3:6], rest.replace(".", ",")]
+        ),
+        "milliseconds": "\n".join([*lines[:6], *map(in_milliseconds, lines[6:])]),
+        "a name three times": "\n".join(
+            [*lines[:3], "Frame#\tTime\t" + "\t".join(n for n in names for _ in "xyz"), rest]
+        ),
     }
     for what, content in spelled.items():
         path.write_bytes(content.encode())
