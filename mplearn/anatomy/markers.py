@@ -7,6 +7,7 @@ What lies where its landmark cannot be is left out.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 
 import numpy as np
@@ -66,6 +67,7 @@ def recognise_markers(recording: Recording, names: Mapping[str, str] | None = No
             found[label] = free[0]
             taken.add(free[0])
     warnings: list[str] = []
+    _warn_of_others(found, labels, warnings)
     _drop_middle_of_shoulders(found, labels, some)
     _drop_odd(found, labels, some, names, warnings)
     if sum(label in seen for label in found) < FEWEST:
@@ -149,6 +151,24 @@ def _heights(labels: tuple[str, ...], some: FloatArray) -> dict[str, float]:
     low, high = known.min(), known.max()
     shares = (usual - low) / max(high - low, 1e-6)
     return {label: float(s) for label, s in zip(labels, shares, strict=True) if np.isfinite(s)}
+
+
+def _warn_of_others(found: Mapping[str, str], labels: tuple[str, ...], warnings: list[str]) -> None:
+    """Warn of people beside the one that was found: ``Ben:LASI`` where ``Anna:LASI`` is used."""
+    subjects = {label: label.rpartition(":")[::2] for label in labels}
+    used = {subjects[label][1] for label in found if subjects[label][0]}
+    one = Counter(subjects[label][0] for label in found if subjects[label][0])
+    others = Counter(
+        subject
+        for label, (subject, name) in subjects.items()
+        if label not in found and name in used
+    )
+    people = [subject for subject, count in others.items() if subject and count >= FEWEST]
+    if people:
+        warnings.append(
+            f"there is more than one person; {one.most_common(1)[0][0]!r} is used, and not "
+            f"{', '.join(map(repr, people[:5]))} (write each to a file of its own)"
+        )
 
 
 def _drop_middle_of_shoulders(

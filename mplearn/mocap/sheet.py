@@ -45,7 +45,8 @@ class Sheet:
         some = [line for line in lines[:_LOOK] if line.strip()]
         # the first line that has any tells: names hold no separators, numbers may hold commas
         telling = next((line for line in some if any(s in line for s in separators)), "")
-        separator = max(separators, key=telling.count) if telling else ""
+        bare = re.sub(r'"[^"]*"', "", telling)  # a quoted name may hold any of them
+        separator = max(separators, key=bare.count) if telling else ""
         sheet = cls(path, lines, separator, False)
         cells = [cell for i in range(min(len(lines), _LOOK)) for cell in sheet.cells(i)]
         commas = sum(bool(_DECIMAL_COMMA.fullmatch(cell)) for cell in cells)

@@ -34,6 +34,20 @@ def test_what_all_labels_begin_with_says_nothing(truth, name):
     assert set(found.points) <= set(labels)
 
 
+def test_of_two_people_one_is_used_and_said(truth):
+    recording = labelled("cast", truth.body, truth.postures, 25.0)
+    names = recording.marker_names
+    both = np.concatenate(
+        [recording.markers, recording.markers + np.array((1.0, 0.5, 0.0))], axis=1
+    )
+    labels = (*(f"Anna:{name}" for name in names), *(f"Ben:{name}" for name in names))
+    found = recognise(
+        replace(recording, frames=both.reshape(len(both), -1), channels=marker_channels(labels))
+    )
+    assert {point.split(":")[0] for point in found.points} == {"Anna"}
+    assert any("'Anna' is used, and not 'Ben'" in warning for warning in found.warnings)
+
+
 @pytest.mark.parametrize("name", ["helen_hayes", "cast", "sports", "opencap", "mediapipe"])
 def test_a_label_on_the_wrong_segment_is_left_out_and_said(truth, name):
     recording = labelled(name, truth.body, truth.postures, 25.0)

@@ -87,8 +87,7 @@ def test_tables_in_any_spelling(
         header += [str(how["name"]).format(m=name, a=axis, A=axis.upper()) + unit for axis in "xyz"]
     if how["quoted"]:
         header = [f'"{name}"' for name in header]
-    elif separator == ",":
-        header = [f'"{name}"' if "," in name else name for name in header]
+    header = [f'"{n}"' if "," in n and '"' not in n else n for n in header]
     lines = [str(how["remark"]) + separator.join(header) + trailing]
     for i, frame in enumerate(points / unit_m):
         cells = [str(i + 5)] * bool(how["frame"]) + [f"{i / how['rate_hz'] / time_s:.4f}"]  # type: ignore[operator]
