@@ -111,7 +111,7 @@ def plain_points(recording: Recording) -> tuple[str, ...]:
     """Return the points of a recording without those that only show how a joint is turned."""
     if not recording.is_markers:
         return ()
-    from mplearn.mocap.kinematics import AXIS_MARK
+    from mplearn.mocap.skeletons.kinematics import AXIS_MARK
 
     ends = tuple(f"{AXIS_MARK}{axis}" for axis in "xyz")
     shown = recording.skeleton is not None

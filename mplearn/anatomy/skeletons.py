@@ -14,8 +14,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..errors import BodyError
-from ..mocap.kinematics import AXIS_MARK
 from ..mocap.options import option
+from ..mocap.skeletons.kinematics import AXIS_MARK
 from ..recording import Recording, Skeleton
 from .body_map import BodyMap
 from .joint_tree import JointTree

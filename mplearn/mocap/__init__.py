@@ -9,11 +9,11 @@ from .open import open_recordings as open_recordings
 from .open import open_takes as open_takes
 from .open import take_names as take_names
 from .options import command_line as command_line
+from .placing.size import UNITS_M as UNITS_M
+from .placing.size import named_unit as named_unit
+from .placing.vertical import DIRECTIONS as DIRECTIONS
 from .reader import Hints as Hints
 from .reader import Reader as Reader
 from .registry import readers as readers
 from .registry import register_reader as register_reader
 from .resample import resample as resample
-from .size import UNITS_M as UNITS_M
-from .size import named_unit as named_unit
-from .vertical import DIRECTIONS as DIRECTIONS

@@ -13,24 +13,24 @@ import numpy as np
 
 from ..errors import RecordingError, RecordingWarning
 from ..recording import ReadReport, Recording
-from .amc import AMCReader
-from .bvh import BVHReader
-from .c3d import C3DReader
-from .csv_table import CSVReader
 from .files import bad_file, is_file, is_folder, stem
-from .g1_csv import G1CSVReader
 from .labels import labels_beside
-from .motive import MotiveReader
-from .mvnx import MVNXReader
-from .nexus import NexusReader
-from .qualisys import QualisysReader
+from .markers.c3d import C3DReader
+from .markers.csv_table import CSVReader
+from .markers.motive import MotiveReader
+from .markers.nexus import NexusReader
+from .markers.qualisys import QualisysReader
+from .markers.trc import TRCReader
+from .markers.ui_prmd import UIPRMDReader
+from .markers.xdf import XDFReader
 from .reader import Hints, Reader, joined
 from .registry import reader_for, reader_of, register_reader, suffixes
 from .resample import resample
-from .smpl import SMPLReader
-from .trc import TRCReader
-from .ui_prmd import UIPRMDReader
-from .xdf import XDFReader
+from .skeletons.amc import AMCReader
+from .skeletons.bvh import BVHReader
+from .skeletons.g1_csv import G1CSVReader
+from .skeletons.mvnx import MVNXReader
+from .skeletons.smpl import SMPLReader
 
 # the most general first: the latest is asked first
 for _reader in (

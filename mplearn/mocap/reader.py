@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import InvalidValueError, RecordingError
 from ..recording import Recording
 from .files import stem
-from .vertical import DIRECTIONS
+from .placing.vertical import DIRECTIONS
 
 
 @dataclass(frozen=True)

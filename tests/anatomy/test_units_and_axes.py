@@ -14,7 +14,7 @@ from rigs import RIGS, Rig, write_rig
 
 from mplearn.body import human_body
 from mplearn.mocap import open_recording
-from mplearn.mocap.stature import unit_of_skeleton
+from mplearn.mocap.skeletons.stature import unit_of_skeleton
 
 UNITS_M = (0.01, 1.0, 0.001, 0.0254, 0.0254 / 0.45, 0.1, 0.3048)
 

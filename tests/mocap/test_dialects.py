@@ -22,7 +22,7 @@ from mocap_writers import (
 from mplearn.demonstrator import demonstrate
 from mplearn.errors import RecordingError, RecordingWarning
 from mplearn.mocap import Hints, open_recording
-from mplearn.mocap.columns import MEDIAPIPE_POSE, meaning_of
+from mplearn.mocap.markers.columns import MEDIAPIPE_POSE, meaning_of
 from mplearn.recording import Recording
 
 pytestmark = pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")

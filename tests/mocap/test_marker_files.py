@@ -12,8 +12,8 @@ from mocap_writers import person, write_c3d, write_csv, write_trc, write_ui_prmd
 
 from mplearn.errors import InvalidValueError, RecordingError, RecordingWarning
 from mplearn.mocap import Hints, open_recording, open_recordings, take_names
-from mplearn.mocap.space import to_z_up
-from mplearn.mocap.ui_prmd import PLUG_IN_GAIT_MARKERS
+from mplearn.mocap.markers.ui_prmd import PLUG_IN_GAIT_MARKERS
+from mplearn.mocap.placing.space import to_z_up
 from mplearn.recording import LabelledSegment
 
 

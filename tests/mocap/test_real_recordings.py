@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from mplearn.errors import RecordingError
 from mplearn.mocap import Hints, open_recording, resample, take_names
-from mplearn.mocap.cmu_humanoid import CMU_COLUMNS
+from mplearn.mocap.skeletons.cmu_humanoid import CMU_COLUMNS
 from mplearn.recording import Recording
 
 pytestmark = needs_data

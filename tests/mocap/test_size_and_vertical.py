@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from mplearn.demonstrator import demonstrate
 from mplearn.mocap import open_recording
-from mplearn.mocap.part_names import place_of
-from mplearn.mocap.size import CMU_UNIT_M, UNITS_M, find_unit, named_unit
-from mplearn.mocap.space import upright
-from mplearn.mocap.vertical import DIRECTIONS, find_vertical
+from mplearn.mocap.placing.part_names import place_of
+from mplearn.mocap.placing.size import CMU_UNIT_M, UNITS_M, find_unit, named_unit
+from mplearn.mocap.placing.space import upright
+from mplearn.mocap.placing.vertical import DIRECTIONS, find_vertical
 
 RATE_HZ = 50.0
 LEGS = ("KNE", "ANK", "HEE", "TOE", "MT5", "ASI", "PSI")

@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 
 from mplearn.errors import RecordingError, RecordingWarning
 from mplearn.mocap import Hints, open_recording
-from mplearn.mocap.g1 import BASE, G1_JOINTS
+from mplearn.mocap.skeletons.g1 import BASE, G1_JOINTS
 from mplearn.recording import Recording
 
 

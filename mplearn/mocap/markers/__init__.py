@@ -1,0 +1,1 @@
+"""Formats of markers and tables: where points are, by name."""

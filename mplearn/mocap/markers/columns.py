@@ -1,0 +1,225 @@
+"""What the columns of a table mean, by their names, in whatever spelling.
+
+Markers are three columns of one name and the axes x, y, z: ``LFHD.x``, ``LFHD_X``, ``LFHD x (mm)``,
+``LFHD:X``, ``LFHDx``, ``x_nose``, ``x0``. Times and frame numbers have names of their own.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..placing.size import named_unit
+
+# fmt: off
+MEDIAPIPE_POSE = (
+    "nose", "left_eye_inner", "left_eye", "left_eye_outer", "right_eye_inner", "right_eye",
+    "right_eye_outer", "left_ear", "right_ear", "mouth_left", "mouth_right", "left_shoulder",
+    "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist", "left_pinky",
+    "right_pinky", "left_index", "right_index", "left_thumb", "right_thumb", "left_hip",
+    "right_hip", "left_knee", "right_knee", "left_ankle", "right_ankle", "left_heel",
+    "right_heel", "left_foot_index", "right_foot_index",
+)
+OPENPOSE_BODY_25 = (
+    "Nose", "Neck", "RShoulder", "RElbow", "RWrist", "LShoulder", "LElbow", "LWrist", "MidHip",
+    "RHip", "RKnee", "RAnkle", "LHip", "LKnee", "LAnkle", "REye", "LEye", "REar", "LEar",
+    "LBigToe", "LSmallToe", "LHeel", "RBigToe", "RSmallToe", "RHeel",
+)
+# fmt: on
+_NUMBERED = {33: MEDIAPIPE_POSE, 25: OPENPOSE_BODY_25}
+
+_SEP = r"[\s,._:|/\-]"
+_UNIT_BEHIND = re.compile(r"(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]*?)\s*[\])]\s*$")
+_UNIT_JOINED = re.compile(rf"(?P<name>.*[^\s._]){_SEP}(?P<unit>mm|cm|deg|degrees|rad|m)$", re.I)
+_AXES = (
+    re.compile(
+        rf"(?P<name>.+?){_SEP}+(?:pos|position|loc|t|translate)?{_SEP}*(?P<axis>[xyz])$", re.I
+    ),
+    re.compile(r"(?P<name>.+?)\s*[\[(](?P<axis>[xyz])[\])]$", re.I),
+    re.compile(r"(?P<name>.+?)(?P<axis>[xyz])$", re.I),
+    re.compile(rf"(?:(?:pos|position){_SEP}+)?(?P<axis>[xyz]){_SEP}?(?P<name>.+)$", re.I),
+)  # fmt: skip
+# fmt: off
+_NO_POSITION = frozenset((
+    "r", "rot", "rotation", "q", "quat", "quaternion", "ori", "orient", "orientation", "ang",
+    "angle", "angles", "euler", "vel", "velocity", "acc", "acceleration", "gyro", "mag", "force",
+    "moment", "torque", "grf", "cop", "power", "scale",
+))
+# fmt: on
+_CONFIDENCE = re.compile(
+    rf"(.*{_SEP})?(visibility|presence|likelihood|confidence|conf|score|prob|probability|residual|"
+    r"reprojection_?error|v|c|p)\d*$",
+    re.I,
+)
+_TIME = re.compile(
+    rf"(time|times|zeit|temps|tiempo|tempo|tijd|timestamps?|time{_SEP}?stamps?|t|elapsed|elapsed{_SEP}?time|clock|secs?|seconds|"
+    rf"ms|msec|milliseconds)({_SEP}?(s|secs?|seconds?|ms|msecs?|milliseconds|us|microseconds|ns|"
+    r"nanoseconds|mean|unix))*$",
+    re.I,
+)
+_TIME_UNITS = {
+    **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), 1.0),
+    **dict.fromkeys(("ms", "msec", "msecs", "milliseconds"), 1e-3),
+    **dict.fromkeys(("us", "microseconds"), 1e-6),
+    **dict.fromkeys(("ns", "nanoseconds"), 1e-9),
+}
+_FRAME = re.compile(
+    rf"(unnamed: ?0|#|index|idx|row|sample|samples|field)$|(sub)?{_SEP}?frames?{_SEP}?"
+    rf"(#|no\.?|nr\.?|num|number|index|idx|id|count)?$|(sample|field|row|item){_SEP}?"
+    r"(#|no\.?|num|number|index|idx)$",
+    re.I,
+)
+_TEXTS = ("label", "segment", "person")
+_POINTS = re.compile(
+    rf"(marker|landmark|joint|key{_SEP}?point|body{_SEP}?part|point|trajectory|name)"
+    rf"({_SEP}?(name|id|index|label))?$",
+    re.I,
+)
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What the columns of a table mean; each is named by its index.
+
+    Attributes:
+        names: Names of all columns, without units.
+        units: What their header says of their units, as text; empty where nothing.
+        times: Columns that may be times.
+        frames: Columns that may be numbers of frames.
+        texts: Columns of ``label``, ``segment`` and ``person``.
+        markers: Markers by name, each with its columns x, y, z.
+        doubled: Names of markers that come more than once; the first counts.
+        confidences: How sure a landmark is; no measurement.
+        points: Column that names the point of each row, where each row is one point.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    times: tuple[int, ...]
+    frames: tuple[int, ...]
+    texts: dict[str, int]
+    markers: dict[str, tuple[int, int, int]]
+    doubled: tuple[str, ...]
+    confidences: tuple[int, ...]
+    points: int | None
+
+    @property
+    def measured(self) -> list[int]:
+        """Columns that may be measurements."""
+        other = {*self.times, *self.frames, *self.texts.values(), *self.confidences, self.points}
+        return [i for i in range(len(self.names)) if i not in other]
+
+    def time_unit_s(self, column: int) -> float | None:
+        """Return the unit of a column of times [s], if its header says it."""
+        said = self.units[column].lower()
+        last = re.split(_SEP, self.names[column].lower())[-1]
+        return _TIME_UNITS.get(said, _TIME_UNITS.get(last) if last != "t" else None)
+
+
+def meaning_of(header: Sequence[str]) -> Columns:
+    """Return what columns mean, by their names."""
+    split = [_without_unit(name.strip()) for name in header]
+    names, units = tuple(name for name, _ in split), tuple(unit for _, unit in split)
+    texts = {name.lower(): i for i, name in enumerate(names) if name.lower() in _TEXTS}
+    special = set(texts.values())
+    times = [i for i, name in enumerate(names) if i not in special and _TIME.fullmatch(name)]
+    special |= set(times)
+    frames = [
+        i
+        for i, name in enumerate(names)
+        if i not in special and (_FRAME.fullmatch(name) or (not name and i == 0))
+    ]
+    special |= set(frames)
+    free = [i for i in range(len(names)) if i not in special]
+    axes = {names[i].lower(): i for i in free}
+    points = [i for i in free if _POINTS.fullmatch(names[i])]
+    if points and {"x", "y", "z"} <= axes.keys():
+        # a row for each point; names tell more than numbers
+        best = min(points, key=lambda i: names[i].lower().endswith(("id", "index")))
+        return Columns(names, units, tuple(times), tuple(frames), texts, {}, (), (), best)
+    markers, doubled = _markers(names, free)
+    used = {i for columns in markers.values() for i in columns}
+    confidences = [i for i in free if i not in used and _CONFIDENCE.fullmatch(names[i])]
+    return Columns(
+        names,
+        units,
+        tuple(times),
+        tuple(frames),
+        texts,
+        _by_number(markers),
+        doubled,
+        tuple(confidences) if markers else (),
+        None,
+    )
+
+
+def angle_factor(unit: str) -> float | None:
+    """Return what turns an angle of a named unit to radians; None for no unit of angle."""
+    plain = unit.strip().lower().rstrip(".")
+    if plain in ("deg", "degree", "degrees", "°"):
+        return 0.017453292519943295
+    return 1.0 if plain in ("rad", "radian", "radians") else None
+
+
+def _without_unit(name: str) -> tuple[str, str]:
+    for pattern in (_UNIT_BEHIND, _UNIT_JOINED):
+        match = pattern.fullmatch(name)
+        if match is None or not match["name"]:
+            continue
+        unit = match["unit"]
+        known = (
+            named_unit(unit) is not None
+            or angle_factor(unit) is not None
+            or unit.lower() in _TIME_UNITS
+        )
+        if known:
+            return match["name"].strip(), unit
+    return name, ""
+
+
+def _markers(
+    names: tuple[str, ...], free: list[int]
+) -> tuple[dict[str, tuple[int, int, int]], tuple[str, ...]]:
+    markers: dict[str, tuple[int, int, int]] = {}
+    doubled: list[str] = []
+    left = list(free)
+    for pattern in _AXES:
+        groups: defaultdict[str, dict[str, list[int]]] = defaultdict(lambda: defaultdict(list))
+        for i in left:
+            match = pattern.fullmatch(names[i])
+            if match is not None and _last_word(match["name"]) not in _NO_POSITION:
+                groups[match["name"].strip()][match["axis"].lower()].append(i)
+        for name, axes in groups.items():
+            if set(axes) != {"x", "y", "z"}:
+                continue
+            if name in markers or any(len(columns) > 1 for columns in axes.values()):
+                doubled.append(name)
+            markers.setdefault(name, (axes["x"][0], axes["y"][0], axes["z"][0]))
+            left = [i for i in left if i not in {i for each in axes.values() for i in each}]
+    order = sorted(markers.items(), key=lambda item: min(item[1]))
+    return dict(order), tuple(doubled)
+
+
+def _last_word(name: str) -> str:
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
+    words = [word for word in re.split(_SEP, spaced) if word]
+    return words[-1].lower() if words else ""
+
+
+def _by_number(markers: dict[str, tuple[int, int, int]]) -> dict[str, tuple[int, int, int]]:
+    """Name the landmarks of a known number that are only numbered."""
+    names = _NUMBERED.get(len(markers))
+    numbers = [re.fullmatch(r"(?:landmark|point|kp|p|joint|keypoint)?[\s._]*(\d{1,3})", name, re.I)
+               for name in markers]  # fmt: skip
+    if names is None or not all(numbers):
+        return markers
+    counted = [int(match[1]) for match in numbers if match]
+    first = min(counted)
+    if first > 1 or sorted(counted) != list(range(first, first + len(names))):
+        return markers
+    return {
+        names[number - first]: columns
+        for number, columns in zip(counted, markers.values(), strict=True)
+    }

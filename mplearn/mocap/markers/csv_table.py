@@ -1,0 +1,369 @@
+"""Tables with a header of column names: CSV, TSV and their like, from any tool.
+
+The separator is a comma, semicolon, tab or white space; decimals have a point or a comma; an empty
+cell, ``NaN``, ``NA`` or ``null`` is a missing measurement. Special names, in any spelling, are:
+
+* ``time``, ``time_s``, ``t``, ``timestamp``, ``Time (ms)``, ...: when; without such a column
+  `Hints.rate_hz` is needed;
+* ``frame``, ``Frame#``, ``index``, ...: numbers of frames, which are no measurement;
+* ``label``: class of the motion; consecutive rows with the same one are a `LabelledSegment`, rows
+  without one belong to none;
+* ``segment``: any text; where it changes a segment ends even if the label stays, so that
+  repetitions can be told apart;
+* ``person``: who moves, the same in every row.
+
+All other columns are measurements. Markers are three columns each, ``NAME.x, NAME.y, NAME.z`` or
+``NAME_x``, ``NAME X (mm)``, ``x_NAME``, ..., also below each other (names in one row, axes in the
+next), or a row for each point (``frame, landmark, x, y, z``): metres and z up, unless the person
+shows otherwise. Where most columns are markers, the others are left out. All other channels are
+radians and metres; those whose names say ``(deg)`` or ``(mm)`` are converted.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import RecordingError
+from ...recording import FloatArray, IntArray, LabelledSegment, Recording, marker_channels
+from ..clock import Clock, even_clock, in_seconds
+from ..files import bad_file, head_text, read_text, stem
+from ..findings import Findings
+from ..numbers import measured_rows
+from ..options import option
+from ..placing.size import named_unit
+from ..placing.space import Space, placed
+from ..reader import Hints, Reader
+from .columns import MEDIAPIPE_POSE, Columns, angle_factor, meaning_of
+from .names import chosen_names
+from .sheet import Header, Sheet, find_header, is_number
+
+_MARKERS_SHARE = 0.5  # of the measured columns: from there on it is a table of markers
+_LEAST_MARKERS = 3  # that a .txt file must name to be taken for a table
+_SAME_STEP = 0.01
+_TURN = 2 * np.pi
+
+
+class CSVReader(Reader):
+    """Reads tables with named columns; see the module's docstring for the format."""
+
+    format = "CSV"
+    suffixes = (".csv", ".tsv", ".txt")
+
+    def accepts(self, path: Path) -> bool:
+        """Whether it is called a table, or is a text that begins like one of markers."""
+        if not path.name.lower().removesuffix(".gz").endswith(".txt"):
+            return True
+        try:
+            header = find_header(Sheet.of(path, head_text(path)))
+        except RecordingError:
+            return False
+        return len(meaning_of(header.names).markers) >= _LEAST_MARKERS
+
+    def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
+        """Read the table; see `Reader.read`."""
+        findings = Findings(self.format)
+        sheet = Sheet.of(path, read_text(path))
+        header = find_header(sheet)
+        columns = meaning_of(header.names)
+        _check_names(path, columns)
+        table = _read(sheet, header, columns, findings)
+        if columns.points is not None:
+            table = _by_points(path, table, columns)
+        person = _person(path, table)
+        rate_hz, clock = _clock(path, table, hints, findings)
+        index = np.rint(clock.places).astype(np.int64)
+        values = clock.even(table.values)
+        labels = _segments(table.texts, index, person)
+        if table.markers is None:
+            return Recording(
+                values,
+                rate_hz,
+                table.channels,
+                stem(path),
+                person,
+                labels,
+                report=findings.report(rate_hz),
+            )
+        points = values.reshape(len(values), -1, 3)
+        seen = (~np.isnan(points).any(axis=2)).sum(axis=0)
+        kept, names = chosen_names(path, table.markers, seen, findings)
+        points = points[:, kept]
+        space = Space(table.unit_m or 1.0, says_unit=table.unit_m is not None)
+        _warn_of_pictures(points, names, findings)
+        at = placed(path, points, names, rate_hz, space, hints, findings)
+        return Recording(
+            at.points.reshape(len(points), -1),
+            rate_hz,
+            marker_channels(names),
+            stem(path),
+            person,
+            labels,
+            report=findings.report(rate_hz, at.unit_m, at.up),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Table:
+    """A table's measured columns, and what goes with them.
+
+    Attributes:
+        values: Shape (T, D).
+        channels: Names of its columns, length D; empty for markers.
+        markers: Names of the D / 3 markers; None where the columns are none.
+        unit_m: Length of the markers' unit [m], where the header says it.
+        times: Columns of times [any unit], each of shape (T,), with their unit [s] if it is said.
+        numbers: Numbers of the frames, shape (T,); None where there are none.
+        texts: Columns of texts by name, each of length T.
+    """
+
+    values: FloatArray
+    channels: tuple[str, ...]
+    markers: tuple[str, ...] | None
+    unit_m: float | None
+    times: tuple[tuple[FloatArray, float | None], ...]
+    numbers: FloatArray | None
+    texts: dict[str, list[str]]
+
+
+def _check_names(path: Path, columns: Columns) -> None:
+    plain = [name for i, name in enumerate(columns.names) if i not in columns.frames]
+    marked = {i for c in columns.markers.values() for i in c}
+    single = [n for i, n in enumerate(columns.names) if i not in marked and i not in columns.frames]
+    if not all(plain) or (len(set(single)) != len(single) and not columns.doubled):
+        raise bad_file(path, f"columns named {list(columns.names[:6])}", "names, each different")
+
+
+def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) -> _Table:
+    path, n_columns = sheet.path, len(columns.names)
+    first = next((cells for _, cells in sheet.rows(header.start)), [])
+    textual = dict(columns.texts)
+    if columns.points is not None:
+        textual["point"] = columns.points
+    for i in columns.times:  # times of the day are texts
+        if i < len(first) and first[i].strip() and not is_number(first[i]):
+            textual[f"time {i}"] = i
+    texts: dict[str, list[str]] = {name: [] for name in textual}
+    markers = [i for axes in columns.markers.values() for i in axes]
+    measured = [i for i in columns.measured if i not in textual.values()]
+    are_markers = bool(markers) and len(markers) >= _MARKERS_SHARE * len(measured)
+    if are_markers:
+        wanted = markers
+    elif columns.points is not None:
+        wanted = [next(i for i in measured if columns.names[i].lower() == a) for a in "xyz"]
+    else:
+        wanted = measured
+    clocks = [i for i in (*columns.times, *columns.frames) if i not in textual.values()]
+
+    def rows() -> Iterator[tuple[int, list[str]]]:
+        for line, cells in sheet.rows(header.start):
+            if textual:
+                while len(cells) > n_columns and not cells[-1].strip():
+                    cells.pop()
+                if len(cells) != n_columns:
+                    raise bad_file(path, f"line {line} has {len(cells)} columns", f"{n_columns}")
+                for name, i in textual.items():
+                    texts[name].append(cells[i].strip())
+            yield line, cells
+
+    found = measured_rows(
+        path,
+        rows(),
+        n_columns,
+        findings,
+        group=3 if are_markers else 1,
+        columns=[*clocks, *wanted],
+    )
+    place = {column: k for k, column in enumerate([*clocks, *wanted])}
+    numbers = [i for i in columns.frames if _counts(found[:, place[i]])]
+    if wanted == measured:  # what is only called a number of frames is measured
+        wanted = [i for i in clocks if i in columns.frames and i not in numbers] + wanted
+    if not wanted or not len(found):
+        raise bad_file(path, f"{len(wanted)} channels, {len(found)} rows", "at least one of each")
+    if not all(columns.names[i] for i in wanted):
+        raise bad_file(path, f"columns named {list(columns.names[:6])}", "names, each different")
+    times = [(found[:, place[i]], columns.time_unit_s(i)) for i in clocks if i in columns.times]
+    times = [(seconds, unit_s) for seconds, unit_s in times if not np.isnan(seconds).all()]
+    times += [(_of_day(path, texts.pop(n)), 1.0) for n in list(texts) if n.startswith("time ")]
+    table = _Table(
+        found[:, [place[i] for i in wanted]],
+        tuple(columns.names[i] for i in wanted),
+        None,
+        None,
+        tuple(times),
+        found[:, place[numbers[0]]] if numbers else None,
+        texts,
+    )
+    if are_markers:
+        return _of_markers(table, columns, findings)
+    return table if columns.points is not None else _in_si(table, wanted, columns, findings)
+
+
+def _of_markers(table: _Table, columns: Columns, findings: Findings) -> _Table:
+    """Return a table with its columns named as markers."""
+    used = [i for axes in columns.markers.values() for i in axes]
+    others = [columns.names[i] for i in columns.measured if i not in set(used)]
+    if others:
+        findings.leave_out(others)
+        findings.note(f"{len(others)} columns that are no markers left out")
+    if columns.doubled:
+        findings.warn(
+            f"the same name more than once: {', '.join(columns.doubled[:5])}; the first one is used"
+        )
+    units = {columns.units[i] for i in used if columns.units[i]}
+    unit = named_unit(units.pop()) if len(units) == 1 else None
+    return replace(table, channels=(), markers=tuple(columns.markers), unit_m=unit)
+
+
+def _in_si(table: _Table, wanted: list[int], columns: Columns, findings: Findings) -> _Table:
+    """Return a table of channels in radians and metres, as far as units are said."""
+    values = table.values.copy()
+    said = [columns.units[i] for i in wanted]
+    for k, text in enumerate(said):
+        values[:, k] *= angle_factor(text) or named_unit(text) or 1.0
+    reach = np.nanmax(np.abs(values), initial=0.0)
+    if not any(said) and reach > 2 * _TURN:
+        findings.note(
+            f"the columns reach up to {reach:.4g} and are taken as radians and metres; if they are "
+            "degrees or millimetres, write (deg) or (mm) behind their names"
+        )
+    return replace(table, values=values)
+
+
+def _counts(values: FloatArray) -> bool:
+    """Whether a column holds numbers of frames: whole, and never going back."""
+    return bool(
+        not np.isnan(values).any()
+        and (values == np.rint(values)).all()
+        and (np.diff(values) >= 0).all()
+    )
+
+
+def _of_day(path: Path, texts: list[str]) -> FloatArray:
+    """Return times that are written with a date, or as hours, minutes and seconds [s]."""
+    times = []
+    for row, text in enumerate(texts, start=1):
+        try:
+            if text[:4].isdigit():
+                times.append(datetime.fromisoformat(text.replace("/", "-")).timestamp())
+            else:
+                parts = [float(part) for part in text.split(":")]
+                times.append(sum(p * 60.0**k for k, p in enumerate(reversed(parts))))
+        except (ValueError, OverflowError) as error:
+            raise bad_file(
+                path,
+                f"row {row} holds the time {text[:40]!r}",
+                "a number, or hours:minutes:seconds",
+            ) from error
+    return np.array(times, dtype=np.float64)
+
+
+def _by_points(path: Path, table: _Table, columns: Columns) -> _Table:
+    """Return a table with a row for each point as one with a row for each frame."""
+    keys = table.numbers if table.numbers is not None else None
+    if keys is None and table.times:
+        keys = table.times[0][0]
+    if keys is None or np.isnan(keys).any():
+        raise bad_file(path, "a row for each point, without frames or times", "a column 'frame'")
+    frames, first, row = np.unique(keys, return_index=True, return_inverse=True)
+    names = list(dict.fromkeys(table.texts["point"]))
+    if len(frames) * len(names) > 4 * len(keys) + 1000:
+        raise bad_file(path, f"{len(names)} points in {len(frames)} frames", "most points in each")
+    column = {name: k for k, name in enumerate(names)}
+    points = np.full((len(frames), len(names), 3), np.nan)
+    axes = [[n.lower() for n in table.channels].index(axis) for axis in "xyz"]
+    which = np.array([column[name] for name in table.texts["point"]], dtype=np.int64)
+    points[row, which] = table.values[:, axes]
+    unit = next((columns.units[i] for i, n in enumerate(columns.names) if n.lower() == "x"), "")
+    if all(name.isdecimal() for name in names) and len(names) == len(MEDIAPIPE_POSE):
+        order = sorted(names, key=lambda name: float(name))
+        known = dict(zip(order, MEDIAPIPE_POSE, strict=True))
+        names = [known[name] for name in names]
+    texts = {name: [values[i] for i in first] for name, values in table.texts.items()}
+    del texts["point"]
+    return _Table(
+        points.reshape(len(frames), -1),
+        (),
+        tuple(names),
+        named_unit(unit),
+        tuple((times[first], unit_s) for times, unit_s in table.times),
+        None if table.numbers is None else table.numbers[first],
+        texts,
+    )
+
+
+def _person(path: Path, table: _Table) -> str:
+    people = sorted(set(table.texts.get("person", [""])))
+    if len(people) > 1:
+        raise bad_file(path, f"several persons: {', '.join(people[:5])}", "one person a file")
+    return people[0]
+
+
+def _clock(path: Path, table: _Table, hints: Hints, findings: Findings) -> tuple[float, Clock]:
+    """Return the rate, and where the rows lie on an even clock."""
+    times = [in_seconds(values, unit, findings) for values, unit in table.times]
+    if len(times) > 1 and not all(_same_steps(times[0], other) for other in times[1:]):
+        raise bad_file(path, "several columns of times", "one")
+    if times:
+        clock = even_clock(path, times[0])
+        if clock.jitters:
+            findings.note(f"times jitter: resampled to an even {clock.rate_hz:.6g} Hz")
+    elif table.numbers is not None and len(table.values) > 1:
+        clock = _by_numbers(path, table.numbers)
+    else:
+        clock = Clock(np.nan, np.arange(len(table.values), dtype=np.float64), False)
+    rate_hz = hints.rate_hz or clock.rate_hz
+    if not 0 < rate_hz < np.inf:
+        raise bad_file(path, "no rate", f"a column 'time' [s], or {option('rate_hz')}")
+    return rate_hz, clock
+
+
+def _by_numbers(path: Path, numbers: FloatArray) -> Clock:
+    """Return where rows lie by the numbers of their frames, which have a usual step."""
+    steps = np.diff(numbers)
+    usual = float(np.median(steps))
+    places = (numbers - numbers[0]) / (usual or 1.0)
+    off = (places != np.rint(places)) | (np.concatenate([[1.0], steps]) <= 0)
+    if off.any() or places[-1] > 10 * len(numbers) + 1000:
+        row = int(np.argmax(off))
+        raise bad_file(path, f"frame {numbers[row]:g} in row {row + 1}", "evenly numbered frames")
+    return Clock(np.nan, places, False)
+
+
+def _same_steps(one: FloatArray, other: FloatArray) -> bool:
+    if len(one) < 2:
+        return False
+    steps, others = np.diff(one), np.diff(other)
+    return bool(abs(others.sum() - steps.sum()) <= _SAME_STEP * abs(steps.sum()))
+
+
+def _warn_of_pictures(points: FloatArray, names: tuple[str, ...], findings: Findings) -> None:
+    """Warn of landmarks in a picture: MediaPipe gives shares of its width and height too."""
+    if len(set(names) & set(MEDIAPIPE_POSE)) < len(MEDIAPIPE_POSE) // 2:
+        return
+    flat = points[..., :2]
+    inside = (flat > -0.2) & (flat < 1.2)
+    if np.mean(inside[~np.isnan(flat)]) > 0.99 and np.nanmin(flat) > -0.2:
+        findings.warn(
+            "these look like landmarks in a picture (shares of its width and height), whose depth "
+            "and size mean little: world landmarks [m] are needed"
+        )
+
+
+def _segments(
+    texts: dict[str, list[str]], index: IntArray, person: str
+) -> tuple[LabelledSegment, ...]:
+    labels = texts.get("label", [])
+    marks = texts.get("segment", labels)
+    keys = list(zip(labels, marks, strict=True))
+    cuts = [0, *(i for i in range(1, len(keys)) if keys[i] != keys[i - 1]), len(keys)]
+    return tuple(
+        LabelledSegment(int(index[a]), int(index[b - 1]) + 1, labels[a], person)
+        for a, b in itertools.pairwise(cuts)
+        if b > a and labels[a]
+    )

@@ -1,0 +1,193 @@
+"""Tables as text: lines of cells, whatever separates them and however decimals are written."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import zip_longest
+from pathlib import Path
+
+from ..files import bad_file
+from ..numbers import MISSING
+
+_DECIMAL_COMMA = re.compile(r"\s*[-+]?\d+,\d+(e[-+]?\d+)?\s*", re.I)
+_DECIMAL_POINT = re.compile(r"\s*[-+]?\d*\.\d+(e[-+]?\d+)?\s*", re.I)
+_AXIS = re.compile(r"[xyz]\d*", re.I)
+_UNIT = re.compile(
+    r"[\[(]?(mm|cm|m|meters?|millimeters?|s|sec|seconds|ms|deg|degrees|°|rad)[\])]?", re.I
+)
+_LOOK = 40  # lines
+_COMMENT = "#%"
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """A text file as a table.
+
+    Attributes:
+        path: The file, for messages.
+        lines: Its lines.
+        separator: What separates cells; empty for white space.
+        decimal_comma: Whether numbers have a decimal comma.
+    """
+
+    path: Path
+    lines: list[str]
+    separator: str
+    decimal_comma: bool
+
+    @classmethod
+    def of(cls, path: Path, text: str, separators: str = ",;\t") -> Sheet:
+        """Return a text as a table; what separates its cells is found out."""
+        lines = text.splitlines()
+        some = [line for line in lines[:_LOOK] if line.strip()]
+        # the first line that has any tells: names hold no separators, numbers may hold commas
+        telling = next((line for line in some if any(s in line for s in separators)), "")
+        bare = re.sub(r'"[^"]*"', "", telling)  # a quoted name may hold any of them
+        separator = max(separators, key=bare.count) if telling else ""
+        sheet = cls(path, lines, separator, False)
+        cells = [cell for i in range(min(len(lines), _LOOK)) for cell in sheet.cells(i)]
+        commas = sum(bool(_DECIMAL_COMMA.fullmatch(cell)) for cell in cells)
+        points = sum(bool(_DECIMAL_POINT.fullmatch(cell)) for cell in cells)
+        return cls(path, lines, separator, commas > points)
+
+    def cells(self, line: int) -> list[str]:
+        """Return the cells of a line, counted from 0.
+
+        Raises:
+            RecordingError: Its quotes do not match.
+        """
+        text = self.lines[line]
+        if not self.separator:
+            return text.split()
+        if '"' not in text:
+            return text.split(self.separator)
+        try:
+            return next(csv.reader([text], delimiter=self.separator, strict=True), [])
+        except csv.Error as error:
+            raise bad_file(
+                self.path, f"not a table (line {line + 1}: {error})", "rows of cells"
+            ) from error
+
+    def rows(self, start: int, stop: int | None = None) -> Iterator[tuple[int, list[str]]]:
+        """Yield the rows that hold anything, each with the number of its line, from 1.
+
+        Decimal commas are points in them.
+        """
+        for line in range(start, len(self.lines) if stop is None else stop):
+            cells = self.cells(line)
+            if any(cells) and any(cell.strip() for cell in cells):
+                if self.decimal_comma:
+                    cells = [
+                        cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell
+                        for cell in cells
+                    ]
+                yield line + 1, cells
+
+    def is_data(self, line: int) -> bool:
+        """Whether a line holds at least as many numbers, or marks for missing ones, as texts."""
+        cells = [cell.strip() for cell in self.cells(line)]
+        filled = [cell for cell in cells if cell]
+        return bool(filled) and 2 * sum(map(is_number, filled)) >= len(filled)
+
+
+def is_number(text: str) -> bool:
+    """Whether a cell holds a number, or says that one is missing."""
+    text = text.strip()
+    if text.lower() in MISSING:
+        return bool(text)
+    try:
+        float(text.replace(",", ".", 1))
+    except ValueError:
+        return False
+    return True
+
+
+@dataclass(frozen=True)
+class Header:
+    """Names of the columns of a table.
+
+    Attributes:
+        names: One for each column; markers' as ``NAME.x`` where axes stand in a row of their own.
+        start: Line at which the data start, from 0.
+    """
+
+    names: tuple[str, ...]
+    start: int
+
+
+def find_header(sheet: Sheet) -> Header:
+    """Return the names of a table's columns: one row, or names above axes, or above units.
+
+    Raises:
+        RecordingError: There is no row of names above rows of numbers.
+    """
+    start = 0
+    above: list[list[str]] = []
+    for line in range(min(len(sheet.lines), _LOOK)):
+        cells = [cell.strip() for cell in sheet.cells(line)]
+        if not any(cells):
+            continue
+        if above and sheet.is_data(line):
+            start = line
+            break
+        if line == 0 or not above:
+            if cells[0][:1] in _COMMENT and 2 * len(cells) < _width_below(sheet, line):
+                continue  # a remark, not the names
+            cells = _uncommented(cells)
+            if sheet.is_data(line):
+                raise bad_file(
+                    sheet.path, "the first row holds numbers", "the names of the columns"
+                )
+        above.append(cells)
+        start = line + 1
+    if not above:
+        raise bad_file(sheet.path, "an empty table", "rows of cells below a row of names")
+    return Header(_joined_names(above), start)
+
+
+def _uncommented(cells: list[str]) -> list[str]:
+    """Return a row without the mark of a comment before it, as numpy writes headers."""
+    first = cells[0].lstrip(_COMMENT).strip()
+    return [first, *cells[1:]]
+
+
+def _width_below(sheet: Sheet, line: int) -> int:
+    """Return how many cells the widest of the lines below has."""
+    below = range(line + 1, min(len(sheet.lines), line + _LOOK))
+    return max((len(sheet.cells(k)) for k in below), default=0)
+
+
+def _joined_names(above: list[list[str]]) -> tuple[str, ...]:
+    axes = next((i for i, row in enumerate(above) if i and _names_axes(row)), None)
+    if axes is None:
+        names = above[0]
+        if len(above) > 1 and _names_units(above[1]):
+            pairs = zip_longest(names, above[1][: len(names)], fillvalue="")
+            names = [f"{name} ({unit})" if unit else name for name, unit in pairs]
+        width = max((i + 1 for i, name in enumerate(names) if name), default=0)
+        return tuple(names[:width])
+    names, letters = above[axes - 1], above[axes]
+    units = above[axes + 1] if len(above) > axes + 1 and _names_units(above[axes + 1]) else []
+    joined: list[str] = []
+    current = ""
+    for name, letter, unit in zip_longest(names, letters, units, fillvalue=""):
+        current = name or current
+        axis = letter[:1].lower() if _AXIS.fullmatch(letter) else ""
+        own = f"{current}.{axis}" if axis else letter or name
+        joined.append(f"{own} ({unit})" if unit and own else own)
+    while joined and not joined[-1]:
+        joined.pop()
+    return tuple(joined)
+
+
+def _names_axes(row: list[str]) -> bool:
+    filled = [cell for cell in row if cell]
+    return len(filled) >= 3 and 2 * sum(bool(_AXIS.fullmatch(c)) for c in filled) >= len(filled)
+
+
+def _names_units(row: list[str]) -> bool:
+    filled = [cell for cell in row if cell]
+    return bool(filled) and all(_UNIT.fullmatch(cell) for cell in filled)

@@ -1,0 +1,175 @@
+"""TRC: the marker table of OpenSim and Motion Analysis [OpenSim]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...recording import FloatArray, Recording, marker_channels
+from ..clock import even_clock, in_seconds
+from ..files import bad_file, cmu_subject, read_text, stem
+from ..findings import Findings
+from ..numbers import measured_rows, number
+from ..placing.size import UNITS_M, named_unit
+from ..placing.space import Space, placed
+from ..reader import Hints, Reader
+from .columns import meaning_of
+from .names import chosen_names
+from .sheet import Sheet
+
+_EXPECTED = (
+    "a TRC file: two header lines of names and values, then 'Frame#', 'Time' and the markers"
+)
+_SAME_RATE = 0.01  # how far the rates of header and times may differ, as a share
+
+
+class TRCReader(Reader):
+    """Reads TRC files: y up, x forward as in OpenSim; missing is an empty cell or (0, 0, 0)."""
+
+    format = "TRC"
+    suffixes = (".trc",)
+
+    def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
+        """Read the markers; see `Reader.read`."""
+        findings = Findings(self.format)
+        sheet = Sheet.of(path, read_text(path), separators="\t")
+        header = _Header.parse(path, sheet.lines)
+        values, labels = _table(sheet, header, findings)
+        measured = values[:, 2:].reshape(len(values), -1, 3)
+        measured[(measured == 0.0).all(axis=2)] = np.nan
+        seen = (~np.isnan(measured).any(axis=2)).sum(axis=0)
+        kept, names = chosen_names(path, labels, seen, findings)
+        header.compare(path, "NumFrames", len(values), "frames", findings)
+        header.compare(path, "NumMarkers", sum(bool(label) for label in labels), "names", findings)
+        rate_hz, points = _in_time(path, header, values[:, 1], measured[:, kept], hints, findings)
+        at = placed(path, points, names, rate_hz, _space(path, header, hints), hints, findings)
+        return Recording(
+            frames=at.points.reshape(len(points), -1),
+            rate_hz=rate_hz,
+            channels=marker_channels(names),
+            name=stem(path),
+            person=cmu_subject(stem(path)),
+            report=findings.report(rate_hz, at.unit_m, at.up),
+        )
+
+
+@dataclass(frozen=True)
+class _Header:
+    """What the lines above the table say.
+
+    Attributes:
+        values: By name in small letters, as text.
+        names_at: Line of the markers' names, from 0.
+    """
+
+    values: dict[str, str]
+    names_at: int
+
+    @classmethod
+    def parse(cls, path: Path, lines: list[str]) -> _Header:
+        if len(lines) < 6 or not lines[0].lower().startswith("pathfiletype"):
+            raise bad_file(path, f"starts with {lines[0][:40]!r}", _EXPECTED)
+        first = [line.split("\t")[0].strip().lower() for line in lines[:12]]
+        at = next((i for i, cell in enumerate(first) if cell.strip("# ") == "frame"), None)
+        if at is None:
+            raise bad_file(path, f"line 4 starts with {lines[3][:40]!r}", _EXPECTED)
+        names, values = (lines[at - 2], lines[at - 1]) if at >= 2 else ("", "")
+        pairs = [(names.split("\t"), values.split("\t")), (names.split(), values.split())]
+        # a value left empty shows between tabs only; without tabs, words are all there is
+        names_, values_ = pairs[0] if len(pairs[0][0]) > 1 else pairs[1]
+        said = zip(names_, values_, strict=False)
+        return cls({n.strip().lower(): v.strip() for n, v in said}, at)
+
+    def compare(self, path: Path, name: str, count: int, what: str, findings: Findings) -> None:
+        """Warn where a count in the header is another than what is there."""
+        said = self.values.get(name.lower(), "")
+        if said.isascii() and said.isdecimal() and said.lstrip("0") == str(count):
+            return
+        findings.warn(f"{name} is {said[:20] or 'missing'}, but {count} {what} are there and read")
+
+
+def _table(sheet: Sheet, header: _Header, findings: Findings) -> tuple[FloatArray, list[str]]:
+    """Return frame numbers, times and coordinates, shape (T, 2 + 3M), and the M names."""
+    path, lines = sheet.path, sheet.lines
+    labels = _labels(lines[header.names_at].rstrip("\r\n").split("\t")[2:])
+    if not labels:
+        raise bad_file(path, "no marker names", "at least one")
+    start = header.names_at + 1
+    if start < len(lines) and _names_axes(lines[start]):
+        start += 1
+    values = measured_rows(path, sheet.rows(start), 2 + 3 * len(labels), findings, group=3)
+    if not len(values):
+        raise bad_file(path, "0 frames", "at least one")
+    return values, labels
+
+
+def _labels(cells: list[str]) -> list[str]:
+    """Return the markers' names: above the first of three columns each, or as some write them."""
+    labels = [name.strip() for name in cells]
+    while labels and not labels[-1]:
+        labels.pop()
+    if not any(name for i, name in enumerate(labels) if i % 3):
+        return labels[::3]
+    if len(labels) % 3 == 0 and labels[::3] == labels[1::3] == labels[2::3]:
+        return labels[::3]
+    triples = meaning_of(labels).markers  # a name for each column: nose_x, nose_y, nose_z
+    if [i for axes in triples.values() for i in axes] == list(range(len(labels))):
+        return list(triples)
+    return [name for name in labels if name]  # one after the other
+
+
+def _names_axes(line: str) -> bool:
+    words = line.split()
+    return bool(words) and all(word[:1].upper() in ("X", "Y", "Z") for word in words)
+
+
+def _in_time(
+    path: Path,
+    header: _Header,
+    times_s: FloatArray,
+    points: FloatArray,
+    hints: Hints,
+    findings: Findings,
+) -> tuple[float, FloatArray]:
+    """Return the rate and the points at even times, shape (T', M, 3)."""
+    said = header.values.get("datarate", "")
+    rate_hz = (
+        number(path, said.replace(",", "."), "DataRate")
+        if said or hints.rate_hz is None
+        else np.nan
+    )
+    clock = None
+    if np.isnan(times_s).all() or not np.ptp(times_s):
+        if len(points) > 1:
+            findings.note("there are no times; frames are taken as even")
+    else:
+        times_s = in_seconds(times_s, None, findings)
+        clock = even_clock(path, times_s)
+        points = clock.even(points.reshape(len(points), -1)).reshape(-1, *points.shape[1:])
+        if clock.jitters:
+            findings.note(f"times jitter: resampled to an even {clock.rate_hz:.6g} Hz")
+    if hints.rate_hz is not None:
+        return hints.rate_hz, points
+    if clock is None or np.isnan(clock.rate_hz):
+        if not 0 < rate_hz < np.inf:
+            raise bad_file(path, f"DataRate {said[:40]!r}", "a positive number [1/s]")
+        return rate_hz, points
+    rounded_s = 1e-3  # times may be rounded to milliseconds
+    slack = _SAME_RATE + 2 * rounded_s / max(float(np.ptp(times_s)), rounded_s)
+    if not (0 < rate_hz < np.inf and abs(clock.rate_hz / rate_hz - 1.0) <= slack):
+        findings.warn(
+            f"DataRate is {said[:20] or 'missing'}, the times say {clock.rate_hz:.6g} Hz, "
+            "which is used"
+        )
+        rate_hz = clock.rate_hz
+    return rate_hz, points
+
+
+def _space(path: Path, header: _Header, hints: Hints) -> Space:
+    text = header.values.get("units", "")
+    unit = named_unit(text)
+    if unit is None and text and hints.unit_m is None:
+        raise bad_file(path, f"unit of length {text!r}", f"one of {', '.join(UNITS_M)}")
+    return Space(unit or 0.001, "y", "x", says_unit=unit is not None)

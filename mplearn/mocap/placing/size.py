@@ -1,0 +1,150 @@
+"""The unit of length, from the size of the person.
+
+Lengths within the body (thigh, shank, trunk) where names tell which points bound them; how far the
+points spread otherwise. A unit that the file names wins as long as a person can be meant by it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...recording import FloatArray
+from .part_names import LINKS_M, place_of
+
+UNITS_M = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+"""Length of the units that files name [m]."""
+
+CMU_UNIT_M = 0.0254 / 0.45
+"""Unit of the CMU database's skeletons, and of most conversions of it [m]."""
+
+_COMMON = (1.0, 0.001, 0.01)
+_OTHERS = (0.0254, CMU_UNIT_M, 0.3048, 0.1)
+_LOOK = 200  # frames
+
+# how large a person may be against one of 1.75 m: a toddler to a giant, markers off the joints
+_PEOPLE = (0.4, 1.4)
+# how far the points may spread against the markers of a whole person: a hand to two people afar
+_SPREADS = (0.06, 8.0)
+_USUAL_SPREAD_M = 0.45
+_USUAL_SPREADS = (0.25, 2.5)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit of length that was settled.
+
+    Attributes:
+        unit_m: Its length [m].
+        fits: Whether a person, or a part of one, can be meant by it.
+        contradicts: Whether it is another than the one declared.
+        doubtful: Whether the points would be few, or far apart, of a person.
+    """
+
+    unit_m: float
+    fits: bool
+    contradicts: bool
+    doubtful: bool = False
+
+
+def find_unit(points: FloatArray, names: tuple[str, ...], declared_m: float) -> Unit:
+    """Return the unit of length in which points are a person's.
+
+    Args:
+        points: Markers or joint centres in the file's unit, shape (T, M, 3); NaN where missing.
+        names: Their names, length M; hints.
+        declared_m: The unit that the file, or its format, says [m].
+    """
+    adult_m = _unit_of_an_adult(points, names)
+    if adult_m is not None:
+        low, high = _PEOPLE
+        if low <= declared_m / adult_m <= high:
+            return Unit(declared_m, True, False)
+        fits = [u for u in _COMMON if low <= u / adult_m <= high]
+        fits = fits or [u for u in _OTHERS if low <= u / adult_m <= high]
+    else:
+        spread = spread_of(points)
+        if not 0 < spread < np.inf:
+            return Unit(declared_m, False, False)
+        adult_m = _USUAL_SPREAD_M / spread
+        low, high = _USUAL_SPREADS
+        if _SPREADS[0] <= declared_m / adult_m <= _SPREADS[1]:
+            return Unit(declared_m, True, False, not low <= declared_m / adult_m <= high)
+        fits = [u for u in _COMMON if low <= u / adult_m <= high]
+    if not fits:
+        return Unit(declared_m, False, False)
+    best = min(fits, key=lambda u: abs(np.log(u / adult_m)))
+    return Unit(best, True, True)
+
+
+def spread_of(points: FloatArray) -> float:
+    """Return the median distance of the points from their middle, in their unit; NaN for none."""
+    some = points[:: max(1, len(points) // _LOOK)]
+    seen = ~np.isnan(some).any(axis=2)
+    some = some[seen.sum(axis=1) >= 3]
+    if not len(some):
+        return float("nan")
+    middle = np.nanmedian(some, axis=1, keepdims=True)
+    return float(np.nanmedian(np.linalg.norm(some - middle, axis=2)))
+
+
+def named_unit(text: str) -> float | None:
+    """Return the length of a unit as files write it [m]: in short, in words, or cut; or None.
+
+    ``"mm"``, ``"Millimeters"``, ``"mete"``, ``"[m]"``, ``"inches"``.
+    """
+    plain = "".join(c for c in text.lower() if c.isalpha())
+    if plain in UNITS_M:
+        return UNITS_M[plain]
+    if len(plain) < 2:
+        return None
+    for words, unit in _WORDS:
+        # a text of at least three letters may be cut off, as C3D parameters are
+        if plain in words or (len(plain) >= 3 and any(w.startswith(plain) for w in words)):
+            return unit
+    return None
+
+
+_WORDS = (
+    (("millimeters", "millimetres", "mms", "milimeters", "milimetres"), 0.001),
+    (("centimeters", "centimetres", "cms"), 0.01),
+    (("decimeters", "decimetres"), 0.1),
+    (("meters", "metres", "mtrs"), 1.0),
+    (("inches", "inchs"), 0.0254),
+    (("feet", "foot"), 0.3048),
+)
+
+
+def _unit_of_an_adult(points: FloatArray, names: tuple[str, ...]) -> float | None:
+    """Return the unit [m] in which the named parts are as far apart as in a person of 1.75 m."""
+    some = points[:: max(1, len(points) // _LOOK)]
+    columns: dict[tuple[str, str], list[int]] = {}
+    for index, name in enumerate(names):
+        place = place_of(name)
+        if place.part:
+            columns.setdefault((place.part, place.side), []).append(index)
+    centres: dict[tuple[str, str], FloatArray] = {}
+    for key, indices in columns.items():
+        centres[key] = _middle(some[:, indices])
+    for part in {part for part, _ in columns}:  # the middle of both sides, and of what has no side
+        both = [centres[key] for key in columns if key[0] == part]
+        centres[part, ""] = _middle(np.stack(both, axis=1))
+    ratios = []
+    for (a, b), length_m in LINKS_M.items():
+        for side in [s for s in "lr" if (a, s) in centres and (b, s) in centres] or [""]:
+            if (a, side) in centres and (b, side) in centres:
+                apart = np.linalg.norm(centres[a, side] - centres[b, side], axis=1)
+                apart = apart[apart > 0]
+                if len(apart):
+                    ratios.append(length_m / float(np.median(apart)))
+    return float(np.median(ratios)) if len(ratios) >= 2 else None
+
+
+def _middle(points: FloatArray) -> FloatArray:
+    """Return the mean of the points that are seen, shape (T, K, 3) to (T, 3); NaN for none."""
+    seen = ~np.isnan(points)
+    count = seen.sum(axis=1)
+    total = np.where(seen, points, 0.0).sum(axis=1)
+    middle: FloatArray = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    return middle

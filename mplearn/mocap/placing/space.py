@@ -1,0 +1,219 @@
+"""From a file's axes and unit of length to metres, z up, x forward, y left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import InvalidValueError
+from ...recording import FloatArray
+from ..files import bad_file
+from ..findings import Findings
+from ..options import option
+from ..reader import Hints
+from .size import UNITS_M, Unit, find_unit, spread_of
+from .vertical import find_vertical
+
+_FARTHEST_M = 100.0  # no capture volume is larger
+_SMALLEST_M = 0.02  # all markers of a body within less: not a body
+_MANY = 10  # markers; fewer may be a hand's
+_FEW = 3  # markers; about fewer the file alone can tell
+
+
+def to_z_up(up: str, forward: str) -> FloatArray:
+    """Return the matrix that turns a file's axes to z up, x forward, y left.
+
+    Args:
+        up: The file's axis that points up, as ``"y"`` or ``"-y"``.
+        forward: The file's axis that points forward.
+
+    Returns:
+        Rotation, shape (3, 3): ours = matrix @ theirs.
+
+    Raises:
+        InvalidValueError: The two are not different axes.
+    """
+    u, f = _axis(up), _axis(forward)
+    if u @ f:
+        raise InvalidValueError(f"up {up!r} and forward {forward!r} must be different axes")
+    return np.stack([f, np.cross(u, f), u])
+
+
+def upright(up: str) -> FloatArray:
+    """Return the smallest turn that makes a file's axis, one of `DIRECTIONS`, ours that is up."""
+    return to_z_up(up, {"x": "-z", "-x": "z"}.get(up, "x"))
+
+
+def file_axes(up_hint: str | None, up: str, forward: str) -> FloatArray:
+    """Return `to_z_up` for a format's axes, or for a hinted vertical with the next axis forward."""
+    if up_hint is None or up_hint == up:
+        return to_z_up(up, forward)
+    following = {"x": "y", "y": "z", "z": "x"}
+    return to_z_up(up_hint, following[up_hint]) if up_hint in following else upright(up_hint)
+
+
+@dataclass(frozen=True)
+class Space:
+    """What a file, or its format, says of its lengths and axes.
+
+    Attributes:
+        unit_m: Length of the unit [m].
+        up: The axis that points up.
+        forward: The axis that points forward.
+        says_unit: Whether the file itself names the unit, not only its format.
+        says_up: Whether the file itself names the axes.
+    """
+
+    unit_m: float
+    up: str = "z"
+    forward: str = "x"
+    says_unit: bool = True
+    says_up: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Points in metres, z up, and how they came to be so.
+
+    Attributes:
+        points: Shape (T, M, 3) [m].
+        unit_m: Length of the file's unit [m].
+        up: The file's axis that points up.
+        axes: Rotation from the file's axes to ours, shape (3, 3).
+    """
+
+    points: FloatArray
+    unit_m: float
+    up: str
+    axes: FloatArray
+
+
+def placed(
+    path: Path,
+    points: FloatArray,
+    names: tuple[str, ...],
+    rate_hz: float,
+    space: Space,
+    hints: Hints,
+    findings: Findings,
+    sized: Unit | None = None,
+) -> Placed:
+    """Return a file's points in metres, z up, x forward where that is known, never mirrored.
+
+    Hints win; then what the file says, unless the person's size or posture contradicts it; what
+    was found out otherwise, or stays in doubt, is added to the findings.
+
+    Args:
+        path: The file, for messages.
+        points: In the file's unit and axes, shape (T, M, 3); NaN where missing.
+        names: Names of the points, length M.
+        rate_hz: Frames per second [1/s].
+        space: What the file or its format says.
+        hints: What the caller says.
+        findings: Where to tell what was found.
+        sized: The unit by the size of the person, where the caller knows better than `find_unit`.
+
+    Raises:
+        RecordingError: No person can be meant by the points.
+    """
+    unit = hints.unit_m or _settled_unit(points, names, space, findings, sized)
+    metres = checked_markers(path, points if unit == 1.0 else points * unit, names)
+    up = hints.up_axis or _settled_up(metres, names, rate_hz, space, findings)
+    turn = to_z_up(up, space.forward) if up == space.up else upright(up)
+    turned = metres if np.array_equal(turn, np.eye(3)) else metres @ turn.T
+    return Placed(turned, unit, up, turn)
+
+
+def _settled_unit(
+    points: FloatArray,
+    names: tuple[str, ...],
+    space: Space,
+    findings: Findings,
+    sized: Unit | None,
+) -> float:
+    found = sized or find_unit(points, names, space.unit_m)
+    if found.contradicts:
+        said = unit_text(space.unit_m)
+        tell = findings.warn if space.says_unit else findings.note
+        tell(
+            f"the unit of length is taken as {unit_text(found.unit_m)}, by the size of the person; "
+            + (f"the file says {said}" if space.says_unit else f"usual is {said}")
+            + f" ({option('unit_m')} sets it)"
+        )
+    elif found.doubtful and len(names) >= _MANY:
+        findings.warn(
+            f"the unit of length is taken as {unit_text(found.unit_m)}, by which the points are "
+            f"{'close together' if spread_of(points) * found.unit_m < 0.2 else 'far apart'} for a "
+            f"person's; {option('unit_m')} settles it"
+        )
+    elif not space.says_unit and found.fits:
+        findings.note(f"the unit of length is taken as {unit_text(found.unit_m)}: it fits a person")
+    return found.unit_m
+
+
+def _settled_up(
+    metres: FloatArray, names: tuple[str, ...], rate_hz: float, space: Space, findings: Findings
+) -> str:
+    found = find_vertical(metres, names, rate_hz, space.up, says_so=space.says_up)
+    if found.contradicts:
+        tell = findings.warn if space.says_up else findings.note
+        said = "the file says" if space.says_up else "usual in the format is"
+        tell(
+            f"{found.up} is taken as the vertical axis, by feet, head and floor; {said} {space.up} "
+            f"({option('up_axis')} sets it)"
+        )
+    told = space.says_up and not found.contradicts
+    if found.doubtful and not told and len(names) >= _FEW:
+        findings.warn(f"whether {found.up} points up is in doubt; {option('up_axis')} settles it")
+    return found.up
+
+
+def unit_text(unit_m: float) -> str:
+    """Return the name of a unit, or its length where it has none."""
+    return next((name for name, length in UNITS_M.items() if length == unit_m), f"{unit_m:.6g} m")
+
+
+def checked_markers(path: Path, points: FloatArray, names: tuple[str, ...]) -> FloatArray:
+    """Return marker positions, shape (T, M, 3) [m], if a person can be meant by them.
+
+    Raises:
+        RecordingError: Nothing was measured, in most frames a marker lies 100 m away, or all lie
+            within 2 cm.
+    """
+    size = np.abs(points)
+    if np.isnan(size).all():
+        raise bad_file(path, "no marker was ever seen", "measured positions")
+    frame, marker, _ = np.unravel_index(np.nanargmax(size), size.shape)
+    measured = np.isfinite(size).any(axis=(1, 2))
+    far = (size > _FARTHEST_M).any(axis=(1, 2))
+    if 2 * np.count_nonzero(far) > np.count_nonzero(measured):  # a few frames are the learner's
+        raise bad_file(
+            path,
+            f"marker {names[marker]!r} is {np.nanmax(size):.3g} m away in frame {frame}",
+            f"less than {_FARTHEST_M:g} m; is the unit of length right? {option('unit_m')} sets it",
+        )
+    if points.shape[1] >= 5:
+        some = points[:: max(1, len(points) // 200)]
+        gone = np.isnan(some)
+        spread = np.where(gone, -np.inf, some).max(1) - np.where(gone, np.inf, some).min(1)
+        extent = spread.max(axis=1)  # (t,)
+        if np.median(extent[extent >= 0], axis=0) < _SMALLEST_M:
+            raise bad_file(
+                path,
+                f"all {points.shape[1]} markers lie within {np.median(extent) * 1000:.3g} mm",
+                f"at least {_SMALLEST_M * 1000:g} mm: is the unit of length right? "
+                f"({option('unit_m')} sets it)",
+            )
+    return points
+
+
+def _axis(name: str) -> FloatArray:
+    letter = name.lower().removeprefix("+")
+    sign = -1.0 if letter.startswith("-") else 1.0
+    letter = letter.removeprefix("-")
+    if letter not in ("x", "y", "z"):
+        raise InvalidValueError(f"an axis is x, y or z, with a sign or without, not {name!r}")
+    unit: FloatArray = sign * np.eye(3)["xyz".index(letter)]
+    return unit

@@ -1,0 +1,1 @@
+"""Formats of skeletons: joints, their hierarchy, and how they turn."""

@@ -1,0 +1,80 @@
+"""BVH: a skeleton and its joint angles in one file [BVH].
+
+The format was never written down, and each tool bends it. What is read:
+
+* keywords in any case; names with blanks; names that repeat, which are numbered (``Arm``,
+  ``Arm_2``); end sites with a name or without (``End Site``, ``EndSite``, ``End Site Head_tip``);
+* up to six channels of each joint, in an order of its own; several trees (``ROOT``);
+* frames that are wrapped over lines, numbers that are glued together (``1.0-2.0``), decimal commas,
+  cells that are not numbers (missing), text behind the frames;
+* a number of frames that is not the one in the header.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ...recording import FloatArray, Recording
+from ..files import bad_file, read_text
+from ..findings import Findings
+from ..placing.space import Space
+from ..reader import Hints, Reader
+from .bvh_hierarchy import parse_hierarchy
+from .bvh_motion import parse_motion
+from .kinematics import Joint
+from .skeletal import SkeletalMotion, skeletal_recording
+
+# the format names neither: centimetres are usual, and so is y up
+_SPACE = Space(0.01, "y", "z", says_unit=False)
+_NEXT_TO_NOTHING = 0.1  # of the offset
+_MOTION = re.compile(r"(?:^|(?<=\}))[ \t]*MOTION[ \t]*$", re.IGNORECASE | re.MULTILINE)
+
+
+class BVHReader(Reader):
+    """Reads BVH files: y up, z forward, centimetres unless the person or a hint tells otherwise.
+
+    A joint's position channels replace its offset, unless those of most joints are next to nothing:
+    then they are how far it is off its offset. Unlike most formats this one has a rate without
+    a name: seconds a frame.
+    """
+
+    format = "BVH"
+    suffixes = (".bvh",)
+
+    def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
+        """Read angles, or positions by forward kinematics; see `Reader.read`."""
+        findings = Findings(self.format)
+        text = read_text(path).replace("\r\n", "\n").replace("\r", "\n")
+        start = _MOTION.search(text)
+        if start is None:
+            raise bad_file(path, "no line 'MOTION'", "a BVH file: HIERARCHY, then MOTION")
+        joints, columns = parse_hierarchy(path, text[: start.start()], findings)
+        first_line = text.count("\n", 0, start.end()) + 2
+        values, rate_hz = parse_motion(
+            path, text[start.end() + 1 :], first_line, len(columns), hints.rate_hz, findings
+        )
+        values *= [np.pi / 180.0 if column.rotates else 1.0 for column in columns]
+        _from_parents(joints, values, findings)
+        motion = SkeletalMotion(joints, columns, values, rate_hz, _SPACE)
+        return skeletal_recording(path, motion, hints, findings, positions=positions)
+
+
+def _from_parents(joints: tuple[Joint, ...], values: FloatArray, findings: Findings) -> None:
+    """Let positions that are counted from the offsets be counted from the parents, in place."""
+    moving = [j for j in joints if j.parent >= 0 and len(j.translations) == 3 and j.offset.any()]
+    small = []
+    for joint in moving:
+        columns = [column for _, column in joint.translations]
+        known = values[~np.isnan(values[:, columns]).any(axis=1)][:, columns]
+        if len(known) and np.linalg.norm(np.median(known, axis=0)) < _NEXT_TO_NOTHING * float(
+            np.linalg.norm(joint.offset)
+        ):
+            small.append(joint)
+    if small and 2 * len(small) > len(moving):
+        findings.note("positions of joints are taken as how far they are off their offsets")
+        for joint in small:
+            for axis, column in joint.translations:
+                values[:, column] += joint.offset[axis]

@@ -1,0 +1,204 @@
+"""Motions of the Unitree G1 as tables: the kind that LAFAN1 was retargeted to, and SEED's.
+
+* 36 numbers a row, with a header or without: the pelvis' place [m], its orientation as a quaternion
+  (x, y, z, w), and the 29 joints in order [rad], 30 Hz;
+* a header ``Frame, root_translateX, ..., root_rotateX, ..., left_hip_pitch_joint_dof, ...``:
+  centimetres, degrees, the pelvis' rotations about the fixed axes x, y, z in turn, 120 Hz.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ...maths.rotations import euler_to_matrix, matrix_to_euler, quaternion_to_matrix
+from ...recording import FloatArray, Recording
+from ..clock import even_clock
+from ..files import bad_file, head_text, read_text
+from ..findings import Findings
+from ..numbers import numbers
+from ..options import option
+from ..placing.space import Space
+from ..reader import Hints, Reader
+from .g1 import BASE, G1_JOINTS, g1_joints
+from .skeletal import Column, SkeletalMotion, skeletal_recording
+
+_WIDTH = 7 + len(G1_JOINTS)
+_HEADERLESS = ("x", "y", "z", "qx", "qy", "qz", "qw", *G1_JOINTS)
+_ROOT = r"(?:(?:root|base|pelvis|floating_base)_?)?"
+_PLACE = re.compile(rf"{_ROOT}(?:(?:translate|translation|trans|pos|position)_?)?([xyz])")
+_QUATERNION = re.compile(rf"{_ROOT}(?:q|quat|quaternion|rot|orientation)_?([xyzw])")
+_ROTATION = re.compile(rf"{_ROOT}(?:rotate|rotation|euler)_?([xyz])")
+_TIMES = ("time", "time_s", "timestamp", "t")
+_RETARGETED_HZ, _SEED_HZ = 30.0, 120.0
+_HEIGHT_M = (0.05, 3.0)  # of the pelvis, lying to leaping
+_EXPECTED = "the pelvis' place and orientation, and the G1's 29 joints"
+
+_COLUMNS = (
+    *(Column("pelvis", axis, False, True, name) for axis, name in enumerate(BASE[:3])),
+    *(Column("pelvis", axis, True, True, BASE[3 + i]) for i, axis in enumerate((2, 0, 1))),
+    *(Column(name, 0, True, name=name) for name in G1_JOINTS),
+)
+
+
+class G1CSVReader(Reader):
+    """Reads motions of the Unitree G1 from CSV files: see the module's docstring.
+
+    Channels are the robot's: how its pelvis is (`g1.BASE`), and its joints by name.
+    """
+
+    format = "G1 CSV"
+    suffixes = (".csv",)
+
+    def accepts(self, path: Path) -> bool:
+        """Whether the first row names half of the G1's joints, or holds 36 numbers as it would."""
+        lines = [line for line in head_text(path).splitlines() if line.strip()]
+        if not lines:
+            return False
+        cells = _cells(lines[0])
+        if sum(_joint(cell) is not None for cell in cells) >= len(G1_JOINTS) // 2:
+            return True
+        row = _plain_numbers(cells)
+        return (
+            row is not None
+            and len(row) == _WIDTH
+            and abs(float(np.linalg.norm(row[3:7])) - 1.0) < 0.01
+            and bool(np.abs(row[7:]).max() < 2 * np.pi)
+        )
+
+    def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
+        """Read angles, or where the robot's joints are; see `Reader.read`."""
+        findings = Findings(self.format)
+        rows = [(i, s) for i, s in enumerate(read_text(path).splitlines(), 1) if s.strip()]
+        header = _cells(rows[0][1]) if rows else []
+        if _plain_numbers(header) is None:
+            rows = rows[1:]
+        else:
+            header = list(_HEADERLESS)
+        if not rows:
+            raise bad_file(path, "no frames", "a row for each")
+        table = numbers(path, [_cells(s) for _, s in rows], len(header), [i for i, _ in rows])
+        at = _columns(path, header, findings)
+        seed = "qw" not in at
+        unit_m = _unit(path, table[:, at["z"]], 0.01 if seed else 1.0, hints, findings)
+        values = np.zeros((len(table), len(BASE) + len(G1_JOINTS)))
+        values[:, :3] = table[:, [at[axis] for axis in "xyz"]] * unit_m
+        values[:, 3:6] = _root_angles(table, at, findings)
+        joints = [name for name in G1_JOINTS if name in at]
+        angles = table[:, [at[name] for name in joints]]
+        if not seed and np.nanmax(np.abs(angles), initial=0.0) > 2 * np.pi:
+            findings.warn("joint angles above a full turn: they are taken for degrees")
+            seed = True
+        values[:, [len(BASE) + G1_JOINTS.index(name) for name in joints]] = (
+            np.radians(angles) if seed else angles
+        )
+        rate_hz = hints.rate_hz or (_SEED_HZ if "qw" not in at else _RETARGETED_HZ)
+        if "time" in at:
+            clock = even_clock(path, table[:, at["time"]])
+            values, rate_hz = clock.even(values), hints.rate_hz or clock.rate_hz
+        elif hints.rate_hz is None:
+            findings.note(f"{rate_hz:g} Hz, usual in such tables, which do not say it")
+        motion = SkeletalMotion(
+            g1_joints(), _COLUMNS, values, rate_hz, Space(1.0, "z", "x", says_up=True)
+        )
+        metres = replace(hints, unit_m=1.0)  # the robot's bones are known, whatever the file's unit
+        recording = skeletal_recording(path, motion, metres, findings, positions=positions)
+        assert recording.report is not None
+        return replace(recording, report=replace(recording.report, unit_m=unit_m))
+
+
+def _cells(line: str) -> list[str]:
+    for separator in (",", ";", "\t"):
+        if separator in line:
+            return [cell.strip() for cell in line.rstrip().rstrip(separator).split(separator)]
+    return line.split()
+
+
+def _plain_numbers(cells: list[str]) -> FloatArray | None:
+    try:
+        values = np.array([float(cell) for cell in cells])
+    except ValueError:
+        return None
+    return values if np.isfinite(values).all() else None
+
+
+def _joint(name: str) -> str | None:
+    """Return the joint of the G1 that a column is named after: ``waist_yaw``, ``..._joint_dof``."""
+    plain = re.sub(r"(_joint|_dof|_pos|_angle|_rad|_deg)+$", "", name.strip().lower())
+    return f"{plain}_joint" if f"{plain}_joint" in G1_JOINTS else None
+
+
+def _columns(path: Path, header: list[str], findings: Findings) -> dict[str, int]:
+    """Return the column of each joint, of x, y, z, of qx.. or rx.., and of the time."""
+    at: dict[str, int] = {}
+    for index, name in enumerate(header):
+        plain = name.lower()
+        found = _joint(plain)
+        for prefix, pattern in (("", _PLACE), ("q", _QUATERNION), ("r", _ROTATION)):
+            match = pattern.fullmatch(plain)
+            if found is None and match is not None:
+                found = prefix + match[1]
+        if found is None and plain in _TIMES:
+            found = "time"
+        if found is None:
+            findings.leave_out([name])
+        elif found in at:
+            raise bad_file(path, f"columns {header[at[found]]!r} and {name!r}", "one of each")
+        else:
+            at[found] = index
+    turned = "qw" in at or "rx" in at
+    wanted = [*"xyz", *(f"q{c}" for c in "xyzw")] if "qw" in at else [*"xyz", "rx", "ry", "rz"]
+    if not turned or not set(wanted) <= set(at):
+        raise bad_file(path, f"columns named {header[:8]}", _EXPECTED)
+    resting = [name for name in G1_JOINTS if name not in at]
+    if resting:
+        findings.warn(f"no columns for {', '.join(resting)}: they are taken to rest")
+    return at
+
+
+def _root_angles(table: FloatArray, at: dict[str, int], findings: Findings) -> FloatArray:
+    if "qw" in at:
+        rotations = _turned(table[:, [at[f"q{c}"] for c in "wxyz"]])
+        w_first = _turned(table[:, [at[f"q{c}"] for c in "xyzw"]])
+        if at["qx"] == 3 and _upright(rotations) < -0.5 < 0.5 < _upright(w_first):
+            findings.warn("the quaternion is taken as w, x, y, z: else the robot is on its head")
+            rotations = w_first
+    else:
+        rotations = euler_to_matrix("xyz", np.radians(table[:, [at[f"r{c}"] for c in "xyz"]]))
+    return matrix_to_euler("ZXY", rotations)
+
+
+def _turned(quaternions: FloatArray) -> FloatArray:
+    size = np.linalg.norm(quaternions, axis=1, keepdims=True)
+    return quaternion_to_matrix(np.where(size > 0.5, quaternions, np.nan))
+
+
+def _upright(rotations: FloatArray) -> float:
+    """Return the median height of the tip of the body's upward axis, 1 for who stands."""
+    heights = rotations[:, 2, 2]
+    return float(np.median(heights[~np.isnan(heights)])) if not np.isnan(heights).all() else 0.0
+
+
+def _unit(
+    path: Path, heights: FloatArray, usual_m: float, hints: Hints, findings: Findings
+) -> float:
+    """Return the unit of the pelvis' place [m], by its height; joints are as far apart anyway."""
+    height = float(np.nanmedian(np.abs(heights))) if not np.isnan(heights).all() else 0.0
+    low, high = _HEIGHT_M
+    if hints.unit_m is not None:
+        if height > 0 and not low / 10 <= height * hints.unit_m <= high * 10:
+            raise bad_file(
+                path,
+                f"the pelvis is {height * hints.unit_m:.3g} m up",
+                f"{low:g} to {high:g} m; is {option('unit_m')} right?",
+            )
+        return hints.unit_m
+    for unit_m in (usual_m, 1.0, 0.01, 0.001):
+        if low <= height * unit_m <= high:
+            if unit_m != usual_m:
+                findings.warn(f"a unit of {unit_m:g} m by the height of the pelvis")
+            return unit_m
+    return usual_m

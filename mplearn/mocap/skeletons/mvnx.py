@@ -1,0 +1,181 @@
+"""MVNX: the XML of Xsens MVN, segments of a person from inertial sensors [MVNX].
+
+Positions and orientations of the segments are the world's, z up; a segment's origin is the joint
+towards the pelvis, and in a T pose all its axes are the world's. Which of them a file holds is
+chosen when it is exported:
+
+* both: joint angles or positions; orientations alone: the same, but the pelvis stays where it is;
+* positions alone: positions; joint angles alone: angles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ...maths.rotations import quaternion_to_matrix
+from ...recording import FloatArray, Recording, Skeleton, marker_channels
+from ..files import bad_file, read_text, stem
+from ..findings import Findings
+from ..options import option
+from ..placing.space import Space, placed
+from ..reader import Hints, Reader
+from .mvnx_file import MVNXFile, read_mvnx
+from .skeletal import Limbs, SkeletalMotion, limb_order, skeletal_recording
+
+_SPACE = Space(1.0, "z", "x", says_up=True)
+_LOOSE_M = 0.01  # bones that vary more are no bones
+_SHORTEST_END_M = 0.01
+_USUAL_PARENTS = dict(
+    entry.split("<")
+    for entry in (
+        "L5<Pelvis L3<L5 T12<L3 T8<T12 Neck<T8 Head<Neck "
+        + " ".join(
+            f"{s}Shoulder<T8 {s}UpperArm<{s}Shoulder {s}ForeArm<{s}UpperArm {s}Hand<{s}ForeArm "
+            f"{s}UpperLeg<Pelvis {s}LowerLeg<{s}UpperLeg {s}Foot<{s}LowerLeg {s}Toe<{s}Foot"
+            for s in ("Right", "Left")
+        )
+    ).split()
+)
+
+
+class MVNXReader(Reader):
+    """Reads MVNX files, versions 2 to 4: see the module's docstring for what they may hold."""
+
+    format = "MVNX"
+    suffixes = (".mvnx",)
+
+    def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
+        """Read angles, or where the segments' origins and ends are; see `Reader.read`."""
+        findings = Findings(self.format)
+        file = read_mvnx(path, read_text(path), findings)
+        rate_hz = hints.rate_hz or file.rate_hz
+        if rate_hz is None:
+            raise bad_file(path, "no frameRate", f"one, or {option('rate_hz')}")
+        if file.orientations is not None:
+            motion = _motion(file, rate_hz, findings)
+            recording = skeletal_recording(path, motion, hints, findings, positions=positions)
+        elif positions and file.positions is not None:
+            recording = _points(path, file, file.positions, rate_hz, hints, findings)
+        elif not positions and file.joint_angles is not None:
+            recording = _angles(file, file.joint_angles, rate_hz, findings)
+        else:
+            what = "positions or orientations" if positions else "orientations or joint angles"
+            raise bad_file(path, f"it holds no {what} of segments", "an export with them")
+        return replace(recording, name=stem(path), person=file.subject)
+
+
+def _tree(file: MVNXFile, findings: Findings) -> tuple[list[int], list[int]]:
+    """Return the segments that hang on the first one, parents first, and each one's parent."""
+    parent_of = _USUAL_PARENTS | {child: parent for _, parent, _, child, _ in file.joints}
+    order, place = [0], {file.segments[0]: 0}
+    parents = [-1]
+    waiting = list(range(1, len(file.segments)))
+    while True:
+        hanging = [i for i in waiting if parent_of.get(file.segments[i]) in place]
+        if not hanging:
+            break
+        for index in hanging:
+            parents.append(place[parent_of[file.segments[index]]])
+            place.setdefault(file.segments[index], len(order))
+            order.append(index)
+        waiting = [i for i in waiting if i not in set(hanging)]
+    findings.leave_out(file.segments[i] for i in waiting)
+    return order, parents
+
+
+def _offsets(file: MVNXFile, order: list[int], parents: list[int]) -> FloatArray:
+    """Return where each segment's origin is in its parent, as the file says, shape (S, 3) [m]."""
+    at = {child: file.points.get((parent, point)) for _, parent, point, child, _ in file.joints}
+    offsets = np.zeros((len(order), 3))
+    for index, segment in enumerate(order):
+        said = at.get(file.segments[segment])
+        if parents[index] >= 0 and said is not None:
+            offsets[index] = said
+        elif parents[index] >= 0 and file.t_pose is not None:
+            offsets[index] = file.t_pose[segment] - file.t_pose[order[parents[index]]]
+    return offsets
+
+
+def _motion(file: MVNXFile, rate_hz: float, findings: Findings) -> SkeletalMotion:
+    order, parents = _tree(file, findings)
+    assert file.orientations is not None
+    quaternions = file.orientations[:, order]
+    sizes = np.linalg.norm(quaternions, axis=2)
+    quaternions = np.where(sizes[..., None] > 0.5, quaternions, np.nan)
+    world = quaternion_to_matrix(quaternions)
+    local = world.copy()
+    moving = [i for i, parent in enumerate(parents) if parent >= 0]
+    above = [parents[i] for i in moving]
+    local[:, moving] = world[:, above].swapaxes(-1, -2) @ world[:, moving]
+    offsets = _offsets(file, order, parents)
+    if file.positions is None:
+        places = np.zeros((len(world), 3))
+        places[:, 2] = -_lowest(offsets, parents)
+        findings.warn("there are no positions: the pelvis is taken to stay where it is")
+    else:
+        points = file.positions[:, order]
+        places = points[:, 0]
+        bones = points[:, moving] - points[:, above]
+        in_parent = (world[:, above].swapaxes(-1, -2) @ bones[..., None])[..., 0]
+        seen = ~np.isnan(in_parent).any(axis=(1, 2))
+        if seen.any() and moving:
+            offsets[moving] = np.median(in_parent[seen], axis=0)
+            loose = np.linalg.norm(in_parent[seen] - offsets[moving], axis=2).max(axis=0)
+            if loose.max() > _LOOSE_M:
+                name = file.segments[order[moving[int(loose.argmax())]]]
+                findings.warn(
+                    f"{name} moves {loose.max():.3f} m in its parent: taken at its median"
+                )
+    names = [file.segments[i] for i in order]
+    orders = [limb_order(name, is_root=i == 0) for i, name in enumerate(names)]
+    for index in sorted(set(range(len(order))) - set(parents)):
+        ends = [place for (segment, _), place in file.points.items() if segment == names[index]]
+        end = max(ends, key=lambda place: float(np.linalg.norm(place)), default=np.zeros(3))
+        if np.linalg.norm(end) > _SHORTEST_END_M:
+            names.append(f"{names[index]}_end")
+            parents.append(index)
+            orders.append("")
+            offsets = np.concatenate([offsets, end[None]])
+    limbs = Limbs(tuple(names), tuple(parents), offsets, tuple(orders))
+    return limbs.motion(local, places, rate_hz, _SPACE)
+
+
+def _lowest(offsets: FloatArray, parents: list[int]) -> float:
+    heights = np.zeros(len(parents))
+    for index, parent in enumerate(parents):
+        if parent >= 0:
+            heights[index] = heights[parent] + offsets[index, 2]
+    return float(heights.min())
+
+
+def _points(
+    path: Path,
+    file: MVNXFile,
+    points: FloatArray,
+    rate_hz: float,
+    hints: Hints,
+    findings: Findings,
+) -> Recording:
+    order, parents = _tree(file, findings)
+    names = tuple(file.segments[i] for i in order)
+    place = placed(path, points[:, order], names, rate_hz, _SPACE, hints, findings)
+    offsets = _offsets(file, order, parents) * place.unit_m @ place.axes.T
+    return Recording(
+        place.points.reshape(len(points), -1),
+        rate_hz,
+        marker_channels(names),
+        skeleton=Skeleton(names, tuple(parents), offsets),
+        report=findings.report(rate_hz, place.unit_m, place.up),
+    )
+
+
+def _angles(
+    file: MVNXFile, angles_deg: FloatArray, rate_hz: float, findings: Findings
+) -> Recording:
+    frames = np.radians(angles_deg.reshape(len(angles_deg), -1))
+    channels = tuple(f"{joint[0]}.r{axis}" for joint in file.joints for axis in "xyz")
+    findings.note("joint angles as Xsens defines them: abduction, rotation, flexion")
+    return Recording(frames, rate_hz, channels, report=findings.report(rate_hz))

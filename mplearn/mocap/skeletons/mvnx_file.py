@@ -1,0 +1,214 @@
+"""What stands in an MVNX file, read as a stream: no tree of the whole XML is ever built."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+
+import numpy as np
+
+from ...recording import FloatArray, IntArray
+from ..files import bad_file
+from ..findings import Findings
+
+_MEASURED = {"position": 3, "orientation": 4, "jointAngle": 3}
+_LISTED = {"pos_b": "segments", "connector1": "joints", "connector2": "joints"}
+_TEXTS = (*_MEASURED, *_LISTED)
+_EXPECTED = "an MVNX file: mvnx, subject, segments, frames"
+_MOST_MISSING = 10  # times as many frames as there are
+
+
+@dataclass
+class MVNXFile:
+    """An MVNX file.
+
+    Attributes:
+        subject: Who moves.
+        rate_hz: Frames per second [1/s]; None where it does not say.
+        segments: Names of the S segments.
+        points: Where the named points of each segment are in its frame [m], by both names.
+        joints: Name of each of the K joints, and the parent's and the child's segment and point.
+        positions: Origins of the segments, shape (T, S, 3) [m]; None where they are not exported.
+        orientations: Quaternions (w, x, y, z), shape (T, S, 4), as the segments in order.
+        joint_angles: Shape (T, K, 3) [deg].
+        t_pose: Origins of the segments in the T pose, shape (S, 3) [m].
+    """
+
+    subject: str = ""
+    rate_hz: float | None = None
+    segments: list[str] = field(default_factory=list)
+    points: dict[tuple[str, str], FloatArray] = field(default_factory=dict)
+    joints: list[tuple[str, str, str, str, str]] = field(default_factory=list)
+    positions: FloatArray | None = None
+    orientations: FloatArray | None = None
+    joint_angles: FloatArray | None = None
+    t_pose: FloatArray | None = None
+
+
+def read_mvnx(path: Path, text: str, findings: Findings) -> MVNXFile:
+    """Return what an MVNX file holds.
+
+    Raises:
+        RecordingError: The text is not such a file, or declares entities.
+    """
+    stream = _Stream(path)
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    parser.StartElementHandler = stream.start
+    parser.EndElementHandler = stream.end
+    parser.CharacterDataHandler = stream.text
+    parser.StartDoctypeDeclHandler = stream.doctype
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        raise bad_file(path, f"damaged XML ({error})", _EXPECTED) from error
+    file = stream.file
+    if not file.segments or not stream.numbers:
+        raise bad_file(path, f"{len(file.segments)} segments, {stream.numbers} frames", _EXPECTED)
+    if stream.n_subjects > 1:
+        findings.warn(f"{stream.n_subjects} subjects: {file.subject!r}, the first, is read")
+    rows = _rows(stream.indices, findings)
+    for name, n_parts in (
+        ("position", len(file.segments)),
+        ("orientation", len(file.segments)),
+        ("jointAngle", len(file.joints)),
+    ):
+        found = stream.measured[name]
+        if not found or not n_parts:
+            continue
+        if len(found) != stream.numbers:
+            raise bad_file(path, f"{len(found)} of {stream.numbers} frames have {name}", "all")
+        table = np.full((rows[-1] + 1, n_parts, _MEASURED[name]), np.nan)
+        table[rows] = _table(path, found, name, n_parts * _MEASURED[name]).reshape(
+            len(rows), n_parts, -1
+        )
+        attribute = {"position": "positions", "orientation": "orientations"}.get(name)
+        setattr(file, attribute or "joint_angles", table)
+    if stream.t_pose:
+        values = _table(path, [stream.t_pose], "position", 3 * len(file.segments))
+        file.t_pose = values.reshape(-1, 3)
+    if file.rate_hz is None and len(stream.times_ms) > 1:
+        step_ms = float(np.median(np.diff(stream.times_ms)))
+        file.rate_hz = 1000.0 / step_ms if step_ms > 0 else None
+    return file
+
+
+def _rows(indices: list[int], findings: Findings) -> IntArray:
+    """Return the number of each frame from the first on; where they make no sense, one by one."""
+    rows = np.array(indices, dtype=np.int64)
+    steps = np.diff(rows)
+    if (steps < 1).any() or steps.sum() > _MOST_MISSING * len(rows):
+        if steps.any():
+            findings.warn("the frames' indices do not increase: taken one by one")
+        return np.arange(len(rows), dtype=np.int64)
+    rows -= rows[0]
+    if len(rows) <= rows[-1]:
+        findings.warn(f"{rows[-1] + 1 - len(rows)} frames are missing by their index")
+    return rows
+
+
+def _table(path: Path, texts: list[str], name: str, width: int) -> FloatArray:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DeprecationWarning)  # by which numpy says: no number
+        try:
+            flat: FloatArray = np.fromstring(" ".join(texts), sep=" ")
+        except (DeprecationWarning, ValueError) as error:
+            raise bad_file(path, f"a {name} that is no number", "numbers") from error
+    if np.isinf(flat).any():
+        raise bad_file(path, f"a {name} is infinite", "finite numbers")
+    counts = {len(text.split()) for text in texts}
+    if counts != {width}:
+        wrong = min(counts - {width})
+        raise bad_file(path, f"a frame's {name} has {wrong} numbers", f"{width}")
+    return flat.reshape(len(texts), width)
+
+
+class _Stream:
+    """What expat calls as it goes through the file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.file = MVNXFile()
+        self.n_subjects = 0
+        self.numbers = 0  # frames of the motion
+        self.indices: list[int] = []
+        self.times_ms: list[float] = []
+        self.measured: dict[str, list[str]] = {name: [] for name in _MEASURED}
+        self.t_pose = ""
+        self._list = ""  # which of the subject's own lists is open; fingers have others
+        self._segment = self._point = ""
+        self._joint: list[str] = []
+        self._frame = ""  # type of the frame that is open
+        self._parts: list[str] | None = None
+
+    def doctype(self, *_: object) -> None:
+        raise bad_file(self.path, "a document type, which may declare entities", "none, as in MVNX")
+
+    def start(self, name: str, attributes: dict[str, str]) -> None:
+        name = name.rpartition(":")[2]
+        if name == "subject":
+            self.n_subjects += 1
+        if self.n_subjects > 1:
+            return
+        if name == "subject":
+            self.file.subject = attributes.get("label", "").strip()
+            self.file.rate_hz = _positive(attributes.get("frameRate", ""))
+        elif name in ("segments", "joints"):
+            self._list = name
+        elif name == "segment" and self._list == "segments":
+            self._segment = (
+                attributes.get("label", "").strip() or f"segment{len(self.file.segments)}"
+            )
+            self.file.segments.append(self._segment)
+        elif name == "point" and self._list == "segments":
+            self._point = attributes.get("label", "").strip()
+        elif name == "joint" and self._list == "joints":
+            self._joint = [attributes.get("label", "").strip()]
+        elif name == "frame":
+            self._frame = attributes.get("type", "normal").strip().lower() or "normal"
+            if self._frame == "normal":
+                self.numbers += 1
+                index = attributes.get("index", "")
+                self.indices.append(int(index[:12]) if index.isdecimal() else 0)
+                time_ms = _positive(attributes.get("time", ""))
+                self.times_ms += [] if time_ms is None else [time_ms]
+        elif name in _MEASURED or _LISTED.get(name) == self._list:
+            self._parts = []
+
+    def text(self, text: str) -> None:
+        if self._parts is not None:
+            self._parts.append(text)
+
+    def end(self, name: str) -> None:
+        name = name.rpartition(":")[2]
+        if name == "frame":
+            self._frame = ""
+        elif name == self._list:
+            self._list = ""
+        if self._parts is None or name not in _TEXTS or self.n_subjects > 1:
+            return
+        text, self._parts = "".join(self._parts).strip(), None
+        if name in _MEASURED:
+            if self._frame == "normal" and text:
+                self.measured[name].append(text)
+            elif self._frame.startswith("tpose") and name == "position":
+                self.t_pose = self.t_pose or text
+        elif name == "pos_b":
+            place = _table(self.path, [text], name, 3)[0]
+            self.file.points[self._segment, self._point] = place
+        else:
+            segment, _, point = text.partition("/")
+            self._joint += [segment, point]
+            if len(self._joint) == 5:
+                label, *ends = self._joint
+                self.file.joints.append((label, ends[0], ends[1], ends[2], ends[3]))
+
+
+def _positive(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if 0 < value < 1e12 else None

@@ -1,0 +1,183 @@
+"""SMPL, SMPL-H and SMPL-X poses in ``.npz`` files, as AMASS has them [SMPL] [AMASS].
+
+Such a file holds how each joint of a body model turns, and where the model is; how long the bones
+are comes from the model, which has a licence of its own and is neither needed nor shipped. The
+rotations are taken alone, on the bones of a person of mean proportions and 1.70 m [Winter2009].
+Fingers, jaw and eyes are left out.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ...maths.rotations import rotation_vector_to_matrix
+from ...recording import FloatArray, Recording
+from ..files import bad_file
+from ..findings import Findings
+from ..options import option
+from ..placing.space import Space
+from ..reader import Hints, Reader
+from .npz_file import NPZFile
+from .skeletal import Limbs, limb_order, skeletal_recording
+
+STATURE_M = 1.70
+"""How tall the person is whose bones turn [m]."""
+
+# Each joint, its parent, and where it is from it in a T pose as a share of the stature: forward,
+# left, up. The order is that of the models' rotations.
+_JOINTS = (
+    ("pelvis", "", 0.0, 0.0, 0.0),
+    ("left_hip", "pelvis", 0.0, 0.050, -0.045),
+    ("right_hip", "pelvis", 0.0, -0.050, -0.045),
+    ("spine1", "pelvis", 0.0, 0.0, 0.065),
+    ("left_knee", "left_hip", 0.0, 0.0, -0.245),
+    ("right_knee", "right_hip", 0.0, 0.0, -0.245),
+    ("spine2", "spine1", 0.0, 0.0, 0.075),
+    ("left_ankle", "left_knee", 0.0, 0.0, -0.246),
+    ("right_ankle", "right_knee", 0.0, 0.0, -0.246),
+    ("spine3", "spine2", 0.0, 0.0, 0.035),
+    ("left_foot", "left_ankle", 0.075, 0.0, -0.030),
+    ("right_foot", "right_ankle", 0.075, 0.0, -0.030),
+    ("neck", "spine3", 0.0, 0.0, 0.120),
+    ("left_collar", "spine3", 0.0, 0.035, 0.070),
+    ("right_collar", "spine3", 0.0, -0.035, 0.070),
+    ("head", "neck", 0.010, 0.0, 0.050),
+    ("left_shoulder", "left_collar", 0.0, 0.075, -0.005),
+    ("right_shoulder", "right_collar", 0.0, -0.075, -0.005),
+    ("left_elbow", "left_shoulder", 0.0, 0.172, 0.0),
+    ("right_elbow", "right_shoulder", 0.0, -0.172, 0.0),
+    ("left_wrist", "left_elbow", 0.0, 0.146, 0.0),
+    ("right_wrist", "right_elbow", 0.0, -0.146, 0.0),
+)
+_ENDS = (
+    ("head_end", "head", 0.0, 0.0, 0.075),
+    ("left_foot_end", "left_foot", 0.045, 0.0, 0.0),
+    ("right_foot_end", "right_foot", 0.045, 0.0, 0.0),
+    ("left_wrist_end", "left_wrist", 0.0, 0.108, 0.0),
+    ("right_wrist_end", "right_wrist", 0.0, -0.108, 0.0),
+)
+_TO_OURS = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # theirs: x left, y up
+_N_BODY = len(_JOINTS)
+_MODELS = {24: "SMPL", 52: "SMPL-H", 55: "SMPL-X", 22: "the body alone", 23: "SMPL without root"}
+
+_POSES = ("poses", "smpl_poses", "pose")
+_ROOTS = ("root_orient", "global_orient")
+_BODIES = ("pose_body", "body_pose")
+_PLACES = ("trans", "transl", "smpl_trans", "root_trans")
+_RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
+
+
+class SMPLReader(Reader):
+    """Reads the poses of SMPL's family from ``.npz`` files: see the module's docstring.
+
+    The rotations are axis-angle vectors [rad] under ``poses``, or under ``root_orient`` and
+    ``pose_body`` (``global_orient`` and ``body_pose``); places under ``trans`` [m]; the rate under
+    ``mocap_framerate``. The world of AMASS is z up.
+    """
+
+    format = "SMPL"
+    suffixes = (".npz",)
+
+    def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
+        """Read angles, or where the joints of a person of 1.70 m are; see `Reader.read`."""
+        findings = Findings(self.format)
+        archive = NPZFile(path)
+        vectors = _vectors(archive, findings)
+        rate_hz = hints.rate_hz or _rate(archive)
+        if rate_hz is None:
+            raise bad_file(path, f"none of {', '.join(_RATES)}", f"one, or {option('rate_hz')}")
+        limbs = mean_person()
+        local = np.broadcast_to(np.eye(3), (len(vectors), len(limbs.names), 3, 3)).copy()
+        turns = rotation_vector_to_matrix(vectors)
+        local[:, :_N_BODY] = _TO_OURS @ turns @ _TO_OURS.T
+        local[:, 0] = turns[:, 0] @ _TO_OURS.T  # the root's parent is the world
+        places = _places(archive, len(vectors), findings)
+        findings.note(
+            f"the bones are those of a person of mean proportions and {STATURE_M:.2f} m: "
+            "the file holds none"
+        )
+        motion = limbs.motion(local, places, rate_hz, Space(1.0, "z", "x"))
+        return skeletal_recording(path, motion, hints, findings, positions=positions)
+
+
+def mean_person() -> Limbs:
+    """Return the skeleton of a person of mean proportions in a T pose, x forward, z up [m]."""
+    names = tuple(name for name, *_ in (*_JOINTS, *_ENDS))
+    return Limbs(
+        names,
+        tuple(names.index(parent) if parent else -1 for _, parent, *_ in (*_JOINTS, *_ENDS)),
+        STATURE_M * np.array([place for _, _, *place in (*_JOINTS, *_ENDS)]),
+        tuple(limb_order(name, is_root=i == 0) for i, (name, *_) in enumerate(_JOINTS))
+        + ("",) * len(_ENDS),
+    )
+
+
+def _vectors(archive: NPZFile, findings: Findings) -> FloatArray:
+    """Return the rotation vectors of the body's joints, shape (T, 22, 3) [rad]."""
+    name = _first(archive, _POSES)
+    root, body = _first(archive, _ROOTS), _first(archive, _BODIES)
+    if name is not None:
+        poses = _numbers(archive, name)
+    elif root is not None and body is not None:
+        parts = [_numbers(archive, part) for part in (root, body)]
+        if len({len(part) for part in parts}) > 1:
+            raise bad_file(archive.path, f"{root} and {body} of other lengths", "a row a frame")
+        poses = np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)
+    else:
+        raise bad_file(
+            archive.path,
+            f"arrays {', '.join(archive.names[:8])}",
+            "'poses', or 'root_orient' and 'pose_body', as in AMASS",
+        )
+    width = int(np.prod(poses.shape[1:]))
+    if poses.ndim < 2 or width % 3 or width < 3 * _N_BODY or len(poses) == 0:
+        raise bad_file(
+            archive.path,
+            f"poses of shape {poses.shape}",
+            f"three numbers a joint, of {_N_BODY} joints or more: {_MODELS[24]} has 72 in a row, "
+            f"{_MODELS[52]} 156, {_MODELS[55]} 165",
+        )
+    n_joints = width // 3
+    model = _MODELS.get(n_joints, f"{n_joints} joints")
+    if n_joints > _N_BODY:
+        findings.leave_out([f"rotations of {n_joints - _N_BODY} joints of hands and face"])
+    findings.note(f"the poses are those of {model}")
+    return poses.reshape(len(poses), n_joints, 3)[:, :_N_BODY]
+
+
+def _places(archive: NPZFile, n_frames: int, findings: Findings) -> FloatArray:
+    name = _first(archive, _PLACES)
+    if name is None:
+        findings.warn("there is no 'trans': the pelvis is taken to stay where it is")
+        height = -float(mean_person().offsets[[1, 4, 7, 10], 2].sum())
+        return np.tile([0.0, 0.0, height], (n_frames, 1))
+    places = _numbers(archive, name)
+    if places.shape != (n_frames, 3):
+        raise bad_file(archive.path, f"{name} of shape {places.shape}", f"({n_frames}, 3)")
+    return places
+
+
+def _rate(archive: NPZFile) -> float | None:
+    name = _first(archive, _RATES)
+    if name is None:
+        return None
+    value = _numbers(archive, name)
+    if value.size != 1 or not 0 < value.flat[0] < 1e6:
+        raise bad_file(archive.path, f"{name} is {value.tolist()}"[:80], "frames a second")
+    return float(value.flat[0])
+
+
+def _numbers(archive: NPZFile, name: str) -> FloatArray:
+    array = archive.read(name)
+    if array.dtype.kind not in "fiu":
+        raise bad_file(archive.path, f"{name} of {array.dtype}", "numbers")
+    values: FloatArray = np.asarray(array, dtype=np.float64)
+    if np.isinf(values).any():
+        raise bad_file(archive.path, f"{name} holds infinite values", "finite numbers")
+    return values
+
+
+def _first(archive: NPZFile, names: tuple[str, ...]) -> str | None:
+    return next((name for name in names if name in archive), None)

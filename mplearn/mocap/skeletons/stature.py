@@ -1,0 +1,94 @@
+"""The unit of length of a skeleton, from the person's size, whatever the joints are called."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...recording import FloatArray
+from ..placing.size import CMU_UNIT_M, Unit
+
+_CANDIDATES = (1.0, 0.01, 0.001, 0.0254, CMU_UNIT_M, 0.1, 0.3048)
+_USUAL_M = 1.6  # between the joints of a person that are farthest apart: crown to toe, or hands
+_PEOPLE_M = (0.72, 2.3)  # the same, from a child who sits to a giant who reaches up
+_LOOK = 100  # frames
+_RIGID = 0.1  # of its length, by which a bone may vary
+_LONG = 0.2  # of the longest chain, from which on one is a limb or a trunk
+
+
+def unit_of_skeleton(points: FloatArray, parents: Sequence[int], declared_m: float) -> Unit | None:
+    """Return the unit of length in which a skeleton is a person's.
+
+    Args:
+        points: Where its joints are, in the file's unit, shape (T, J, 3); NaN where missing.
+        parents: Index of each joint's parent, length J, parents first; -1 for a root.
+        declared_m: The unit that the file, or its format, says [m].
+
+    Returns:
+        The unit; None where the skeleton has no trunk with limbs at both ends, as people have.
+    """
+    some = points[:: max(1, len(points) // _LOOK)]
+    some = some[~np.isnan(some).any(axis=(1, 2))]
+    if not len(some):
+        return None
+    joints, parents_in, bones = _largest_rigid_part(some, parents)
+    if not _has_trunk_and_limbs(parents_in, bones):
+        return None
+    body = some[:, joints]
+    apart = np.array([np.linalg.norm(p[:, None] - p[None], axis=2).max() for p in body])
+    extent = float(np.median(apart))
+    low, high = _PEOPLE_M
+    if low <= extent * declared_m <= high:
+        return Unit(declared_m, True, False)
+    fits = [unit for unit in _CANDIDATES if low <= extent * unit <= high]
+    if not fits:
+        return Unit(declared_m, False, False)
+    return Unit(min(fits, key=lambda unit: abs(np.log(extent * unit / _USUAL_M))), True, True)
+
+
+def _largest_rigid_part(
+    points: FloatArray, parents: Sequence[int]
+) -> tuple[list[int], list[int], FloatArray]:
+    """Return the joints of the largest part whose bones keep their lengths, with its tree.
+
+    Some files hang the body on a root that stays on the floor: that is no bone.
+    """
+    part = list(range(len(parents)))
+    bones = np.zeros(len(parents))
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            lengths = np.linalg.norm(points[:, joint] - points[:, parent], axis=1)
+            bones[joint] = np.median(lengths)
+            if np.ptp(lengths) <= _RIGID * bones[joint]:
+                part[joint] = part[parent]
+    largest = int(np.bincount(part).argmax())
+    joints = [joint for joint in range(len(parents)) if part[joint] == largest]
+    at = {joint: index for index, joint in enumerate(joints)}
+    return joints, [at.get(parents[joint], -1) for joint in joints], bones[joints]
+
+
+def _has_trunk_and_limbs(parents: list[int], bones: FloatArray) -> bool:
+    """Whether three long chains meet in at least two joints, and not in one place."""
+    n_joints = len(parents)
+    below = np.zeros(n_joints)  # the longest chain below a joint
+    children: list[list[int]] = [[] for _ in parents]
+    for joint in range(n_joints - 1, 0, -1):
+        children[parents[joint]].append(joint)
+        below[parents[joint]] = max(below[parents[joint]], below[joint] + bones[joint])
+    above = np.zeros(n_joints)  # the longest chain that leaves a joint towards the root
+    for joint in range(n_joints):
+        for child in children[joint]:
+            beside = [below[c] + bones[c] for c in children[joint] if c != child]
+            above[child] = bones[child] + max([above[joint], *beside])
+    long = _LONG * float((below + above).max())
+    meets = [
+        joint
+        for joint in range(n_joints)
+        if sum(below[c] + bones[c] > long for c in children[joint]) + (above[joint] > long) >= 3
+    ]
+    # a place on the tree from the root on, so that helper joints at one place count once
+    along = np.zeros(n_joints)
+    for joint in range(1, n_joints):
+        along[joint] = along[parents[joint]] + bones[joint]
+    return len(meets) > 1 and bool(np.ptp(along[meets]) > 0.25 * long)
