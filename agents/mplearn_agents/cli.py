@@ -14,6 +14,7 @@ from types import ModuleType
 from mplearn.errors import MPLearnError
 
 from . import commands
+from .reading import printable
 
 #: What `main` returns for bad input, as argparse does for a bad option.
 BAD_INPUT = 2
@@ -62,7 +63,7 @@ def _commands() -> dict[str, ModuleType]:
 
 
 def _refuse(message: str) -> int:
-    print(f"mplearn: {' '.join(message.split())}", file=sys.stderr)
+    print(f"mplearn: {printable(' '.join(message.split()))}", file=sys.stderr)
     return BAD_INPUT
 
 

@@ -19,6 +19,11 @@ if TYPE_CHECKING:
 _SHOWN = 8  # names in a line
 
 
+def printable(text: str) -> str:
+    """Return a text in which what would steer a terminal, in names of a file, is spelled out."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what a file may not say about itself, and what to do with one that is refused."""
     group = parser.add_argument_group("what the files do not say, or say wrongly")
@@ -78,7 +83,7 @@ def say_takes(console: Console, takes: Takes) -> None:
         for line in remarks(recording):
             said.setdefault(line, []).append(recording.name)
     for line, names in said.items():  # what is said of many takes is said once
-        console.print(f"{_listed(names)}: {line}", markup=False, highlight=False)
+        console.print(printable(f"{_listed(names)}: {line}"), markup=False, highlight=False)
 
 
 def say_bodies(console: Console, bodies: Bodies) -> None:
@@ -92,7 +97,7 @@ def say_bodies(console: Console, bodies: Bodies) -> None:
         line = f"a body by {len(body.places)} places{left}{unseen}"
         said.setdefault(line, []).append(name)
     for line, names in said.items():
-        console.print(f"{_listed(names)}: {line}", markup=False, highlight=False)
+        console.print(printable(f"{_listed(names)}: {line}"), markup=False, highlight=False)
 
 
 def remarks(recording: Recording) -> list[str]:
@@ -108,7 +113,8 @@ def remarks(recording: Recording) -> list[str]:
 
 def say_left_out(console: Console, name: str, error: Exception) -> None:
     """Say that a take is left out, and why."""
-    console.print(f"left out: {name}: {error}", markup=False, highlight=False, style="yellow")
+    text = printable(f"left out: {name}: {error}")
+    console.print(text, markup=False, highlight=False, style="yellow")
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -12,6 +12,7 @@ from mplearn.body import human_body, posture_of
 from mplearn.recording import FloatArray
 
 from .inspection import Inspection, plain_points
+from .reading import printable
 
 LEFT, RIGHT, MIDDLE, OTHER = "#c1272d", "#0f5e9c", "#222222", "#b0b0b0"
 _LIMBS = (("hip", "knee", "ankle", "ball"), ("shoulder", "elbow", "wrist", "hand"))
@@ -43,10 +44,12 @@ def draw(inspections: Sequence[Inspection], path: Path) -> None:
         for at, moment, features in zip(row[1:], found.moments, found.postures, strict=False):
             _person(at, features)
             at.set_title(f"{moment / found.recording.rate_hz:.1f} s", fontsize=6)
-        row[0].set_title(found.recording.name[:32], fontsize=6, loc="left")
+        name = printable(found.recording.name[:32])
+        row[0].set_title(name, fontsize=6, loc="left", parse_math=False)
         if found.problem:
-            text = found.problem[:160]
-            row[1 if columns > 1 else 0].text(0, 0.5, text, fontsize=5, wrap=True)
+            text = printable(found.problem[:160])
+            at = row[1 if columns > 1 else 0]
+            at.text(0, 0.5, text, fontsize=5, wrap=True, parse_math=False)
     figure.savefig(path, dpi=110)
     plt.close(figure)
 

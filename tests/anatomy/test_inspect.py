@@ -49,3 +49,17 @@ def test_one_bad_take_does_not_cost_the_others(take, tmp_path, capsys):
     assert main(["inspect", str(tmp_path), "--json", "--no-picture"]) == 0
     good, bad = json.loads(capsys.readouterr().out)
     assert good["take"] == "take" and bad["take"] == "bad" and bad["problem"]
+
+
+def test_names_do_not_steer_the_terminal_nor_the_picture(take, tmp_path, capsys):
+    wild = tmp_path / "[red]$\\frac{$\x1b[31m.bvh"
+    wild.write_text(take.read_text().replace("thumb2_l", "\x1b]0;[bold]thumb2_l"))
+    picture = tmp_path / "sticks.png"
+    assert main(["inspect", str(wild), "--picture", str(picture)]) == 0
+    said = capsys.readouterr().out
+    assert "\x1b" not in said
+    assert "[red]$\\frac{$\\x1b[31m: BVH" in said and "\\x1b]0;[bold]thumb2_l" in said
+    assert picture.exists()
+    wild.write_text("\x1b[31mHIERARCHY\nMOTION\n")
+    assert main(["inspect", str(wild), "--no-picture"]) == 2
+    assert "\x1b" not in capsys.readouterr().err

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mplearn_agents.reading import add_reading_arguments, hints_of, say_left_out
+from mplearn_agents.reading import add_reading_arguments, hints_of, printable, say_left_out
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -74,39 +74,40 @@ def _draw(args: argparse.Namespace, found: list[Inspection], console: Console) -
     draw(found[::step], path)
     if not args.json:
         more = f" of every {step}th take" if step > 1 else ""
-        console.print(f"stick figures{more} written to {path}")
+        console.print(printable(f"stick figures{more} written to {path}"))
 
 
 def _say(console: Console, each: Inspection) -> None:
+    def say(text: str) -> None:
+        console.print(printable(text))
+
     facts = each.as_dict()
     unit = f", unit {facts['unit_m']:g} m" if facts["unit_m"] else ""
     up = f", {facts['up']} up" if facts["up"] else ""
-    console.print(
+    say(
         f"{facts['take']}: {facts['format']}, {facts['frames']} frames at {facts['rate_hz']:g} Hz "
         f"({facts['duration_s']:.1f} s){unit}{up}, {facts['points'] or facts['channels']} "
         f"{'points' if facts['points'] else 'channels'}"
     )
     for name, share in list(facts["gaps"].items())[:_MANY]:
-        console.print(f"  missing: {name} in {100 * share:.1f} % of the frames")
+        say(f"  missing: {name} in {100 * share:.1f} % of the frames")
     if each.body is not None:
-        console.print(
+        say(
             f"  a person of {each.stature_m:.2f} m, {1000 * each.fit_m:.0f} mm from the points, "
             f"confidence {each.body.confidence:.2f}"
         )
-        console.print(
-            "  recognised: " + ", ".join(f"{p} = {' '.join(n)}" for p, n in each.body.parts)
-        )
+        say("  recognised: " + ", ".join(f"{p} = {' '.join(n)}" for p, n in each.body.parts))
     if facts["unseen"]:
-        console.print(f"  unseen, held at rest: {', '.join(facts['unseen'])}")
+        say(f"  unseen, held at rest: {', '.join(facts['unseen'])}")
     if facts["left_out"]:
         more = len(facts["left_out"]) - _MANY
-        console.print(
+        say(
             f"  left out: {', '.join(facts['left_out'][:_MANY])}"
             + (f" and {more} more" if more > 0 else "")
         )
     for note in facts["notes"]:
-        console.print(f"  {note}")
+        say(f"  {note}")
     for warning in facts["warnings"]:
-        console.print(f"  warning: {warning}")
+        say(f"  warning: {warning}")
     if each.problem:
-        console.print(f"  nobody: {each.problem}")
+        say(f"  nobody: {each.problem}")

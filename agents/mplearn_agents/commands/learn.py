@@ -13,6 +13,7 @@ from mplearn.errors import MPLearnError, RecordingError
 from mplearn_agents.reading import (
     add_reading_arguments,
     hints_of,
+    printable,
     say_bodies,
     say_left_out,
     say_takes,
@@ -91,14 +92,16 @@ def run(args: argparse.Namespace) -> None:
     console.print(
         f"{len(library)} primitives from {len(recordings) - len(log.refused)} takes, "
         f"{log.watched_s / 60:.1f} minutes of motion in {len(log.moving)} segments, "
-        f"{log.times_real_time:.0f} x real time; written to {args.out}"
+        f"{log.times_real_time:.0f} x real time; written to {printable(str(args.out))}",
+        markup=False,
     )
     if not len(library):
         console.print(why_nothing(learner, log))
     if log.lost:
         console.print(
             f"{log.n_lost / first.rate_hz:.1f} s in {len(log.lost)} stretches were left out: "
-            f"{log.reasons}"
+            f"{log.reasons}",
+            markup=False,
         )
 
 
@@ -152,7 +155,8 @@ def _of_one_kind(
         joined = join_by_name(recordings)
         refused, recordings = joined.refused, joined.recordings
         if joined.dropped:
-            console.print(f"not in every take, left out: {', '.join(joined.dropped)}")
+            text = printable(f"not in every take, left out: {', '.join(joined.dropped)}")
+            console.print(text, markup=False)
     for name, error in refused.items():
         if args.strict:
             raise error
