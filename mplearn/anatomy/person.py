@@ -102,6 +102,12 @@ class Person:
         }
         if rises[self.arms.root] > ABOVE_SHOULDERS * rough or not head:
             self.neck = self.arms.root
+            if rises[self.neck] < -ABOVE_SHOULDERS * rough:
+                self.warnings.append(
+                    f"there is no neck: {self.tree.names[self.neck][0]!r}, below the shoulders, is "
+                    f"taken for its base, so the trunk may be too short ({option('names')} says "
+                    "which joint is which)"
+                )
         else:
             necks = head[:2] if len(head) > 2 else head[:1]
             self.neck = min(necks, key=lambda node: abs(rises[node] - NECK_RISE * rough))
@@ -192,6 +198,13 @@ class Person:
 def _likeness(name: str, tree: JointTree, plan: Plan, *, sure: bool) -> float:
     """Return how sure it is that a plan is a person; refuse what is hardly one."""
     assert plan.legs is not None and plan.arms is not None
+    arms, legs = plan.arms.nodes, plan.legs.nodes
+    if arms[0][0] == arms[1][0] and legs[0][0] != legs[1][0] and not sure:
+        # of a matchstick man both begin at one point; elsewhere the wrists are missing
+        raise BodyError(
+            f"both arms of {name!r} would begin at {tree.names[arms[0][0]][0]!r}; are joints "
+            f"missing in its arms? {option('names')} says which joint is which"
+        )
     confidence = float(1.0 / (1.0 + np.exp(0.5 * (plan.legs.cost + plan.arms.cost - 10.0))))
     if confidence >= LEAST_CONFIDENCE or sure:
         return confidence

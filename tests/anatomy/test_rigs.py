@@ -1,5 +1,7 @@
 """Any skeleton of one person is the same body: written in many dialects, read, recognised."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from known_person import Truth
@@ -10,6 +12,7 @@ from mplearn.body import human_body
 from mplearn.demonstrator import Person, demonstrate
 from mplearn.errors import BodyError
 from mplearn.mocap import Hints, open_recording
+from mplearn.recording import Skeleton, marker_channels
 
 SEGMENTS = {
     "knee": ("shank", "hip"),
@@ -103,3 +106,28 @@ def test_people_of_other_proportions(tmp_path, seed):
         recognise(recording).apply(recording)
     )
     assert np.median(angles) < 3.0 and np.median(points, axis=0).max() < 15.0
+
+
+def without_joints(recording, word):
+    """Leave out joints whose names hold a word."""
+    old = recording.skeleton
+    kept = [j for j, name in enumerate(old.names) if word not in name]
+    skeleton = Skeleton(
+        tuple(old.names[j] for j in kept),
+        tuple(kept.index(old.parents[j]) if old.parents[j] >= 0 else -1 for j in kept),
+        old.offsets[kept],
+        tuple(old.ends[j] for j in kept),
+    )
+    frames = recording.markers[:, kept].reshape(len(recording), -1)
+    return replace(
+        recording, frames=frames, channels=marker_channels(skeleton.names), skeleton=skeleton
+    )
+
+
+def test_arms_without_wrists_are_not_taken_for_arms(tmp_path, truth):
+    path = write_rig(tmp_path / "rig.bvh", truth.body, truth.postures[:100], 25.0, Rig())
+    recording = open_recording(path, positions=True)
+    with pytest.raises(BodyError, match="missing in its arms"):
+        recognise(without_joints(recording, "Hand"))
+    found = recognise(without_joints(recording, "Neck"))
+    assert any("there is no neck" in warning for warning in found.warnings)
