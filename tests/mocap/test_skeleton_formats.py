@@ -239,6 +239,7 @@ def test_smpl_angles_are_the_poses(tmp_path: Path) -> None:
          smpl_poses()[:, 3:66].reshape(12, 21, 3), "trans": None,
          "transl": np.tile([0.4, -0.1, 0.95], (12, 1))},
         {"poses": None, "smpl_poses": smpl_poses()[:, :72]},
+        {"poses": None, "fullpose": smpl_poses()},
         {"mocap_framerate": None, "mocap_frame_rate": 100},
         {"mocap_framerate": None, "fps": np.array([100], dtype=np.int32)},
         {"poses": smpl_poses().astype(np.float32)},

@@ -62,7 +62,7 @@ _TO_OURS = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # thei
 _N_BODY = len(_JOINTS)
 _MODELS = {24: "SMPL", 52: "SMPL-H", 55: "SMPL-X", 22: "the body alone", 23: "SMPL without root"}
 
-_POSES = ("poses", "smpl_poses", "pose")
+_POSES = ("poses", "smpl_poses", "fullpose", "full_pose", "pose")
 _ROOTS = ("root_orient", "global_orient")
 _BODIES = ("pose_body", "body_pose")
 _PLACES = ("trans", "transl", "smpl_trans", "root_trans")
