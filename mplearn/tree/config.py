@@ -69,6 +69,8 @@ class TreeConfig:
             lower quartile of the distances to the nearest neighbour over the mean distance: small
             where repetitions are very like, and yet never nothing.
         scale_power: That power; 1 makes the scale a multiple of the quartile, 0 of the mean.
+        scale_floor: Smallest r: people do not repeat themselves more exactly, and what does (a
+            recording in a loop, a robot's playback) says nothing of how much they vary.
         spread: Largest scale over that quartile; inf for no such bound.
         mean_share: Largest scale over the mean distance; it holds while hardly any motion has been
             seen twice.
@@ -119,6 +121,7 @@ class TreeConfig:
     cutoff: float = 1.0
     scale_share: float = newer(0.69, absent=1.0)
     scale_power: float = newer(0.3, absent=0.0)
+    scale_floor: float = newer(0.03, absent=0.0)
     spread: float = math.inf
     mean_share: float = 0.45
     min_exemplars: int = 2
@@ -184,6 +187,7 @@ class TreeConfig:
             "n_states": 1,
             "max_chains": 1,
             "scale_power": 0,
+            "scale_floor": 0,
             "min_exemplars": 2,
             "confirmed": 1,
             "patience": 1,

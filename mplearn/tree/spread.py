@@ -159,7 +159,8 @@ class DistanceSample:
         if not len(nearest):
             return 0.0
         quartile = float(np.percentile(nearest, 25))
-        share = config.scale_share * (quartile / mean) ** config.scale_power
+        likeness = max(quartile / mean, config.scale_floor)
+        share = config.scale_share * likeness**config.scale_power
         return float(min(config.spread * quartile, min(share, config.mean_share) * mean))
 
     def state(self, blob_of: Callable[[int], Blob]) -> SampleState:
