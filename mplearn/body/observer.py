@@ -17,8 +17,7 @@ from .axes import Axes, axes_changed
 from .body import Body
 from .features import feature_channels, features_of, join_angles
 from .identity import NOBODY, BodyIdentity, IdentityConfig, IdentityState
-from .inverse_kinematics import FEWEST_MARKERS, FollowedState, IKConfig
-from .resuming import ResumingKinematics
+from .inverse_kinematics import FEWEST_MARKERS, FollowedState, IKConfig, InverseKinematics
 from .robot import robot_body
 
 BLOCK_FRAMES = 128  # that are handed on at once, at most
@@ -155,7 +154,7 @@ class MotionObserver:
         self.marker_names = tuple(marker_names)
         self.rate_hz = float(rate_hz)
         self.calibration_s = calibration_s
-        self.ik = ResumingKinematics(self.body, marker_names, rate_hz=rate_hz, config=config)
+        self.ik = InverseKinematics(self.body, marker_names, rate_hz=rate_hz, config=config)
         self.channels = feature_channels(self.body)
         self.fill_gaps = fill_gaps
         self.identity = BodyIdentity(self.marker_names, self.rate_hz, identity)
