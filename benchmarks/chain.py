@@ -7,7 +7,7 @@ import numpy as np
 
 from mplearn import LearnerConfig, MotionLearner
 from mplearn.body import InverseKinematics, robot_body, view_of
-from mplearn.body.observer import BLOCK_FRAMES
+from mplearn.body.observer.observer import BLOCK_FRAMES
 from mplearn.demonstrator import paper_session
 from mplearn.evaluation import observe
 from mplearn.learner import SegmentClosed

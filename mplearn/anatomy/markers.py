@@ -13,7 +13,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..body import MarkerSet, find_marker_set, human_body, marker_set
-from ..body.markers import plain_name
+from ..body.marker_sets.marker_set import plain_name
 from ..errors import BodyError
 from ..mocap.options import option
 from ..recording import FloatArray, Recording

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..body.marker_tables import TABLES
+from ..body.marker_sets.tables import TABLES
 from ..maths.rotation_kernels import nearest_rotation
 from ..recording import FloatArray, IntArray, Skeleton
 from .body_map import BodyMap

@@ -2,7 +2,8 @@
 
 A chain from the trunk outwards may hold more joints than a limb has: twists, helpers. Of all ways
 to name its joints the most likely one is taken, given how long the parts of a limb are relative to
-each other ([DrillisContini1966], as in `mplearn.body.human_model`) and that a bone does not bend.
+each other ([DrillisContini1966], as in `mplearn.body.models.human_model`) and that a bone does not
+bend.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mplearn.body import KinematicTree, MarkerSet
-from mplearn.body.linkage import Linkage, points_of_postures
+from mplearn.body.kinematics.linkage import Linkage, points_of_postures
 from mplearn.recording import FloatArray
 
 from .variability import Variability

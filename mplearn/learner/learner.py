@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..body import BodyView, MotionObserver, Watched, view_of
-from ..body.observer import BLOCK_FRAMES
+from ..body.observer.observer import BLOCK_FRAMES
 from ..errors import InvalidValueError, StateError
 from ..graph import TransitionGraph
 from ..library import MotionNovelty, PrimitiveLibrary

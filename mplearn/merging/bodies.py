@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..body.known_bodies import BodiesState, KnownBodies
+from ..body.observer.known_bodies import BodiesState, KnownBodies
 from ..recording import FloatArray
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..body import MotionObserver
-from ..body.observer import KnownState, ObserverState
+from ..body.observer.observer import KnownState, ObserverState
 from .bodies import merge_bodies
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mplearn.body import MotionObserver, features_of, human_body, keypoints_of
-from mplearn.body.body import Body
+from mplearn.body.models.body import Body
 from mplearn.recording import Recording
 
 SCRIPT = ("BAR", "BAL", "RAR", "RAL", "BAD", "BAU", "SQD", "SQR", "LKR", "LKT", "SAR", "SAL")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mplearn.body import human_body, marker_set
-from mplearn.body.body import Body
+from mplearn.body.models.body import Body
 from mplearn.recording import Recording, marker_channels
 
 _HELEN_HAYES = {

@@ -12,7 +12,7 @@ import numpy as np
 from rigs import Rig, _nodes, _zero_pose
 from scipy.spatial.transform import Rotation
 
-from mplearn.body.body import Body
+from mplearn.body.models.body import Body
 
 UNIT_M = 0.0254 / 0.45  # of the CMU database
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from mplearn.body.body import Body
+from mplearn.body.models.body import Body
 
 LAFAN = {
     "pelvis": "Hips",

@@ -34,11 +34,11 @@ ROBOT_JOINTS = ["waist_yaw", "neck_yaw", "neck_pitch", "neck_roll"] + [
 
 
 def test_the_builder_draws_the_committed_models():
-    from mplearn.body.build import models
+    from mplearn.body.models.build import models
 
     for name, xml in models().items():
-        committed = (files("mplearn.body") / "models" / f"{name}.xml").read_text(encoding="utf-8")
-        assert xml == committed, f"run python -m mplearn.body.build for {name}"
+        committed = (files("mplearn.body.models") / f"{name}.xml").read_text(encoding="utf-8")
+        assert xml == committed, f"run python -m mplearn.body.models.build for {name}"
 
 
 def test_joints_and_sizes():

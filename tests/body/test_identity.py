@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mplearn.body import MotionObserver
-from mplearn.body.identity import BodyIdentity, IdentityConfig
-from mplearn.body.rigid import distances_of, rigid_pairs
+from mplearn.body.marker_sets.rigid import distances_of, rigid_pairs
+from mplearn.body.observer.identity import BodyIdentity, IdentityConfig
 from mplearn.demonstrator import Person, demonstrate
 from mplearn.errors import BodyError, InvalidValueError
 from mplearn.recording import Recording

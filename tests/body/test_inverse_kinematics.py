@@ -6,12 +6,12 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from mplearn.body import IKConfig, InverseKinematics, human_body, marker_set, robot_body
-from mplearn.body.calibration import Calibration
-from mplearn.body.follower import follower
-from mplearn.body.gauss_newton import normal_equations, solve_frame
-from mplearn.body.inverse_kinematics import FollowedState
-from mplearn.body.kinematics import integrate
-from mplearn.body.linkage import Linkage, locate
+from mplearn.body.inverse_kinematics.calibration import Calibration
+from mplearn.body.inverse_kinematics.follower import follower
+from mplearn.body.inverse_kinematics.gauss_newton import normal_equations, solve_frame
+from mplearn.body.inverse_kinematics.inverse_kinematics import FollowedState
+from mplearn.body.kinematics.kernels import integrate
+from mplearn.body.kinematics.linkage import Linkage, locate
 from mplearn.errors import BodyError, FrameError, InvalidValueError
 from mplearn.mocap import GapTracker
 

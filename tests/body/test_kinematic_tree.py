@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from mplearn.body import KinematicTree, human_body, marker_set, robot_body
-from mplearn.body.body import body_from_xml
-from mplearn.body.follower import follower
-from mplearn.body.kinematics import integrate
+from mplearn.body.inverse_kinematics.follower import follower
+from mplearn.body.kinematics.kernels import integrate
+from mplearn.body.models.body import body_from_xml
 from mplearn.errors import BodyError
 
 ODD = """<mujoco><worldbody><body name="a" pos="0 0 1" quat="0.9 0.1 -0.3 0.2"><freejoint/>

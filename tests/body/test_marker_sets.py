@@ -5,7 +5,7 @@ import pytest
 from data_folder import DATA, needs_data
 
 from mplearn.body import find_marker_set, human_body, marker_set, robot_body
-from mplearn.body.marker_tables import TABLES
+from mplearn.body.marker_sets.tables import TABLES
 from mplearn.errors import BodyError
 
 UI_PRMD = [

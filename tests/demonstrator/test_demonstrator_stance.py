@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mplearn.body import human_body, marker_set
-from mplearn.body.linkage import Linkage, points_of_postures
+from mplearn.body.kinematics.linkage import Linkage, points_of_postures
 from mplearn.demonstrator import PRIMITIVES, Person, Variability, demonstrate, followers
 from mplearn.demonstrator.channels import CHANNELS, INDEX, UPPER_JOINTS, as_vector, mirrored
 from mplearn.demonstrator.postures import POSTURES, STAND

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mplearn.body import human_body, marker_set
-from mplearn.body.linkage import Linkage, points_of_postures
+from mplearn.body.kinematics.linkage import Linkage, points_of_postures
 from mplearn.demonstrator import (
     PAPER_PRIMITIVES,
     PRIMITIVES,

@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from motions import RATE_HZ, Motions
 
 from mplearn.body import feature_channels, keypoints_of
-from mplearn.body.keypoints import keypoint_channels
+from mplearn.body.views.keypoints import keypoint_channels
 from mplearn.errors import InvalidValueError, UnknownPrimitiveError
 from mplearn.tree import MirrorMap, PrimitiveTree, TreeConfig, related
 

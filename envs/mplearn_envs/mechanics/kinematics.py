@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numba import njit
 
-from mplearn.body.tree import KinematicTree, forward_kinematics
+from mplearn.body.kinematics.tree import KinematicTree, forward_kinematics
 from mplearn.maths.quaternions import quaternion_product, vector_quaternion
 from mplearn.recording import FloatArray, IntArray
 

@@ -15,7 +15,7 @@ TIMESTEP_S = 0.004
 
 def build_humanoid() -> str:
     """Return the humanoid's simulation model as MJCF text: body, servos, floor, lights, cameras."""
-    from mplearn.body.robot import HELD, build_robot
+    from mplearn.body.models.robot import HELD, build_robot
 
     root = build_robot()
     root.model = "humanoid"

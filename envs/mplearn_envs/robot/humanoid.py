@@ -1,4 +1,4 @@
-"""The humanoid of the experiments: the body that `mplearn.body.robot` draws, driven.
+"""The humanoid of the experiments: the body that `mplearn.body.models.robot` draws, driven.
 
 Hands and toes hold their rest shape rigidly: the eight joints "were not used during these
 experiments" ([Kulic2012], 4.2).

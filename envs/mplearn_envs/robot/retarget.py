@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mplearn.body import human_body, posture_of, robot_body
-from mplearn.body.gauss_newton import solve_frame
-from mplearn.body.linkage import Linkage
-from mplearn.body.tree import KinematicTree
+from mplearn.body.inverse_kinematics.gauss_newton import solve_frame
+from mplearn.body.kinematics.linkage import Linkage
+from mplearn.body.kinematics.tree import KinematicTree
 from mplearn.errors import RobotError
 from mplearn.recording import FloatArray, IntArray
 

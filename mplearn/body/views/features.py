@@ -13,8 +13,8 @@ from mplearn.errors import BodyError
 from mplearn.maths.yaw_roll_pitch import roll_pitch_of, yaw_roll_pitch_quaternion
 from mplearn.recording import FloatArray
 
-from .body import Body
-from .robot import robot_body
+from ..models.body import Body
+from ..models.robot import robot_body
 
 BASE_CHANNELS = ("base_height", "base_roll", "base_pitch")
 

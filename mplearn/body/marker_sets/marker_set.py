@@ -17,9 +17,9 @@ import numpy as np
 from mplearn.errors import BodyError
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
-from .human import human_body
-from .marker_tables import TABLES
-from .tree import KinematicTree
+from ..kinematics.tree import KinematicTree
+from ..models.human import human_body
+from .tables import TABLES
 
 CARRIER = {"abdomen": "pelvis", "clavicle_l": "chest", "clavicle_r": "chest"}
 LEAST_SHARE = 0.6  # of a recording's markers that a set must know to be taken for it,

@@ -56,7 +56,7 @@ def human_body(height_m: float = 1.75, proportions: Mapping[str, float] | None =
 
 @cache
 def _reference() -> Body:
-    xml = (files(__package__) / "models" / "human.xml").read_text(encoding="utf-8")
+    xml = (files(__package__) / "human.xml").read_text(encoding="utf-8")
     return body_from_xml("human", xml)
 
 

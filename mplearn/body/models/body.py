@@ -12,7 +12,7 @@ import numpy as np
 from mplearn.errors import BodyError
 from mplearn.recording import FloatArray, IntArray
 
-from .tree import KinematicTree
+from ..kinematics.tree import KinematicTree
 
 if TYPE_CHECKING:
     import mujoco
@@ -79,7 +79,7 @@ class Body:
 def load_body(name: str, held: tuple[str, ...] = ()) -> Body:
     """Load a body from the package's models."""
     return body_from_xml(
-        name, (files(__package__) / "models" / f"{name}.xml").read_text(encoding="utf-8"), held
+        name, (files(__package__) / f"{name}.xml").read_text(encoding="utf-8"), held
     )
 
 

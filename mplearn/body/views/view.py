@@ -13,10 +13,10 @@ import numpy as np
 
 from mplearn.recording import FloatArray
 
-from .body import Body
+from ..models.body import Body
+from ..models.robot import robot_body
 from .features import feature_channels
 from .keypoints import keypoint_channels, keypoints_of
-from .robot import robot_body
 
 LEVER_M = 0.02
 

@@ -10,10 +10,10 @@ from mplearn.maths.rotations import matrix_to_quaternion
 from mplearn.mocap.options import option
 from mplearn.recording import FloatArray, IntArray
 
+from ..kinematics.linkage import Linkage
+from ..kinematics.tree import KinematicTree
 from .follower import Follower
 from .gauss_newton import solve_frame
-from .linkage import Linkage
-from .tree import KinematicTree
 
 
 class TooFewMarkersError(BodyError):

@@ -17,8 +17,8 @@ from mplearn.errors import BodyError
 from mplearn.maths.rotations import quaternion_to_matrix
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
-from .kinematics import first_joints, point_jacobian
-from .kinematics import forward_kinematics as forward_kinematics
+from .kernels import first_joints, point_jacobian
+from .kernels import forward_kinematics as forward_kinematics
 
 if TYPE_CHECKING:
     import mujoco

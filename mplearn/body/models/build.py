@@ -1,4 +1,4 @@
-"""Write the committed models: ``python -m mplearn.body.build``.
+"""Write the committed models: ``python -m mplearn.body.models.build``.
 
 The bodies are drawn with ``dm_control.mjcf``; the library itself only reads the MJCF texts written
 here.
@@ -20,8 +20,7 @@ def models() -> dict[str, str]:
 
 def main() -> None:
     """Write all models into the package."""
-    folder = Path(__file__).parent / "models"
-    folder.mkdir(exist_ok=True)
+    folder = Path(__file__).parent
     for name, xml in models().items():
         (folder / f"{name}.xml").write_text(xml, encoding="utf-8")
 

@@ -13,12 +13,17 @@ from mplearn.mocap.gaps import GapsState, GapTracker
 from mplearn.recording import BoolArray, FloatArray
 from mplearn.state import Array, Count, State, require, validated, within
 
+from ..inverse_kinematics.inverse_kinematics import (
+    FEWEST_MARKERS,
+    FollowedState,
+    IKConfig,
+    InverseKinematics,
+)
+from ..models.body import Body
+from ..models.robot import robot_body
+from ..views.features import feature_channels, features_of, join_angles
 from .axes import Axes, axes_changed
-from .body import Body
-from .features import feature_channels, features_of, join_angles
 from .identity import NOBODY, BodyIdentity, IdentityConfig, IdentityState
-from .inverse_kinematics import FEWEST_MARKERS, FollowedState, IKConfig, InverseKinematics
-from .robot import robot_body
 
 BLOCK_FRAMES = 128  # that are handed on at once, at most
 PATIENCE = 5  # times the calibration's length that a stream may take to show its markers

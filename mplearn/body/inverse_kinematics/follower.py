@@ -16,9 +16,9 @@ import numpy as np
 
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
-from .body import Body
-from .human import human_body
-from .tree import KinematicTree
+from ..kinematics.tree import KinematicTree
+from ..models.body import Body
+from ..models.human import human_body
 
 GIRDLE_RANGE_M = 0.09
 GIRDLE_SIGMA_M = 0.03  # how far a shoulder usually is from its place

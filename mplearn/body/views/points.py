@@ -10,8 +10,8 @@ from numba import njit
 from mplearn.maths.yaw_roll_pitch import yaw_roll_pitch_quaternion
 from mplearn.recording import FloatArray, IntArray
 
-from .body import Body
-from .linkage import Linkage, points_of_postures
+from ..kinematics.linkage import Linkage, points_of_postures
+from ..models.body import Body
 
 
 def points_of(features: FloatArray, body: Body, parts: IntArray, places: FloatArray) -> FloatArray:

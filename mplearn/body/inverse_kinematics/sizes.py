@@ -7,8 +7,8 @@ from numba import njit
 
 from mplearn.recording import FloatArray, IntArray
 
-from .human import PROPORTIONS
-from .tree import KinematicTree
+from ..kinematics.tree import KinematicTree
+from ..models.human import PROPORTIONS
 
 MARKER_SIGMA_M = 0.005
 SHORTEST_M = 0.03  # a link shorter than this along an axis says nothing about its body's size

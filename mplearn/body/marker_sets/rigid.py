@@ -11,7 +11,7 @@ from numba import njit
 from mplearn.recording import FloatArray, IntArray
 from mplearn.state import Array
 
-from .markers import find_marker_set
+from .marker_set import find_marker_set
 
 FIRM = {"head": 0.003, "hand_l": 0.004, "hand_r": 0.004, "foot_l": 0.004, "foot_r": 0.004}
 SOFT = 0.008  # how much skin and straps give elsewhere [m]

@@ -21,14 +21,14 @@ from mplearn.maths.rotations import matrix_to_quaternion
 from mplearn.recording import FloatArray
 from mplearn.state import Array, SharedState, require, validated
 
-from .body import Body
+from ..kinematics.linkage import Linkage
+from ..marker_sets.marker_set import MarkerSet, find_marker_set
+from ..models.body import Body
 from .calibration import Calibration, fit
 from .first_posture import first_posture, place_trunk, settle
 from .follower import follower
 from .following import FEWEST_MARKERS as FEWEST_MARKERS
 from .following import FollowRules, follow_frames
-from .linkage import Linkage
-from .markers import MarkerSet, find_marker_set
 
 NEAR_M = 0.03  # root mean square distance of the markers at which a posture is right
 

@@ -20,13 +20,13 @@ from mplearn.errors import BodyError
 from mplearn.recording import FloatArray, IntArray
 from mplearn.state import Array, Range
 
+from ..kinematics.tree import KinematicTree
+from ..marker_sets.marker_set import MarkerSet
+from ..models.human import human_body
 from .first_posture import TooFewMarkersError, first_posture, place_trunk, settle
 from .follower import Follower
 from .follower import follower as make_follower
-from .human import human_body
-from .markers import MarkerSet
 from .sizes import fit_sizes, match_sizes
-from .tree import KinematicTree
 
 # how far markers may be from their usual places, round after round [m]: the sizes must explain what
 # they can before the places may take up the rest, or a bent knee passes for misplaced markers

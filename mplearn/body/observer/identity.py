@@ -20,10 +20,8 @@ from mplearn.errors import InvalidValueError
 from mplearn.recording import BoolArray, FloatArray
 from mplearn.state import Count, Range, State, require, within
 
-from .first_posture import LARGEST, SMALLEST
-from .known_bodies import BodiesState, KnownBodies
-from .known_bodies import IdentityConfig as IdentityConfig
-from .rigid import (
+from ..inverse_kinematics.first_posture import LARGEST, SMALLEST
+from ..marker_sets.rigid import (
     ABSENT,
     FULL,
     IN_DOUBT,
@@ -39,6 +37,8 @@ from .rigid import (
     rigid_pairs,
     usual_distances,
 )
+from .known_bodies import BodiesState, KnownBodies
+from .known_bodies import IdentityConfig as IdentityConfig
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,9 +16,9 @@ import numpy as np
 from mplearn.errors import BodyError
 from mplearn.recording import FloatArray, IntArray
 
-from .body import Body
+from ..models.body import Body
+from ..models.robot import robot_body
 from .points import points_of
-from .robot import robot_body
 
 # point -> (part of the body, place in the part's frame as a share of the body's height)
 _SIDED = {

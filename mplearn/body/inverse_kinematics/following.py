@@ -9,8 +9,8 @@ from numba import njit
 
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
+from ..kinematics.linkage import Linkage
 from .gauss_newton import solve_frame
-from .linkage import Linkage
 
 FEWEST_MARKERS = 3  # fewer do not say where a body is: the posture is held
 LARGEST_M = 3.5  # no person's markers span more along an axis

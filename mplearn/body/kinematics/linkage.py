@@ -9,7 +9,7 @@ from numba import njit
 
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
-from .kinematics import first_joints, forward_kinematics
+from .kernels import first_joints, forward_kinematics
 from .tree import KinematicTree
 
 

@@ -20,8 +20,8 @@ from numba import njit
 from mplearn.maths.tree_solvers import bounded_solve, inverse_diagonal
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
-from .kinematics import integrate
-from .linkage import Linkage, locate
+from ..kinematics.kernels import integrate
+from ..kinematics.linkage import Linkage, locate
 
 
 @njit(cache=True)

@@ -1,0 +1,1 @@
+"""Which markers sit where on a body, and what holds between them however it moves."""

@@ -1,0 +1,1 @@
+"""From a stream of markers to the learner's features: who is there, in which axes."""
