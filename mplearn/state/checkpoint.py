@@ -14,9 +14,8 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar
 import numpy as np
 
 from ..errors import StateError
-from .declared import Blob, SharedState
+from .declared import Blob, SharedState, fields_of, to_plain
 from .packing import as_json, from_json, packed, unpacked
-from .plain import fields_of, to_plain
 from .structure import from_plain
 
 T = TypeVar("T")

@@ -1,4 +1,4 @@
-"""How a stateful object declares its state: frozen dataclasses with checked types.
+"""How a stateful object declares its state: frozen dataclasses with checked types; as plain values.
 
 cattrs and msgspec turn dataclasses into plain values, too. Neither knows arrays, whose types,
 shapes and ranges are most of what must be checked here, nor parts that are kept once by their
@@ -8,108 +8,16 @@ walk over dataclass fields, which is the smaller part of `structure`.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
-from typing import Annotated, Any, TypeAlias, TypeVar
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import StateError
-
-T = TypeVar("T")
-_ABSENT = "absent"
-LARGEST = 1e250  # of a number in a state, where nothing else is said: what lies beyond is damage
-
-
-@dataclass(frozen=True)
-class Range:
-    """Marks a number that lies in [low, high]; NaN never does.
-
-    It is used as in ``Annotated[float, Range(0.0)]``.
-    """
-
-    low: float = -LARGEST
-    high: float = LARGEST
-
-
-@dataclass(frozen=True)
-class Array:
-    """Marks an array, as in ``Annotated[FloatArray, Array("n", "n", low=0.0)]``.
-
-    Args:
-        *shape: Length of each axis: a number, a name (equal names in one state are equal lengths),
-            or None for any.
-        low: Smallest value.
-        high: Largest value.
-        nan: Whether NaN may stand for what is missing.
-    """
-
-    shape: tuple[int | str | None, ...]
-    low: float
-    high: float
-    nan: bool
-
-    def __init__(
-        self,
-        *shape: int | str | None,
-        low: float = -LARGEST,
-        high: float = LARGEST,
-        nan: bool = False,
-    ) -> None:
-        for name, value in (("shape", shape), ("low", low), ("high", high), ("nan", nan)):
-            object.__setattr__(self, name, value)
-
-
-WHOLE = 2.0**53  # of a whole number: up to it, numbers are exact
-Count: TypeAlias = Annotated[int, Range(0, WHOLE)]
-
-
-def complete(kind: type[T]) -> type[T]:
-    """Mark a dataclass whose fields must all be there, whatever defaults its constructor has.
-
-    Elsewhere a field that is missing takes its default: as where a setting is newer than a file.
-    """
-    _COMPLETE.add(kind)
-    return kind
-
-
-def newer(default: T, *, absent: T) -> T:
-    """Return the field of a setting that is newer than files that are about.
-
-    Args:
-        default: What it is in a new configuration.
-        absent: What a file means that does not name it: how things were before. It is written only
-            where it is something else, so that an old file's content stays the same to the bit.
-
-    Example:
-        >>> from dataclasses import dataclass
-        >>> from mplearn.state import from_plain, to_plain
-        >>> @dataclass(frozen=True)
-        ... class Rules:
-        ...     order: int = 2
-        ...     reach: float = newer(1.5, absent=1.0)
-        >>> from_plain(Rules, {"order": 3})
-        Rules(order=3, reach=1.0)
-        >>> to_plain(Rules(3, 1.0)), to_plain(Rules())
-        ({'order': 3}, {'order': 2, 'reach': 1.5})
-    """
-    made: T = field(default=default, metadata={_ABSENT: absent})
-    return made
-
-
-def absent_fields(kind: Any) -> dict[str, Any]:
-    """Return the `newer` fields of a dataclass by name, and what the absence of each means."""
-    return {each.name: each.metadata[_ABSENT] for each in fields(kind) if _ABSENT in each.metadata}
-
-
-def is_complete(kind: type) -> bool:
-    """Whether a dataclass is so marked."""
-    return kind in _COMPLETE
-
-
-_COMPLETE: set[type] = set()
+from .fields import absent_fields
+from .packing import packed
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,9 +41,6 @@ class State:
         """Whether all that two states hold is equal bit for bit."""
         if type(other) is not type(self):
             return NotImplemented
-        from .packing import packed
-        from .plain import to_plain
-
         return packed(to_plain(self)) == packed(to_plain(other))
 
     __hash__ = None  # type: ignore[assignment]
@@ -168,50 +73,54 @@ class Blob:
         return len(self.array)
 
     def __repr__(self) -> str:
-        """Return shape and key, which tells the content."""
-        from .checkpoint import key_of
-
-        return f"Blob({self.array.shape}, {key_of(self)})"
+        """Return the shape."""
+        return f"Blob{self.array.shape}"
 
 
-def require(holds: bool, place: str, problem: str | Callable[[], str]) -> None:
-    """Raise a `StateError` at a place where something does not hold."""
-    if not holds:
-        raise StateError(problem if isinstance(problem, str) else problem(), place)
+Share: TypeAlias = Callable[[Blob | SharedState], Any]
 
 
-def require_no_cycle(parents: Mapping[int, int | None], place: Callable[[int], str]) -> None:
-    """Raise a `StateError` where a node lies below itself.
+def to_plain(value: Any, share: Share | None = None) -> Any:
+    """Return dataclasses as dictionaries, tuples and sets as lists, blobs as arrays.
+
+    Arrays are not copied.
 
     Args:
-        parents: The node above each node; one that is not among them is above all.
-        place: Returns the place of what is said of a node.
+        value: A state, a configuration, or anything they hold.
+        share: Says what stands for a part that is kept by its content; the part itself by default.
     """
-    safe: set[int] = set()
-    for start in parents:
-        path: list[int] = []
-        at: int | None = start
-        while at is not None and at in parents and at not in safe:
-            if at in path[-1:] or (len(path) > len(parents)):
-                raise StateError(f"node {at} lies below itself", place(at))
-            path.append(at)
-            at = parents[at]
-        safe.update(path)
+    if isinstance(value, (np.ndarray, str, int, float)) or value is None:
+        return value.item() if isinstance(value, np.generic) else value
+    if share is not None and isinstance(value, (Blob, SharedState)):
+        return share(value)
+    if isinstance(value, Blob):
+        return value.array
+    if isinstance(value, (tuple, list)):
+        return [to_plain(item, share) for item in value]
+    if isinstance(value, dict):
+        return {key: to_plain(item, share) for key, item in value.items()}
+    if isinstance(value, (set, frozenset)):
+        return sorted(value)
+    if is_dataclass(value):
+        return fields_of(value, share)
+    return value.item() if isinstance(value, np.generic) else value
 
 
-def shown(value: object) -> str:
-    """Return a value for a message, shortened."""
-    if isinstance(value, np.ndarray):
-        return f"an array of {value.dtype} {value.shape}"
-    if isinstance(value, (dict, list, tuple)):
-        return f"a {type(value).__name__} of {len(value)}"
-    if isinstance(value, int | float | bool | str | None):
-        return f"{value!r:.60}"
-    return f"a {type(value).__name__}"
+def fields_of(value: Any, share: Share | None = None) -> dict[str, Any]:
+    """Return the fields of a dataclass as plain values by name.
+
+    A `newer` field is left out where it has the value that its absence means, so that what an older
+    version wrote is written again as it was.
+    """
+    names, absent = _names(cast(Any, type(value)))
+    return {
+        name: to_plain(getattr(value, name), share)
+        for name in names
+        if name not in absent or getattr(value, name) != absent[name]
+    }
 
 
-def limits(low: float, high: float) -> str:
-    """Return a range for a message."""
-    if math.isinf(low) and math.isinf(high):
-        return "any number"
-    return f"in [{low:g}, {high:g}]"
+@cache
+def _names(kind: Any) -> tuple[tuple[str, ...], dict[str, Any]]:
+    """Return the names of the fields, and what the absence of some means."""
+    return tuple(each.name for each in fields(kind)), absent_fields(kind)

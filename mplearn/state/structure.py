@@ -25,14 +25,12 @@ from typing import (
 import numpy as np
 
 from ..errors import MPLearnError, StateError
-from .declared import (
+from .declared import Blob, SharedState, State
+from .fields import (
     LARGEST,
     WHOLE,
     Array,
-    Blob,
     Range,
-    SharedState,
-    State,
     absent_fields,
     is_complete,
     limits,

@@ -1,0 +1,148 @@
+"""What a state says of its fields: ranges, shapes, and what holds for files of other versions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Annotated, Any, TypeAlias, TypeVar
+
+import numpy as np
+
+from ..errors import StateError
+
+T = TypeVar("T")
+_ABSENT = "absent"
+LARGEST = 1e250  # of a number in a state, where nothing else is said: what lies beyond is damage
+
+
+@dataclass(frozen=True)
+class Range:
+    """Marks a number that lies in [low, high]; NaN never does.
+
+    It is used as in ``Annotated[float, Range(0.0)]``.
+    """
+
+    low: float = -LARGEST
+    high: float = LARGEST
+
+
+@dataclass(frozen=True)
+class Array:
+    """Marks an array, as in ``Annotated[FloatArray, Array("n", "n", low=0.0)]``.
+
+    Args:
+        *shape: Length of each axis: a number, a name (equal names in one state are equal lengths),
+            or None for any.
+        low: Smallest value.
+        high: Largest value.
+        nan: Whether NaN may stand for what is missing.
+    """
+
+    shape: tuple[int | str | None, ...]
+    low: float
+    high: float
+    nan: bool
+
+    def __init__(
+        self,
+        *shape: int | str | None,
+        low: float = -LARGEST,
+        high: float = LARGEST,
+        nan: bool = False,
+    ) -> None:
+        for name, value in (("shape", shape), ("low", low), ("high", high), ("nan", nan)):
+            object.__setattr__(self, name, value)
+
+
+WHOLE = 2.0**53  # of a whole number: up to it, numbers are exact
+Count: TypeAlias = Annotated[int, Range(0, WHOLE)]
+
+
+def complete(kind: type[T]) -> type[T]:
+    """Mark a dataclass whose fields must all be there, whatever defaults its constructor has.
+
+    Elsewhere a field that is missing takes its default: as where a setting is newer than a file.
+    """
+    _COMPLETE.add(kind)
+    return kind
+
+
+def newer(default: T, *, absent: T) -> T:
+    """Return the field of a setting that is newer than files that are about.
+
+    Args:
+        default: What it is in a new configuration.
+        absent: What a file means that does not name it: how things were before. It is written only
+            where it is something else, so that an old file's content stays the same to the bit.
+
+    Example:
+        >>> from dataclasses import dataclass
+        >>> from mplearn.state import from_plain, to_plain
+        >>> @dataclass(frozen=True)
+        ... class Rules:
+        ...     order: int = 2
+        ...     reach: float = newer(1.5, absent=1.0)
+        >>> from_plain(Rules, {"order": 3})
+        Rules(order=3, reach=1.0)
+        >>> to_plain(Rules(3, 1.0)), to_plain(Rules())
+        ({'order': 3}, {'order': 2, 'reach': 1.5})
+    """
+    made: T = field(default=default, metadata={_ABSENT: absent})
+    return made
+
+
+def absent_fields(kind: Any) -> dict[str, Any]:
+    """Return the `newer` fields of a dataclass by name, and what the absence of each means."""
+    return {each.name: each.metadata[_ABSENT] for each in fields(kind) if _ABSENT in each.metadata}
+
+
+def is_complete(kind: type) -> bool:
+    """Whether a dataclass is so marked."""
+    return kind in _COMPLETE
+
+
+_COMPLETE: set[type] = set()
+
+
+def require(holds: bool, place: str, problem: str | Callable[[], str]) -> None:
+    """Raise a `StateError` at a place where something does not hold."""
+    if not holds:
+        raise StateError(problem if isinstance(problem, str) else problem(), place)
+
+
+def require_no_cycle(parents: Mapping[int, int | None], place: Callable[[int], str]) -> None:
+    """Raise a `StateError` where a node lies below itself.
+
+    Args:
+        parents: The node above each node; one that is not among them is above all.
+        place: Returns the place of what is said of a node.
+    """
+    safe: set[int] = set()
+    for start in parents:
+        path: list[int] = []
+        at: int | None = start
+        while at is not None and at in parents and at not in safe:
+            if at in path[-1:] or (len(path) > len(parents)):
+                raise StateError(f"node {at} lies below itself", place(at))
+            path.append(at)
+            at = parents[at]
+        safe.update(path)
+
+
+def shown(value: object) -> str:
+    """Return a value for a message, shortened."""
+    if isinstance(value, np.ndarray):
+        return f"an array of {value.dtype} {value.shape}"
+    if isinstance(value, (dict, list, tuple)):
+        return f"a {type(value).__name__} of {len(value)}"
+    if isinstance(value, int | float | bool | str | None):
+        return f"{value!r:.60}"
+    return f"a {type(value).__name__}"
+
+
+def limits(low: float, high: float) -> str:
+    """Return a range for a message."""
+    if math.isinf(low) and math.isinf(high):
+        return "any number"
+    return f"in [{low:g}, {high:g}]"
