@@ -2,48 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import UnknownPrimitiveError
 from ..recording import IntArray
 from .edges import EdgeTable
-
-if TYPE_CHECKING:
-    from .transition_graph import TransitionGraph
-
-
-@dataclass(frozen=True)
-class MergedGraph:
-    """A graph in which each chain is one node; nothing is lost by it.
-
-    Attributes:
-        whole: The graph as it was: the undo.
-        graph: The graph of chains, of order 1; a chain goes by its first primitive. Durations are
-            from the start of a chain to the start of the next.
-        chains: The primitives of each chain, by the first.
-    """
-
-    whole: TransitionGraph
-    graph: TransitionGraph
-    chains: Mapping[int, tuple[int, ...]]
-
-    def expand(self, path: Sequence[int]) -> tuple[int, ...]:
-        """Return the primitives of a path of chains.
-
-        Raises:
-            UnknownPrimitiveError: The path names something that is not a chain's first primitive.
-        """
-        for head in path:
-            if head not in self.chains:
-                raise UnknownPrimitiveError(
-                    f"no chain starts with primitive {head}; chains start with {list(self.chains)}"
-                )
-        return tuple(id for head in path for id in self.chains[head])
 
 
 def find_chains(

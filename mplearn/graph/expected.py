@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..recording import FloatArray
-
-if TYPE_CHECKING:
-    from .transition_graph import TransitionGraph
+from .prediction import Counts
 
 
-def left_out_surprises(counts: TransitionGraph, length: int) -> FloatArray:
+def left_out_surprises(counts: Counts, length: int) -> FloatArray:
     """Return the surprise of each counted transition, itself left out, sorted, shape (n,) [nat].
 
     Args:
@@ -33,7 +30,7 @@ def left_out_surprises(counts: TransitionGraph, length: int) -> FloatArray:
 _Table = dict[tuple[tuple[int, ...], int], int]
 
 
-def _tables(counts: TransitionGraph) -> list[_Table]:
+def _tables(counts: Counts) -> list[_Table]:
     """Return how often each primitive followed each context, by the context's length."""
     tables: list[_Table] = [{} for _ in range(counts.order + 1)]
     for source, target, count, *_ in counts.edge_rows().tolist():
@@ -58,7 +55,7 @@ def _sums(
 
 
 def _surprise(
-    counts: TransitionGraph,
+    counts: Counts,
     tables: list[_Table],
     totals: dict[tuple[int, ...], int],
     kinds: dict[tuple[int, ...], int],

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
 from ..errors import InvalidValueError
-from ..recording import FloatArray
-
-if TYPE_CHECKING:
-    from .transition_graph import TransitionGraph
+from ..recording import FloatArray, IntArray
 
 History: TypeAlias = Sequence[int | None]
 
@@ -45,6 +42,28 @@ class Followers(Protocol):
 
     def followers(self, context: tuple[int, ...]) -> FloatArray:
         """How often each node followed a context (the empty one too), shape (n,)."""
+
+
+class Counts(Followers, Protocol):
+    """All that was counted; see `TransitionGraph`, which is one."""
+
+    @property
+    def order(self) -> int:
+        """Longest history that is looked at."""
+
+    @property
+    def concentration(self) -> float:
+        """Weight of what a shorter history predicts."""
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """The nodes."""
+
+    def edge_rows(self) -> IntArray:
+        """Return the edges, shape (E, 5): source, target, count, total [ms], squares [ms^2]."""
+
+    def histories(self) -> Iterator[tuple[tuple[int, ...], int, int]]:
+        """Yield (context, next, count) of the contexts longer than one node."""
 
 
 def usable_context(history: History, order: int) -> tuple[int, ...]:
@@ -92,7 +111,7 @@ def most_likely(
     return tuple(Prediction(ids[i], float(p[i]), *time_s(ids[i])) for i in best)
 
 
-def surprise(counts: TransitionGraph, sequence: History) -> FloatArray:
+def surprise(counts: Counts, sequence: History) -> FloatArray:
     """Return -log p(x_t | x_1..x_{t-1}) [nat], shape (len(sequence) - 1,); NaN where x_t is None.
 
     NaN too where nothing is known of what came before x_t: that is no order.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal, TypeAlias, Unpack
 
@@ -12,7 +13,7 @@ import numpy as np
 from ..errors import InvalidValueError, NoPathError, UnknownPrimitiveError
 from ..recording import FloatArray, IntArray
 from ..state import validated
-from .chains import MergedGraph, find_chains, merged_edges
+from .chains import find_chains, merged_edges
 from .constraints import Asked, Constraints, constrained_walks
 from .edges import EdgeTable
 from .expected import left_out_surprises
@@ -557,6 +558,35 @@ class TransitionGraph:
     def _indexed_edges(self) -> tuple[IntArray, IntArray, IntArray]:
         edges = self._edges
         return self._indices(edges.sources), self._indices(edges.targets), edges.counts
+
+
+@dataclass(frozen=True)
+class MergedGraph:
+    """A graph in which each chain is one node; nothing is lost by it.
+
+    Attributes:
+        whole: The graph as it was: the undo.
+        graph: The graph of chains, of order 1; a chain goes by its first primitive. Durations are
+            from the start of a chain to the start of the next.
+        chains: The primitives of each chain, by the first.
+    """
+
+    whole: TransitionGraph
+    graph: TransitionGraph
+    chains: Mapping[int, tuple[int, ...]]
+
+    def expand(self, path: Sequence[int]) -> tuple[int, ...]:
+        """Return the primitives of a path of chains.
+
+        Raises:
+            UnknownPrimitiveError: The path names something that is not a chain's first primitive.
+        """
+        for head in path:
+            if head not in self.chains:
+                raise UnknownPrimitiveError(
+                    f"no chain starts with primitive {head}; chains start with {list(self.chains)}"
+                )
+        return tuple(id for head in path for id in self.chains[head])
 
 
 def _shortened(ids: tuple[int, ...]) -> str:

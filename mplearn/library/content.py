@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
-from ..errors import LibraryError, MPLearnError
-from ..graph import GraphState, TransitionGraph
-from ..state import FileFormat, Range, State, from_plain, require, require_no_cycle, to_plain
-from ..tree.recogniser import Recogniser, RecogniserState
+from ..errors import LibraryError
+from ..graph import GraphState
+from ..state import FileFormat, Range, State, require, require_no_cycle
+from ..tree.recogniser import RecogniserState
 from .primitive import Primitive, TreeNode
-
-if TYPE_CHECKING:
-    from .library import PrimitiveLibrary
 
 FILES = FileFormat("mplearn-library", "library", LibraryError)
 
@@ -59,41 +56,3 @@ class LibraryState(State):
             require(ids.issuperset(leaves), "recogniser.index.ids", "must be primitives")
             above = parents.keys() >= set(index.parents.tolist())
             require(above, "recogniser.index.parents", "must be nodes of the tree")
-
-
-def to_content(library: PrimitiveLibrary) -> Any:
-    """Return all that a library holds as plain values and arrays."""
-    recogniser = library.recogniser
-    return to_plain(
-        LibraryState(
-            primitives=library.primitives,
-            graph=library.graph.state(),
-            channels=library.channels,
-            rate_hz=float(library.rate_hz),
-            body=library.body,
-            tree=library.tree,
-            recogniser=None if recogniser is None else recogniser.state(),
-        )
-    )
-
-
-def from_content(kind: type[PrimitiveLibrary], content: Any, source: str) -> PrimitiveLibrary:
-    """Build the library that `to_content` described.
-
-    Raises:
-        LibraryError: The content, which came from ``source``, describes none.
-    """
-    try:
-        state = from_plain(LibraryState, content)
-        recogniser = state.recogniser
-        return kind(
-            primitives=state.primitives,
-            graph=TransitionGraph.from_state(state.graph),
-            channels=state.channels,
-            rate_hz=state.rate_hz,
-            body=state.body,
-            tree=state.tree,
-            recogniser=None if recogniser is None else Recogniser.from_state(recogniser),
-        )
-    except MPLearnError as error:
-        raise LibraryError(f"{source} does not describe a library: {error}") from error

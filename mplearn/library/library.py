@@ -6,12 +6,12 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias, Unpack
+from typing import TypeAlias, Unpack
 
 import numpy as np
 
 from ..body import view_of
-from ..errors import InvalidValueError, UnknownPrimitiveError
+from ..errors import InvalidValueError, LibraryError, StateError, UnknownPrimitiveError
 from ..generation import StyleName, Trajectory, generate, retime
 from ..graph import (
     Asked,
@@ -23,12 +23,11 @@ from ..graph import (
     tree_levels,
 )
 from ..recording import FloatArray
-from .content import FILES, from_content, to_content
+from ..state import from_plain, to_plain, within
+from ..tree.recogniser import Recogniser, Recognition
+from .content import FILES, LibraryState
 from .novelty import AnomalyScore, MotionNovelty, novelty_of
 from .primitive import Primitive, TreeNode
-
-if TYPE_CHECKING:
-    from ..tree import Recogniser, Recognition
 
 Key: TypeAlias = int | str
 
@@ -128,7 +127,7 @@ class PrimitiveLibrary:
     @cached_property
     def version(self) -> str:
         """Hash of all that the library holds, names included: 16 hexadecimal digits."""
-        return FILES.digest(to_content(self))[:16]
+        return FILES.digest(to_plain(self.state()))[:16]
 
     # ---- what it knows
 
@@ -291,7 +290,7 @@ class PrimitiveLibrary:
         Raises:
             LibraryError: The file cannot be written.
         """
-        FILES.write(Path(path), to_content(self))
+        FILES.write(Path(path), to_plain(self.state()))
         return Path(path)
 
     @classmethod
@@ -301,7 +300,46 @@ class PrimitiveLibrary:
         Raises:
             LibraryError: The file is missing, damaged, foreign, or of a newer version.
         """
-        return from_content(cls, FILES.read(Path(path)), str(path))
+        content = FILES.read(Path(path))
+        try:
+            return cls.from_state(from_plain(LibraryState, content))
+        except StateError as error:
+            raise LibraryError(f"{path} does not describe a library: {error}") from error
+
+    def state(self) -> LibraryState:
+        """Return all that the library holds."""
+        return LibraryState(
+            primitives=self.primitives,
+            graph=self.graph.state(),
+            channels=self.channels,
+            rate_hz=float(self.rate_hz),
+            body=self.body,
+            tree=self.tree,
+            recogniser=None if self.recogniser is None else self.recogniser.state(),
+        )
+
+    @classmethod
+    def from_state(cls, state: LibraryState) -> PrimitiveLibrary:
+        """Return the library that `state` described.
+
+        Raises:
+            StateError: Its parts do not fit each other.
+        """
+        with within("graph"):
+            graph = TransitionGraph.from_state(state.graph)
+        with within("recogniser"):
+            known = state.recogniser
+            recogniser = None if known is None else Recogniser.from_state(known)
+        with within("primitives"):
+            return cls(
+                primitives=state.primitives,
+                graph=graph,
+                channels=state.channels,
+                rate_hz=state.rate_hz,
+                body=state.body,
+                tree=state.tree,
+                recogniser=recogniser,
+            )
 
     # ---- inside
 

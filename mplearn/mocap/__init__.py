@@ -11,7 +11,7 @@ from .open import take_names as take_names
 from .options import command_line as command_line
 from .placing.size import UNITS_M as UNITS_M
 from .placing.size import named_unit as named_unit
-from .placing.vertical import DIRECTIONS as DIRECTIONS
+from .reader import DIRECTIONS as DIRECTIONS
 from .reader import Hints as Hints
 from .reader import Reader as Reader
 from .registry import readers as readers

@@ -13,7 +13,9 @@ import numpy as np
 from ..errors import InvalidValueError, RecordingError
 from ..recording import Recording
 from .files import stem
-from .placing.vertical import DIRECTIONS
+
+DIRECTIONS = ("x", "-x", "y", "-y", "z", "-z")
+"""Axes of a file that may point up."""
 
 
 @dataclass(frozen=True)

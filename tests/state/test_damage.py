@@ -19,7 +19,7 @@ from mplearn.errors import LibraryError, StateError
 from mplearn.evaluation.observing import observe
 from mplearn.evaluation.streams import join_people
 from mplearn.learner import LearnerState
-from mplearn.library.content import FILES, from_content, to_content
+from mplearn.library.content import FILES, LibraryState
 from mplearn.state import from_plain, to_plain
 
 
@@ -122,7 +122,11 @@ def library():
 def test_a_damaged_library_is_refused_or_the_same(library):
     plain = to_content(library)
     counts, silent = tried(
-        plain, lambda wrong: from_content(PrimitiveLibrary, wrong, "x"), to_content, 400, 0
+        plain,
+        lambda wrong: PrimitiveLibrary.from_state(from_plain(LibraryState, wrong)),
+        to_content,
+        400,
+        0,
     )
     legal = {  # nothing else says that it is wrong
         "recogniser.bank.columns": "nan",  # a value that was not measured
@@ -131,6 +135,10 @@ def test_a_damaged_library_is_refused_or_the_same(library):
     wrong = [what for what in silent if legal.get(what.place) != what.kind]
     assert not [what for what in wrong if not what.place.startswith("tree[")]
     assert counts["refused"] > 360
+
+
+def to_content(library):
+    return to_plain(library.state())
 
 
 def changed(library, **changes):
@@ -156,8 +164,8 @@ def test_what_used_to_get_past_the_reader(library, tmp_path, place, change):
     content = to_content(library)
     change(content)
     if place == "primitives[0].name":  # no file can hold it
-        with pytest.raises(LibraryError, match="name"):
-            from_content(PrimitiveLibrary, content, "here")
+        with pytest.raises(StateError, match="name"):
+            from_plain(LibraryState, content)
         return
     FILES.write(tmp_path / "wrong.mplearn", content)
     with pytest.raises(LibraryError) as caught:

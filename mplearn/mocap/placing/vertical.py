@@ -16,9 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...recording import BoolArray, FloatArray
+from ..reader import DIRECTIONS
 from .part_names import HEIGHTS, place_of
-
-DIRECTIONS = ("x", "-x", "y", "-y", "z", "-z")
 
 _LOOK = 300  # frames that are looked at
 _FEW = 3  # points; fewer tell nothing
