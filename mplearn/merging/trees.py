@@ -12,9 +12,9 @@ from ..errors import InvalidValueError
 from ..recording import IntArray
 from ..state import Blob
 from ..tree import ROOT, Change, PrimitiveTree
-from ..tree.node import NodeState
-from ..tree.search import mean_nearest
-from ..tree.spread import SampleState, SpreadState
+from ..tree.exemplars.spread import SampleState, SpreadState
+from ..tree.nodes.node import NodeState
+from ..tree.nodes.search import mean_nearest
 from ..tree.tree import TreeState
 
 _REACH = 1.25  # radii of few exemplars are small

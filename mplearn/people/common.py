@@ -9,8 +9,8 @@ import numpy as np
 from ..hmm import LeftRightHMM, fit
 from ..recording import FloatArray
 from ..tree import ROOT, PrimitiveTree, Recogniser, TreeConfig
-from ..tree.bank import ExemplarBank
-from ..tree.search import NodeIndex
+from ..tree.exemplars.bank import ExemplarBank
+from ..tree.nodes.search import NodeIndex
 
 
 def common_model(models: Sequence[LeftRightHMM], exemplars: Sequence[FloatArray]) -> LeftRightHMM:

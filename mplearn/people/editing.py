@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InvalidValueError, UnknownPrimitiveError
 from ..tree import ROOT, Change, Merge, Reparent, Split
-from ..tree.clustering import two_branches
+from ..tree.nodes.clustering import two_branches
 from .leaf import Leaf
 from .nodes import tidied
 from .sharing import Sharing

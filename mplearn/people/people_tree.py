@@ -375,7 +375,7 @@ class PeopleTree:
 
     def _check_widths(self, state: SharingState) -> None:
         """Check that shapes are such as this tree takes."""
-        posture, movement = self.n_channels, self.n_channels * self.config.form.n_points
+        posture, movement = self.n_channels, self.n_channels * self.config.normalisation.n_points
         for k, leaf in enumerate(state.leaves):
             fits = (len(leaf.shape.posture), len(leaf.shape.movement)) == (posture, movement)
             require(fits, f"leaves[{k}].shape", f"must have shapes ({posture},) and ({movement},)")

@@ -15,7 +15,8 @@ import numpy as np
 
 from ..recording import FloatArray
 from ..state import Array, SharedState
-from ..tree import FormConfig, MirrorMap, form
+from ..tree import MirrorMap, NormalisationConfig
+from ..tree.exemplars import normalisation
 
 
 class Shape(NamedTuple):
@@ -38,17 +39,17 @@ class ShapeState(SharedState):
     movement: Annotated[FloatArray, Array("pd")]
 
 
-def shape_of(exemplars: Iterable[FloatArray], config: FormConfig) -> Shape:
+def shape_of(exemplars: Iterable[FloatArray], config: NormalisationConfig) -> Shape:
     """Return the shape of one motion's executions.
 
     Args:
         exemplars: Segments, shape (L, D) each; NaN counts for nothing.
-        config: The form in which segments are compared.
+        config: How segments are normalised.
     """
-    points = np.array([form.points_of(frames, config) for frames in exemplars])
+    points = np.array([normalisation.points_of(frames, config) for frames in exemplars])
     seen = ~np.isnan(points)
     mean = np.where(seen, points, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
-    weights = form.weights(config)
+    weights = normalisation.weights(config)
     weights = weights / weights.sum()
     posture = weights @ mean
     return Shape(posture, (np.sqrt(weights)[:, None] * (mean - posture)).ravel())

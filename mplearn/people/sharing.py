@@ -214,7 +214,7 @@ class Sharing:
         if placement.recognised:
             said = before.get((person, recognised_as(placement)), ROOT)
         else:
-            shape = shape_of([frames], self.config.form)
+            shape = shape_of([frames], self.config.normalisation)
             other, ratio = self._nearest(person, shape)
             nearest = other if nearest is None else nearest
             if other is not None and ratio <= 1:
@@ -396,7 +396,7 @@ class Sharing:
 
     def seen(self, person: int, leaf: int) -> Shape:
         """Return the shape of a leaf as its exemplars are now."""
-        return shape_of(self.trees[person].exemplars(leaf), self.config.form)
+        return shape_of(self.trees[person].exemplars(leaf), self.config.normalisation)
 
     def offset(self, person: int) -> FloatArray:
         """Return a person's usual deviation in posture, shape (D,)."""

@@ -9,7 +9,7 @@ from typing import Annotated
 from ..recording import FloatArray, IntArray
 from ..state import Array, Count, Range, State, require, require_no_cycle
 from ..tree import ROOT
-from ..tree.node import Happening
+from ..tree.nodes.node import Happening
 from .leaf import LeafState
 from .pins import PinsState
 from .waiting import WaitingState

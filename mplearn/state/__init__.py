@@ -17,6 +17,7 @@ from .fields import complete as complete
 from .fields import newer as newer
 from .fields import require as require
 from .fields import require_no_cycle as require_no_cycle
+from .fields import saved_as as saved_as
 from .files import FileFormat as FileFormat
 from .structure import from_plain as from_plain
 from .structure import validated as validated

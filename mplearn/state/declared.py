@@ -16,7 +16,7 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from .fields import absent_fields
+from .fields import absent_fields, saved_names
 from .packing import packed
 
 
@@ -114,13 +114,15 @@ def fields_of(value: Any, share: Share | None = None) -> dict[str, Any]:
     """
     names, absent = _names(cast(Any, type(value)))
     return {
-        name: to_plain(getattr(value, name), share)
-        for name in names
+        saved: to_plain(getattr(value, name), share)
+        for name, saved in names.items()
         if name not in absent or getattr(value, name) != absent[name]
     }
 
 
 @cache
-def _names(kind: Any) -> tuple[tuple[str, ...], dict[str, Any]]:
-    """Return the names of the fields, and what the absence of some means."""
-    return tuple(each.name for each in fields(kind)), absent_fields(kind)
+def _names(kind: Any) -> tuple[dict[str, str], dict[str, Any]]:
+    """Return the names of the fields as saved, and what the absence of some means."""
+    called = saved_names(kind)
+    saved = {each.name: called.get(each.name, each.name) for each in fields(kind)}
+    return saved, absent_fields(kind)

@@ -92,6 +92,36 @@ def newer(default: T, *, absent: T) -> T:
     return made
 
 
+def saved_as(**names: str) -> Callable[[type[T]], type[T]]:
+    """Mark fields of a dataclass that go by other names in what is saved: those they had before.
+
+    What is read may name them either way.
+
+    Example:
+        >>> from dataclasses import dataclass
+        >>> from mplearn.state import from_plain, to_plain
+        >>> @saved_as(order="depth")
+        ... @dataclass(frozen=True)
+        ... class Rules:
+        ...     order: int = 2
+        >>> to_plain(Rules(3))
+        {'depth': 3}
+        >>> from_plain(Rules, {"depth": 3}) == from_plain(Rules, {"order": 3})
+        True
+    """
+
+    def mark(kind: type[T]) -> type[T]:
+        _SAVED_AS[kind] = names
+        return kind
+
+    return mark
+
+
+def saved_names(kind: type) -> dict[str, str]:
+    """Return the names of fields in what is saved, of those that go by another name there."""
+    return _SAVED_AS.get(kind, {})
+
+
 def absent_fields(kind: Any) -> dict[str, Any]:
     """Return the `newer` fields of a dataclass by name, and what the absence of each means."""
     return {each.name: each.metadata[_ABSENT] for each in fields(kind) if _ABSENT in each.metadata}
@@ -103,6 +133,7 @@ def is_complete(kind: type) -> bool:
 
 
 _COMPLETE: set[type] = set()
+_SAVED_AS: dict[type, dict[str, str]] = {}
 
 
 def require(holds: bool, place: str, problem: str | Callable[[], str]) -> None:

@@ -34,6 +34,7 @@ from .fields import (
     absent_fields,
     is_complete,
     limits,
+    saved_names,
     shown,
 )
 
@@ -330,6 +331,7 @@ def _dataclass(kind: type) -> Reader:
     """Return what reads a dataclass; its own hints are looked up when it is first read."""
     known: list[tuple[str, Reader, bool]] = []
     names = {each.name for each in fields(kind)}
+    called = {saved: name for name, saved in saved_names(kind).items()}
 
     def readers() -> list[tuple[str, Reader, bool]]:
         if not known:
@@ -347,6 +349,13 @@ def _dataclass(kind: type) -> Reader:
         given = {name: getattr(value, name) for name in names} if typed else value
         if not isinstance(given, dict):
             raise StateError(f"must be a dictionary, not {shown(value)}")
+        asked: dict[str, str] = {}  # fields by the names that they are given by
+        if not typed and any(saved in given for saved in called):
+            asked = {name: saved for saved, name in called.items() if saved in given}
+            twice = [name for name in asked if name in given]
+            if twice:
+                raise StateError(f"names {twice[0]!r} twice, also as {asked[twice[0]]!r}")
+            given = {called.get(key, key): value for key, value in given.items()}
         strange = [key for key in given if key not in names]
         if strange:
             raise StateError(f"has no field {strange[0]!r:.60}; known are {sorted(names)}")
@@ -360,7 +369,7 @@ def _dataclass(kind: type) -> Reader:
             try:
                 found[name] = one(given[name], scope)
             except StateError as error:
-                raise error.below(name) from None
+                raise error.below(asked.get(name, name)) from None
         if typed and all(found[name] is given[name] for name in names):
             made = value
         else:

@@ -1,6 +1,6 @@
 """The incremental tree of motion primitives."""
 
-from .config import FormConfig as FormConfig
+from .config import NormalisationConfig as NormalisationConfig
 from .config import TreeConfig as TreeConfig
 from .distance import Distance as Distance
 from .distance import Exemplar as Exemplar
@@ -9,7 +9,7 @@ from .distance import MonteCarloDistance as MonteCarloDistance
 from .distance import make_distance as make_distance
 from .distance import register_distance as register_distance
 from .mirror import MirrorMap as MirrorMap
-from .node import Node as Node
+from .nodes.node import Node as Node
 from .placement import ROOT as ROOT
 from .placement import Change as Change
 from .placement import Match as Match

@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass, field, replace
 
 from ..errors import InvalidValueError
-from ..state import newer
+from ..state import newer, saved_as
 
 _MOST_POINTS, _MOST_SAMPLED = 1_000, 4_096  # all distances of the sample are kept
 
 
 @dataclass(frozen=True)
-class FormConfig:
-    """How a segment is put into the form in which segments are compared.
+class NormalisationConfig:
+    """How a segment is normalised in time, weighted and partly centred, before it is compared.
 
     Neighbouring motions blend into each other, mostly into the start of a segment; where a person
     stands differs more than how the person moves.
@@ -44,12 +44,13 @@ class FormConfig:
             raise InvalidValueError(f"centring must lie in [0, 1], not {self.centring}")
 
 
+@saved_as(normalisation="form")
 @dataclass(frozen=True)
 class TreeConfig:
     """Rules of the tree [Kulic2012, 2.2].
 
     Attributes:
-        form: The form in which segments are compared.
+        normalisation: How segments are normalised before they are compared.
         n_states: States of the models.
         max_chains: Most chains of a primitive's model: one is added while it cannot be told apart
             from its neighbour [Kulic2008b]; 1 for none.
@@ -110,7 +111,7 @@ class TreeConfig:
         seed: Seed of the choice of those.
     """
 
-    form: FormConfig = field(default_factory=FormConfig)
+    normalisation: NormalisationConfig = field(default_factory=NormalisationConfig)
     n_states: int = 8
     max_chains: int = 1
     variance_floor: float = 0.6
@@ -151,7 +152,7 @@ class TreeConfig:
         """Return the rules as the paper prints them: eq. 5 to 7, nothing else."""
         return replace(
             cls(),
-            form=FormConfig(n_points=32, head=0.0, ramp=0.0, centring=0.0),
+            normalisation=NormalisationConfig(n_points=32, head=0.0, ramp=0.0, centring=0.0),
             distance="monte_carlo",
             power=1.0,
             tempo=math.inf,
@@ -216,7 +217,8 @@ class TreeConfig:
             raise InvalidValueError(
                 f"false_acceptance must lie in (0, 1) or be None, not {self.false_acceptance}"
             )
-        if self.form.n_points < self.n_states:
+        if self.normalisation.n_points < self.n_states:
             raise InvalidValueError(
-                f"{self.n_states} states need n_points of at least that, not {self.form.n_points}"
+                f"{self.n_states} states need n_points of at least that, "
+                f"not {self.normalisation.n_points}"
             )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -18,16 +18,14 @@ from numba import njit
 from ..errors import InvalidValueError
 from ..hmm.kernels import log_densities, log_likelihood
 from ..recording import FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from .config import TreeConfig
+from .config import TreeConfig
 
 _N_DRAWS = 8  # sequences that `MonteCarloDistance` generates of each model
 _SEED = 20120301
 
 
 class Exemplar(NamedTuple):
-    """A segment in the form in which it is compared, and its model.
+    """A segment, normalised as it is compared, and its model.
 
     Attributes:
         columns: Points, shape (D, P).
@@ -116,7 +114,7 @@ class MonteCarloDistance(Distance):
 
     def __init__(self, config: TreeConfig) -> None:
         super().__init__(config)
-        self._n_points = config.form.n_points
+        self._n_points = config.normalisation.n_points
         self._moves = np.random.default_rng(_SEED).random((_N_DRAWS, self._n_points))
 
     def divergence(

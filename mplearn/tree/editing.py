@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..errors import InvalidValueError, UnknownPrimitiveError
-from .clustering import two_branches
-from .node import Node
+from .nodes.clustering import two_branches
+from .nodes.node import Node
+from .nodes.structure import Structure
 from .placement import ROOT
-from .structure import Structure
 
 _LEAST = 2  # exemplars of a primitive; one alone has no width
 

@@ -7,9 +7,9 @@ import numpy as np
 from ..hmm import FactorialHMM, LeftRightHMM, add_chain, em_step, fit, needs_more_chains
 from ..recording import FloatArray
 from .config import TreeConfig
-from .node import Node
+from .nodes.node import Node
+from .nodes.structure import Structure
 from .placement import ROOT
-from .structure import Structure
 
 _FLOOR = 0.1  # smallest standard deviation of a model, as a share of all motion's
 _EM_STEPS = 5  # after each chain that is added

@@ -12,13 +12,13 @@ import numpy as np
 from ..hmm.sequences import as_frames
 from ..recording import FloatArray
 from ..state import Count, State, require, validated, within
-from . import form
-from .bank import BankState, ExemplarBank
 from .config import TreeConfig
 from .distance import Distance
+from .exemplars import normalisation
+from .exemplars.bank import BankState, ExemplarBank
+from .nodes.search import IndexState, NodeIndex
 from .placement import Match
 from .rejection import Strangers, spreads
-from .search import IndexState, NodeIndex
 
 
 class Recognition(NamedTuple):
@@ -47,9 +47,9 @@ class RecogniserState(State):
     index: IndexState
 
     def check(self) -> None:
-        """Check that the nodes' exemplars are there, in the form of the rules."""
+        """Check that the nodes' exemplars are there, normalised as the rules say."""
         points = self.bank.columns.shape[2]
-        wanted = self.config.form.n_points
+        wanted = self.config.normalisation.n_points
         require(points == wanted, "bank.columns", f"must hold {wanted} points each, not {points}")
         known = set(self.bank.numbers.tolist())
         used = {number for group in self.index.members for number in group}
@@ -132,7 +132,7 @@ class Recogniser:
         frames = as_frames(frames, self._bank.n_channels)
         if refusal(frames, self.shortest_frames):
             return Recognition(None, float("inf"), float("inf"), ())
-        points = form.centred(form.points_of(frames, self.config.form), self.config.form)
+        points = normalisation.normalised(frames, self.config.normalisation)
         matches = self._index.search(self._bank.model(points, len(frames)), self._bank)
         if not matches:
             return Recognition(None, float("inf"), float("inf"), ())

@@ -17,8 +17,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..recording import FloatArray
-from .bank import ExemplarBank
-from .search import NodeIndex, mean_nearest
+from .exemplars.bank import ExemplarBank
+from .nodes.search import NodeIndex, mean_nearest
 
 DIMENSIONS = 3.0  # nearest neighbours among people's motions tell of 2.3 to 5.5
 _PAIR = 2.0

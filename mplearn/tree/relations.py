@@ -14,13 +14,13 @@ import numpy as np
 
 from ..errors import InvalidValueError
 from ..recording import FloatArray
-from . import form
-from .bank import ExemplarBank
+from .exemplars.bank import ExemplarBank
+from .exemplars.normalisation import centred, normalised, points_of
+from .exemplars.spread import ChannelSpread
 from .mirror import MirrorMap
-from .node import Node
+from .nodes.node import Node
+from .nodes.search import NodeIndex, mean_nearest
 from .placement import ROOT
-from .search import NodeIndex, mean_nearest
-from .spread import ChannelSpread
 from .tree import PrimitiveTree
 
 MOVES = 0.3  # a part that varies less than this share of its usual standard deviation is at rest
@@ -73,7 +73,7 @@ def related(
     ]
     leaves = {leaf: [each[:, seen] for each in tree.exemplars(leaf)] for leaf in tree.leaves}
     points = {
-        leaf: [form.points_of(each, tree.config.form) for each in group]
+        leaf: [points_of(each, tree.config.normalisation) for each in group]
         for leaf, group in leaves.items()
     }
     spread = ChannelSpread(np.array(tree.groups, np.int64)[seen])
@@ -83,7 +83,7 @@ def related(
     if not _moves(mine, spread.variances()):
         return ()
     bank, index = _index(tree, points, spread.variances())
-    asked = [bank.model(_centred(tree, form.points_of(each, tree.config.form))) for each in mine]
+    asked = [bank.model(normalised(each, tree.config.normalisation)) for each in mine]
     found = []
     for k, leaf in enumerate(index.ids.tolist()):
         if leaf == id and mirror is None:
@@ -100,10 +100,6 @@ def _moves(exemplars: Sequence[FloatArray], variances: FloatArray) -> bool:
     return bool(own > MOVES**2 * variances.mean())
 
 
-def _centred(tree: PrimitiveTree, points: FloatArray) -> FloatArray:
-    return form.centred(points, tree.config.form)
-
-
 def _index(
     tree: PrimitiveTree, points: dict[int, list[FloatArray]], variances: FloatArray
 ) -> tuple[ExemplarBank, NodeIndex]:
@@ -115,7 +111,7 @@ def _index(
     for leaf, group in points.items():
         node = Node(leaf, ROOT, 0)
         for each in group:
-            bank.add(number, bank.model(_centred(tree, each)))
+            bank.add(number, bank.model(centred(each, tree.config.normalisation)))
             node.members.append(number)
             number += 1
         node.matrix = bank.matrix(node.members)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..recording import FloatArray
-from .clustering import clusters_below
+from .nodes.clustering import clusters_below
 
 _ALIKE = 1.5  # times the scale up to which segments may be meant as one motion
 

@@ -22,20 +22,19 @@ from ..state import (
     require_no_cycle,
     validated,
 )
-from .bank import ExemplarBank
-from .births import forget_chances, form_primitives
 from .config import TreeConfig
 from .editing import chosen_groups, leaf_of, pair_of, place_below
-from .memory import SegmentMemory
+from .exemplars.bank import ExemplarBank
+from .exemplars.memory import SegmentMemory
+from .exemplars.renewal import RenewalState
+from .exemplars.spread import SampleState, SpreadState
 from .models import GroupModels
-from .node import Node, NodeState
+from .nodes.node import Node, NodeState
+from .nodes.structure import Structure
 from .placement import ROOT, Change, Placement
 from .recogniser import Recogniser, refusal
-from .renewal import RenewalState
 from .repetitions import Repetition, most_repeated
-from .revision import merge_duplicates, split_mixed
-from .spread import SampleState, SpreadState
-from .structure import Structure
+from .rules import forget_chances, form_primitives, merge_duplicates, split_mixed
 
 _SHORTEST_S = 0.1
 _LONGEST_S = 60.0

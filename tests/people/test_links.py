@@ -13,10 +13,10 @@ from mplearn.people.links import Known, agglomerate, solve, tension, unit_of
 from mplearn.people.offsets import offsets_of
 from mplearn.people.shape_table import ShapeTable
 from mplearn.people.shapes import Shape, mirrored, shape_of
-from mplearn.tree import FormConfig, MirrorMap
+from mplearn.tree import MirrorMap, NormalisationConfig
 
 RULES = PeopleConfig(repertoire=5)
-FORM = FormConfig()
+FORM = NormalisationConfig()
 
 
 def made(n_people=3, n_motions=5, seed=0, habit=0.3, noise=0.1):

@@ -26,7 +26,7 @@ from mplearn.state import (
     to_plain,
     validated,
 )
-from mplearn.tree import FormConfig, TreeConfig
+from mplearn.tree import NormalisationConfig, TreeConfig
 
 
 class Pair(NamedTuple):
@@ -56,7 +56,7 @@ class Whole(State):
     pairs: tuple[Pair, ...]
     history: tuple[tuple[str, Count], ...]
     parts: tuple[Part, ...]
-    form: FormConfig = field(default_factory=FormConfig)
+    form: NormalisationConfig = field(default_factory=NormalisationConfig)
 
 
 def part(seed, n=3, d=2):
@@ -243,3 +243,18 @@ def test_configurations_are_read_by_the_same_rules():
         with pytest.raises(InvalidValueError) as caught:
             LearnerConfig.from_dict(wrong)
         assert caught.value.place == place
+
+
+def test_a_field_with_a_new_name_keeps_the_old_one_in_files():
+    config = TreeConfig(normalisation=NormalisationConfig(head=0.1))
+    plain = to_plain(config)
+    assert "normalisation" not in plain and plain["form"]["head"] == 0.1
+    assert from_plain(TreeConfig, plain) == config
+    plain["normalisation"] = plain.pop("form")
+    assert from_plain(TreeConfig, plain) == config
+    plain["normalisation"]["head"] = "0.1"
+    with pytest.raises(StateError) as caught:
+        from_plain(TreeConfig, plain)
+    assert caught.value.place == "normalisation.head"
+    with pytest.raises(StateError, match="'normalisation' twice, also as 'form'"):
+        from_plain(TreeConfig, plain | {"form": {}})

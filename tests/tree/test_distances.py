@@ -16,8 +16,8 @@ from mplearn.tree import (
     make_distance,
     register_distance,
 )
-from mplearn.tree import form as forms
-from mplearn.tree.bank import ExemplarBank
+from mplearn.tree.exemplars import normalisation as forms
+from mplearn.tree.exemplars.bank import ExemplarBank
 
 D, N, SIGMA = 3, 9, 0.3
 NAMES = ("likelihood", "monte_carlo")
@@ -28,7 +28,7 @@ def banked(config: TreeConfig, seed: int = 0) -> tuple[ExemplarBank, list[Exempl
     bank = ExemplarBank(config, D, np.full(D, SIGMA**2))
     for number in range(N):
         phase = rng.uniform(0, 2 * np.pi, D)
-        t = np.linspace(0, np.pi, config.form.n_points)[:, None]
+        t = np.linspace(0, np.pi, config.normalisation.n_points)[:, None]
         bank.add(number, bank.model(np.sin(t + phase) + rng.normal(0, 0.05, (len(t), D))))
     return bank, [bank[number] for number in range(N)]
 
@@ -40,7 +40,7 @@ def general(exemplar: Exemplar) -> LeftRightHMM:
 def test_the_default_is_the_distance_of_general_models() -> None:
     config = TreeConfig()
     bank, exemplars = banked(config)
-    weights = forms.weights(config.form)
+    weights = forms.weights(config.normalisation)
     for i in (0, 4):
         found = bank.distances(exemplars[i], range(N))
         for j in range(N):

@@ -18,7 +18,7 @@ from motions import RATE_HZ, Motions
 from mplearn.errors import FrameError, InvalidValueError, UnknownPrimitiveError
 from mplearn.state import checkpoint, from_plain, to_plain
 from mplearn.state.packing import packed, unpacked
-from mplearn.tree import ROOT, FormConfig, PrimitiveTree, TreeConfig
+from mplearn.tree import ROOT, NormalisationConfig, PrimitiveTree, TreeConfig
 
 D = 6
 
@@ -382,7 +382,7 @@ def test_bad_rules_are_named():
         with pytest.raises(InvalidValueError, match=message):
             TreeConfig(**rules)
     with pytest.raises(InvalidValueError, match="head"):
-        FormConfig(head=0.9, ramp=0.2)
+        NormalisationConfig(head=0.9, ramp=0.2)
     with pytest.raises(InvalidValueError, match="n_channels"):
         PrimitiveTree(TreeConfig(), 0, 100.0)
     with pytest.raises(InvalidValueError, match="groups"):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mplearn.tree import PrimitiveTree, TreeConfig
-from mplearn.tree.bank import ExemplarBank
-from mplearn.tree.renewal import EFFORT, Renewal
+from mplearn.tree.exemplars.bank import ExemplarBank
+from mplearn.tree.exemplars.renewal import EFFORT, Renewal
 
 WIDTH = 6
 

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...recording import IntArray, LabelledSegment
-from ...tree import Placement, PrimitiveTree, TreeConfig, form
-from ...tree.bank import ExemplarBank
-from ...tree.spread import ChannelSpread, pairs
+from ...tree import Placement, PrimitiveTree, TreeConfig
+from ...tree.exemplars import normalisation
+from ...tree.exemplars.bank import ExemplarBank
+from ...tree.exemplars.spread import ChannelSpread, pairs
 from ..rates import LearningRates, rate_learning
 from ..table import Table, percent
 from .seen import Seen
@@ -119,14 +120,14 @@ def all_at_once(seen: Seen, config: TreeConfig) -> Presented:
         if not s.still
     ]
     labels = np.array([label for _, label in chosen])
-    points = [form.points_of(frames, config.form) for frames, _ in chosen]
+    points = [normalisation.points_of(frames, config.normalisation) for frames, _ in chosen]
     spread = ChannelSpread(np.zeros(seen.frames.shape[1], np.int64))
     for each in points:
         spread.update(each)
     floor = config.variance_floor**2 * spread.variances()
     bank = ExemplarBank(config, len(floor), floor)
     for number, (each, (frames, _)) in enumerate(zip(points, chosen, strict=True)):
-        bank.add(number, bank.model(form.centred(each, config.form), len(frames)))
+        bank.add(number, bank.model(normalisation.centred(each, config.normalisation), len(frames)))
     distances = pairs(bank.matrix(range(len(points))))
     merges = linkage(distances, "average")
     cuts = np.linspace(0.1, 0.7, 31) * distances.mean()

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..recording import FloatArray
-from .config import TreeConfig
-from .memory import SegmentMemory
+from ...recording import FloatArray
+from ..config import TreeConfig
+from ..exemplars.memory import SegmentMemory
+from ..placement import ROOT, Change, Merge, Reparent, Split
 from .node import Node
-from .placement import ROOT, Change, Merge, Reparent, Split
 from .search import NodeIndex
 
 

@@ -11,14 +11,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ..recording import BoolArray, FloatArray, IntArray
-from ..state import Array, Range, State, require, require_no_cycle
-from .bank import ExemplarBank
-from .config import TreeConfig
-from .distance import Exemplar
+from ...recording import BoolArray, FloatArray, IntArray
+from ...state import Array, Range, State, require, require_no_cycle
+from ..config import TreeConfig
+from ..distance import Exemplar
+from ..exemplars.bank import ExemplarBank
+from ..exemplars.slot_arrays import SlotArrays
+from ..placement import ROOT, Match
 from .node import Node
-from .placement import ROOT, Match
-from .rows import Rows
 
 _KNOWN = np.dtype(
     [
@@ -82,7 +82,7 @@ class NodeIndex:
         self.caps: FloatArray | None = None
         self.members: list[list[int]] = []
         self._known = np.zeros(0, _KNOWN)
-        self._means = Rows((bank.n_channels * config.form.n_points,))
+        self._means = SlotArrays((bank.n_channels * config.normalisation.n_points,))
 
     @property
     def ids(self) -> IntArray:

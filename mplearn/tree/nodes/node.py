@@ -8,10 +8,10 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 
-from ..recording import FloatArray, IntArray
-from ..state import Array, Blob, Count, SharedState, require
+from ...recording import FloatArray, IntArray
+from ...state import Array, Blob, Count, SharedState, require
+from ..exemplars.spread import without
 from .clustering import most_redundant
-from .spread import without
 
 Happening: TypeAlias = Literal["born", "split", "merged", "moved"]
 

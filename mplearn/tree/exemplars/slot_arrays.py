@@ -1,4 +1,4 @@
-"""Arrays of which there is one a row, in blocks that never move."""
+"""Arrays of which there is one a slot, in blocks that never move."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from ..recording import FloatArray, IntArray
+from ...recording import FloatArray, IntArray
 
 BLOCK = 512  # rows; the system gives their memory when they are first written
 
 
-class Rows:
+class SlotArrays:
     """Arrays of fixed shapes by slot: one more costs the same, however many there are.
 
     Args:
-        shapes: Shape of each array of a row.
+        shapes: Shape of each array of a slot.
 
     Attributes:
-        blocks: The arrays of `BLOCK` rows each, stacked.
+        blocks: The arrays of `BLOCK` slots each, stacked.
         n_slots: Slots that were ever taken.
     """
 
@@ -30,9 +30,9 @@ class Rows:
         self._free: list[int] = []
         self._lent: set[int] = set()  # blocks that a fork shows as well: copied before a write
 
-    def fork(self) -> Rows:
-        """Return rows that hold the same, and go on apart; blocks are copied when one changes."""
-        twin = Rows(*self.shapes)
+    def fork(self) -> SlotArrays:
+        """Return slots that hold the same, and go on apart; blocks are copied when one changes."""
+        twin = SlotArrays(*self.shapes)
         twin.blocks, twin.n_slots, twin._free = list(self.blocks), self.n_slots, list(self._free)
         twin._lent, self._lent = set(range(len(self.blocks))), set(range(len(self.blocks)))
         return twin
@@ -51,7 +51,7 @@ class Rows:
         self._free.append(slot)
 
     def write(self, slot: int, values: Sequence[Any]) -> None:
-        """Write the arrays of a row."""
+        """Write the arrays of a slot."""
         block, row = divmod(slot, BLOCK)
         if block in self._lent:
             self.blocks[block] = tuple(stacked.copy() for stacked in self.blocks[block])
@@ -60,12 +60,12 @@ class Rows:
             stacked[row] = value
 
     def read(self, slot: int) -> tuple[FloatArray, ...]:
-        """Return the arrays of a row, which show what is written there later."""
+        """Return the arrays of a slot, which show what is written there later."""
         block, row = divmod(slot, BLOCK)
         return tuple(stacked[row] for stacked in self.blocks[block])
 
     def gather(self, slots: IntArray, which: int) -> FloatArray:
-        """Return one array of some rows, copied, shape (k, ...)."""
+        """Return one array of some slots, copied, shape (k, ...)."""
         out = np.empty((len(slots), *self.shapes[which]))
         for arrays, rows, here in self.parted(slots):
             out[here] = arrays[which][rows]

@@ -14,8 +14,8 @@ from typing import Annotated
 
 import numpy as np
 
-from ..recording import FloatArray
-from ..state import Array, Range, State
+from ...recording import FloatArray
+from ...state import Array, Range, State
 from .bank import ExemplarBank
 
 EFFORT = 120  # a frame's part of the work, in distances; about a millisecond
@@ -118,7 +118,7 @@ class Renewal:
             return 1.0
         kept = [i for i, number in enumerate(numbers) if number in self.bank]
         numbers = [numbers[i] for i in kept]
-        row = self.bank.distances(self.bank[missing], numbers, forms_only=key == SAMPLE)
+        row = self.bank.distances(self.bank[missing], numbers, without_tempo=key == SAMPLE)
         grown = np.zeros((len(numbers) + 1, len(numbers) + 1))
         grown[:-1, :-1] = matrix[np.ix_(kept, kept)]
         grown[-1, :-1] = grown[:-1, -1] = row

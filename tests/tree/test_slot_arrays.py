@@ -10,14 +10,15 @@ from hypothesis import strategies as st
 sys.path.insert(0, str(Path(__file__).parent))
 from motions import RATE_HZ, Motions
 
-from mplearn.tree import PrimitiveTree, TreeConfig, rows
-from mplearn.tree.rows import Rows
+from mplearn.tree import PrimitiveTree, TreeConfig
+from mplearn.tree.exemplars import slot_arrays
+from mplearn.tree.exemplars.slot_arrays import SlotArrays
 
 
 @settings(max_examples=50, deadline=None)
 @given(st.lists(st.integers(-1, 30), max_size=60))
-def test_rows_hold_what_was_written_whatever_came_and_went(steps):
-    kept = Rows((2, 3), ())
+def test_slots_hold_what_was_written_whatever_came_and_went(steps):
+    kept = SlotArrays((2, 3), ())
     truth = {}
     for step, choice in enumerate(steps):
         if choice < 0 or not truth:
@@ -52,7 +53,7 @@ def learned(config):
 def test_what_is_learned_does_not_depend_on_the_layout(monkeypatch):
     config = TreeConfig(n_sampled=40, max_exemplars=5, max_unplaced=30)
     expected = learned(config)
-    monkeypatch.setattr(rows, "BLOCK", 7)
+    monkeypatch.setattr(slot_arrays, "BLOCK", 7)
     assert learned(config) == expected
 
 

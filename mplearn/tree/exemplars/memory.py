@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from ..recording import FloatArray, IntArray
-from ..state import Blob, within
-from . import form
+from ...recording import FloatArray, IntArray
+from ...state import Blob, within
+from ..config import TreeConfig
+from . import normalisation
 from .bank import ExemplarBank
-from .config import TreeConfig
 from .renewal import EFFORT, SAMPLE, Renewal, RenewalState
 from .spread import ChannelSpread, DistanceSample, SampleState, SpreadState
 
@@ -43,12 +43,12 @@ class SegmentMemory:
 
     def remember(self, number: int, frames: FloatArray) -> None:
         """Take up a segment, shape (L, D), held once; it is not written to from now on."""
-        points = form.points_of(frames, self.config.form)
+        points = normalisation.points_of(frames, self.config.normalisation)
         self._spread.update(points)
         if not self._sample.numbers:
             floor = self.outgrown()
             self.bank.floor = self.bank.floor if floor is None else floor
-        seen = form.centred(points, self.config.form)
+        seen = normalisation.centred(points, self.config.normalisation)
         self.bank.add(number, self.bank.model(seen, len(frames)))
         if self.renewal is not None:
             self.renewal.add(number)
@@ -177,5 +177,5 @@ class SegmentMemory:
         self.bank = ExemplarBank(self.config, len(floor), floor)
         for number, frames in self.frames.items():
             with within(f"segment {number}"):
-                seen = form.centred(form.points_of(frames, self.config.form), self.config.form)
+                seen = normalisation.normalised(frames, self.config.normalisation)
                 self.bank.add(number, self.bank.model(seen, len(frames)))

@@ -8,10 +8,10 @@ from typing import Annotated
 
 import numpy as np
 
-from ..recording import FloatArray, IntArray
-from ..state import Array, Blob, SharedState, State, require
+from ...recording import FloatArray, IntArray
+from ...state import Array, Blob, SharedState, State, require
+from ..config import TreeConfig
 from .bank import ExemplarBank
-from .config import TreeConfig
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ class DistanceSample:
             self.numbers.append(number)
         else:
             self.numbers[place] = number
-        row = bank.distances(bank[number], self.numbers, forms_only=True)
+        row = bank.distances(bank[number], self.numbers, without_tempo=True)
         row[place] = 0.0
         self._matrix[place, : len(row)] = self._matrix[: len(row), place] = row
         self._state = None
@@ -132,7 +132,7 @@ class DistanceSample:
     def measure(self, bank: ExemplarBank) -> None:
         """Measure all distances again."""
         self._matrix[: len(self.numbers), : len(self.numbers)] = bank.matrix(
-            self.numbers, forms_only=True
+            self.numbers, without_tempo=True
         )
         self._state = None
 

@@ -9,13 +9,13 @@ from typing import Annotated
 
 import numpy as np
 
-from ..hmm import fit
-from ..recording import FloatArray, IntArray
-from ..state import Array, State, require
-from . import form
-from .config import TreeConfig
-from .distance import Exemplar, make_distance
-from .rows import Rows
+from ...hmm import fit
+from ...recording import FloatArray, IntArray
+from ...state import Array, State, require
+from ..config import TreeConfig
+from ..distance import Exemplar, make_distance
+from . import normalisation
+from .slot_arrays import SlotArrays
 
 _STEEPNESS = 4.0  # a segment twice as long, as two motions in one are, is three times as far
 
@@ -58,12 +58,12 @@ class ExemplarBank:
         self.n_channels = n_channels
         self.floor = np.array(floor, dtype=np.float64)
         self.distance = make_distance(config)
-        self._weights = form.weights(config.form)
+        self._weights = normalisation.weights(config.normalisation)
         self._roots = np.sqrt(self._weights)
         self._slots: dict[int, int] = {}
         per_state, per_transition = (config.n_states, n_channels), (config.n_states,)
-        self._rows = Rows(
-            (n_channels, config.form.n_points),
+        self._arrays = SlotArrays(
+            (n_channels, config.normalisation.n_points),
             *(per_state, per_state, per_state),
             *(per_transition, per_transition),
             *((), ()),
@@ -79,7 +79,7 @@ class ExemplarBank:
 
     def __getitem__(self, number: int) -> Exemplar:
         """Return an exemplar."""
-        return Exemplar(*self._rows.read(self._slots[number]))
+        return Exemplar(*self._arrays.read(self._slots[number]))
 
     def model(self, points: FloatArray, duration: float = 1.0) -> Exemplar:
         """Model the points of a segment, shape (P, D); the bank does not remember it.
@@ -107,16 +107,16 @@ class ExemplarBank:
 
     def add(self, number: int, exemplar: Exemplar) -> None:
         """Remember an exemplar."""
-        self._slots[number] = self._rows.take()
-        self._rows.write(self._slots[number], exemplar)
+        self._slots[number] = self._arrays.take()
+        self._arrays.write(self._slots[number], exemplar)
 
     def drop(self, number: int) -> None:
         """Forget an exemplar."""
-        self._rows.release(self._slots.pop(number))
+        self._arrays.release(self._slots.pop(number))
 
     def take_over(self, other: ExemplarBank) -> None:
         """Hold what another bank holds, from now on instead of it."""
-        self.floor, self._slots, self._rows = other.floor, other._slots, other._rows
+        self.floor, self._slots, self._arrays = other.floor, other._slots, other._arrays
 
     def profile(self, exemplar: Exemplar) -> FloatArray:
         """Return the points times the root of their weights, shape (D * P,); 0 where missing."""
@@ -127,43 +127,43 @@ class ExemplarBank:
 
     def mean_profile(self, numbers: Sequence[int]) -> FloatArray:
         """Return the mean profile of some exemplars, shape (D * P,)."""
-        columns = self._rows.gather(self._slots_of(numbers), _COLUMNS)
+        columns = self._arrays.gather(self._slots_of(numbers), _COLUMNS)
         mean = columns.mean(axis=0)
         if np.isnan(mean.sum()):
             mean = np.nan_to_num(columns).mean(axis=0)
         return np.asarray((mean * self._roots).ravel())
 
     def distances(
-        self, exemplar: Exemplar, others: Sequence[int], *, forms_only: bool = False
+        self, exemplar: Exemplar, others: Sequence[int], *, without_tempo: bool = False
     ) -> FloatArray:
         """Return how far an exemplar is from others of the bank, shape (k,).
 
         It is the length of their distance (`Distance.length`); it grows where one lasts longer than
-        the other by more than motions do, unless forms only count.
+        the other by more than motions do, unless tempo does not count.
         """
         slots = self._slots_of(others)
         raw = np.empty(len(slots))
-        for arrays, rows, here in self._rows.parted(slots):
+        for arrays, rows, here in self._arrays.parted(slots):
             raw[here] = self.distance.divergence(exemplar, Exemplar(*arrays), rows, self._weights)
         distances = self.distance.length(raw)
-        if not forms_only and np.isfinite(self.config.tempo):
-            one, other = exemplar.duration, self._rows.gather(slots, _DURATION)
+        if not without_tempo and np.isfinite(self.config.tempo):
+            one, other = exemplar.duration, self._arrays.gather(slots, _DURATION)
             beyond = np.maximum(one, other) / np.minimum(one, other) / self.config.tempo
             distances *= np.maximum(beyond, 1.0) ** _STEEPNESS
         return np.asarray(distances)
 
-    def matrix(self, numbers: Sequence[int], *, forms_only: bool = False) -> FloatArray:
+    def matrix(self, numbers: Sequence[int], *, without_tempo: bool = False) -> FloatArray:
         """Return the distances among exemplars, shape (k, k)."""
         matrix = np.zeros((len(numbers), len(numbers)))
         for i, number in enumerate(numbers[1:], start=1):
-            row = self.distances(self[number], numbers[:i], forms_only=forms_only)
+            row = self.distances(self[number], numbers[:i], without_tempo=without_tempo)
             matrix[i, :i] = matrix[:i, i] = row
         return matrix
 
     def fork(self) -> ExemplarBank:
         """Return a bank that holds the same, and goes on apart; what neither changes is shared."""
         twin = copy(self)
-        twin._slots, twin._rows = dict(self._slots), self._rows.fork()
+        twin._slots, twin._arrays = dict(self._slots), self._arrays.fork()
         return twin
 
     def state(self, numbers: Iterable[int]) -> BankState:
@@ -173,8 +173,8 @@ class ExemplarBank:
         return BankState(
             self.floor.copy(),
             np.array(numbers, np.int64),
-            self._rows.gather(slots, _COLUMNS),
-            self._rows.gather(slots, _DURATION),
+            self._arrays.gather(slots, _COLUMNS),
+            self._arrays.gather(slots, _DURATION),
         )
 
     @classmethod

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..recording import FloatArray, IntArray
-from .spread import pairs
+from ...recording import FloatArray, IntArray
+from ..exemplars.spread import pairs
 
 
 def clusters_below(
