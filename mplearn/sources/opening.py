@@ -1,0 +1,61 @@
+"""The door: the name of a source to the motion of a body, live."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..mocap import Hints
+from .played import play_demonstrator, play_recording
+from .recognised import RecognisedSource
+from .registry import Observe, Wanted, connect, register_source
+from .source import Source
+
+register_source("recording", play_recording)
+register_source("demonstrator", play_demonstrator)
+
+
+def open_source(
+    name: str,
+    *,
+    observe: Observe = "robot",
+    hints: Hints | None = None,
+    names: Mapping[str, str] | None = None,
+    **options: Any,
+) -> Source:
+    """Open a live source: what it yields can be learned as it comes.
+
+    Args:
+        name: What, as ``"recording:walk.bvh"`` or ``"demonstrator"``; `source_kinds` lists all.
+        observe: ``"robot"``: a body is recognised in markers or joints, as in files; or
+            ``"positions"`` of markers and joints, or the stream's own ``"channels"``.
+        hints: What the stream does not say about itself: its unit, its vertical axis.
+        names: Place of the body by marker or joint, for what is known better.
+        options: Of the source, as ``speed=2.0`` for a recording.
+
+    Returns:
+        A source whose blocks all have the same channels and rate: with
+        ``LearnerConfig(block.channels, block.rate_hz)`` a learner takes them.
+
+    Raises:
+        InvalidValueError: There is no such source, or an option is not allowed.
+        MissingDependencyError: The source needs an extra that is not installed.
+        MPLearnError: It cannot be opened, with the reason.
+
+    Example:
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> learner = None
+        >>> with open_source("demonstrator:7", speed=float("inf")) as source:
+        ...     for item in source:
+        ...         if not isinstance(item, Block):
+        ...             continue
+        ...         if learner is None:
+        ...             learner = MotionLearner(LearnerConfig(item.channels, item.rate_hz))
+        ...         events = learner.learn_many(item.frames)
+        ...         if learner.n_frames >= 500:
+        ...             break
+        >>> learner.config.channels[0], learner.config.rate_hz
+        ('LFHD.x', 100.0)
+    """
+    wanted = Wanted(observe, hints or Hints(), names)
+    return RecognisedSource(connect(name, wanted, **options), wanted)
