@@ -94,7 +94,7 @@ def say_bodies(console: Console, bodies: Bodies) -> None:
             said.setdefault(line, []).append(name)
         left = f"; left out: {_listed(body.left_out)}" if body.left_out else ""
         unseen = f"; unseen: {_listed(body.unseen)}" if body.unseen else ""
-        line = f"a body by {len(body.places)} places{left}{unseen}"
+        line = f"a body by {len(body.places)} places of {bodies.marker_sets[name]!r}{left}{unseen}"
         said.setdefault(line, []).append(name)
     for line, names in said.items():
         console.print(printable(f"{_listed(names)}: {line}"), markup=False, highlight=False)

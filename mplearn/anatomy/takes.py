@@ -21,14 +21,16 @@ class Bodies:
     """Takes as points of one body.
 
     Attributes:
-        recordings: Those in which a body was recognised, all with the same channels: a point that a
-            take lacks is NaN there.
+        recordings: Those in which a body was recognised. Takes of one marker set have the same
+            channels: a point that one lacks is NaN there.
         maps: How each was recognised, by its name.
+        marker_sets: Marker set of each, by its name: ``"landmarks"`` for skeletons.
         refused: Why not, by name, for the others.
     """
 
     recordings: tuple[Recording, ...]
     maps: Mapping[str, BodyMap]
+    marker_sets: Mapping[str, str]
     refused: Mapping[str, MPLearnError]
 
 
@@ -63,9 +65,9 @@ def as_bodies(
     names: Mapping[str, str] | None = None,
     strict: bool = False,
 ) -> Bodies:
-    """Recognise the body in each take, and join takes by the places of the body.
+    """Recognise the body in each take, and join takes of one marker set by the places of the body.
 
-    Takes of another kind than most (markers among skeletons) are refused: their points differ.
+    A learner takes all of them, those of other sets too (`MotionLearner.begin_stream`).
 
     Args:
         recordings: Markers, or joint positions with their skeleton (`Hints.joint_axes`).
@@ -92,38 +94,23 @@ def as_bodies(
     if not found:
         first = next(iter(refused.values()))
         raise BodyError(f"no body in any of {len(recordings)} takes; the first: {first}")
-    found = _of_one_kind(found, maps, refused)
-    return Bodies(_joined(found), MappingProxyType(maps), MappingProxyType(refused))
+    sets = {each.name: find_marker_set(each.marker_names).name for each in found}
+    points: dict[str, dict[str, None]] = {}
+    for each in found:
+        points.setdefault(sets[each.name], {}).update(dict.fromkeys(each.marker_names))
+    return Bodies(
+        tuple(_with_points(each, tuple(points[sets[each.name]])) for each in found),
+        MappingProxyType(maps),
+        MappingProxyType(sets),
+        MappingProxyType(refused),
+    )
 
 
-def _of_one_kind(
-    found: list[Recording], maps: dict[str, BodyMap], refused: dict[str, MPLearnError]
-) -> list[Recording]:
-    """Return the takes of the marker set that most have."""
-    kinds = [find_marker_set(recording.marker_names).name for recording in found]
-    usual = max(kinds, key=kinds.count)
-    for recording, kind in zip(found, kinds, strict=True):
-        if kind != usual:
-            refused[recording.name] = BodyError(
-                f"take {recording.name!r} is of {kind!r}, and most others are of {usual!r}; learn "
-                "them by themselves"
-            )
-            del maps[recording.name]
-    return [r for r, kind in zip(found, kinds, strict=True) if kind == usual]
-
-
-def _joined(recordings: list[Recording]) -> tuple[Recording, ...]:
-    """Return the takes with the same points in the same order, NaN where one lacks a point."""
-    names = list(dict.fromkeys(name for r in recordings for name in r.marker_names))
-    joined = []
-    for recording in recordings:
-        if recording.marker_names != tuple(names):
-            markers = np.full((len(recording), len(names), 3), np.nan)
-            markers[:, [names.index(name) for name in recording.marker_names]] = recording.markers
-            recording = replace(
-                recording,
-                frames=markers.reshape(len(recording), -1),
-                channels=marker_channels(tuple(names)),
-            )
-        joined.append(recording)
-    return tuple(joined)
+def _with_points(recording: Recording, names: tuple[str, ...]) -> Recording:
+    """Return a take with these points in this order, NaN where it lacks one."""
+    if recording.marker_names == names:
+        return recording
+    markers = np.full((len(recording), len(names), 3), np.nan)
+    markers[:, [names.index(name) for name in recording.marker_names]] = recording.markers
+    frames = markers.reshape(len(recording), -1)
+    return replace(recording, frames=frames, channels=marker_channels(names))

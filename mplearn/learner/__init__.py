@@ -18,3 +18,4 @@ from .events import TransitionSeen as TransitionSeen
 from .foresight import NextMotion as NextMotion
 from .learner import MotionLearner as MotionLearner
 from .learner_state import LearnerState as LearnerState
+from .watching import Watching as Watching

@@ -79,18 +79,26 @@ class StreamChecks:
                 f"{passed_s:.4g} s; after a gap, end the stream or fill it with NaN"
             )
 
-    def recording(self, recording: Recording) -> None:
-        """Check the channels and the rate of a recording.
+    def channels_are(self, channels: tuple[str, ...], what: str = "the stream") -> None:
+        """Check the channels of a stream, or of something else.
 
         Raises:
             FrameError: They are others.
         """
-        if recording.channels != self.channels:
+        if channels != self.channels:
             raise FrameError(
-                f"recording {recording.name!r} has {len(recording.channels)} channels "
-                f"({', '.join(recording.channels[:3])}, ...); the learner was made for "
-                f"{len(self.channels)} ({', '.join(self.channels[:3])}, ...)"
+                f"{what} has {len(channels)} channels ({', '.join(channels[:3])}, ...); the "
+                f"learner was made for {len(self.channels)} ({', '.join(self.channels[:3])}, ...)"
             )
+
+    def recording(self, recording: Recording) -> None:
+        """Check the rate of a recording, and its channels where no body is observed.
+
+        Raises:
+            FrameError: They are others.
+        """
+        if not self.gaps:
+            self.channels_are(recording.channels, f"recording {recording.name!r}")
         if abs(recording.rate_hz - self.rate_hz) > 1e-3 * self.rate_hz:
             raise FrameError(
                 f"recording {recording.name!r} has {recording.rate_hz:g} Hz, the learner was made "

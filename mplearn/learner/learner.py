@@ -12,15 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ..body import BodyView, MotionObserver, Watched, view_of
+from ..body import BodyView, MotionObserver, Watched, feature_channels, robot_body, view_of
 from ..body.observer.observer import BLOCK_FRAMES
-from ..errors import InvalidValueError, StateError
+from ..errors import InvalidValueError
 from ..graph import TransitionGraph
 from ..library import MotionNovelty, PrimitiveLibrary
 from ..people import PeopleTree
 from ..recording import BoolArray, FloatArray, Recording, Segment, are_markers
 from ..segmentation import make_segmenter
-from ..state import FileFormat, from_plain, require, to_plain, validated, within
+from ..state import from_plain, require, to_plain, validated, within
 from ..tree import Change, MirrorMap, Placement, make_distance
 from .absurd import AbsurdFrames
 from .buffer import FrameBuffer
@@ -42,8 +42,9 @@ from .events import (
     SegmentClosed,
 )
 from .foresight import NextMotion
-from .learner_state import LearnerState
+from .learner_state import FILES, LearnerState
 from .snapshot import Snapshots
+from .watching import Watching
 
 STILL_M = (
     0.02  # a segment in which no part of the body, and no joint's lever, goes farther: a pause
@@ -51,14 +52,12 @@ STILL_M = (
 BRIDGED_S = 0.3  # a motion goes on through what is lost, if it is no longer
 ABSURD = "a value is not finite, or far beyond all that was seen"
 
-FILES = FileFormat("mplearn-learner", "learner", StateError, compression=1)
-
 
 class MotionLearner:
     """Learns motion primitives and their order from a stream, frame after frame.
 
     Nothing looks ahead, and memory does not grow with the stream. `learn_one`, `learn_many`,
-    `learn_recording` and `end_stream` change what is known; nothing else does.
+    `learn_recording`, `begin_stream` and `end_stream` change what is known; nothing else does.
 
     Args:
         config: The stream, and how to learn from it.
@@ -69,16 +68,16 @@ class MotionLearner:
         tree: The tree of primitives, of all people.
         graph: The transitions between them.
         n_frames: Frames seen, of all streams.
-        observer: What turns markers into features; None where channels are learned as they come.
+        watching: Who is watched by which markers; None where channels are learned as they come.
         chain: The latest segments, and which followed which.
     """
 
     def __init__(self, config: LearnerConfig) -> None:
         self.config = config
-        self._watches = config.observe == "robot" and are_markers(config.channels)
-        self._checks = StreamChecks(config.channels, config.rate_hz, gaps=self._watches)
-        self.observer = self._new_observer()
-        self.channels = config.channels if self.observer is None else self.observer.channels
+        watches = config.observe == "robot" and are_markers(config.channels)
+        self._checks = StreamChecks(config.channels, config.rate_hz, gaps=watches)
+        self.watching = Watching(config.channels, config.rate_hz) if watches else None
+        self.channels = feature_channels(robot_body()) if watches else config.channels
         self._view = view_of(self.channels)
         width = len(self._view.channels)
         self._segmenter = make_segmenter(config.segmenter, width, config.rate_hz)
@@ -94,7 +93,6 @@ class MotionLearner:
         self._stream_start = 0
         self._clock_s: float | None = None
         self._person = -1
-        self._n_people = 0
         self._lost_from, self._lost_why = -1, ""
         self._absurd = AbsurdFrames(len(config.channels), config.rate_hz)
 
@@ -105,6 +103,11 @@ class MotionLearner:
         People are told apart by their markers; without markers all is one person's.
         """
         return max(self._person, 0)
+
+    @property
+    def observer(self) -> MotionObserver | None:
+        """What turns the stream's markers into features; None where channels are learned."""
+        return None if self.watching is None else self.watching.observer
 
     # ---- learning
 
@@ -140,25 +143,66 @@ class MotionLearner:
         """Learn a recording as a stream of its own; yield the events of each frame.
 
         The stream before it is ended, and so is this one after the last frame (the events of that
-        come as one more item).
+        come as one more item). Where a body is observed, a recording may have other markers than
+        the streams before it, of any known set (`begin_stream`).
 
         Args:
             recording: The recording.
             at_once: How many frames to take before their events are yielded; many are faster.
 
         Raises:
-            FrameError: The recording has other channels, or another rate.
+            FrameError: The recording has other channels than those that can be observed, or another
+                rate.
+            BodyError: Its markers belong to no known set.
             InvalidValueError: ``at_once`` is not positive.
         """
         if at_once < 1:
             raise InvalidValueError(f"at_once must be positive, not {at_once}")
         self._checks.recording(recording)
+        ended = self.begin_stream(recording.channels)
+        if ended:
+            yield ended
         frames = self._checks.frames(recording.frames)
-        if self.n_frames > self._stream_start:
-            yield self.end_stream()
         for start in range(0, len(frames), at_once):
             yield self._watch(frames[start : start + at_once])
         yield self.end_stream()
+
+    def begin_stream(self, channels: Sequence[str]) -> list[Event]:
+        """End the stream, as `end_stream` does, and go on with one that has these channels.
+
+        Where a body is observed, it may be seen by other markers: those of any known set, in any
+        order. An observer is made for each set, and all feed the same primitives; who is known by
+        one set of markers is somebody else by another. Markers of an observer that a stream lacks,
+        if it has most of them, are missing measurements.
+
+        Args:
+            channels: Names of the columns of the frames that follow.
+
+        Returns:
+            What came of the end of the stream before.
+
+        Raises:
+            FrameError: No such stream can be learned; nothing has changed then.
+            BodyError: Its markers belong to no known set; nothing has changed then.
+
+        Example:
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> from mplearn.demonstrator import demonstrate
+            >>> shown = demonstrate(["BAR"] * 4, seed=1).recording
+            >>> learner = MotionLearner(LearnerConfig(shown.channels, shown.rate_hz))
+            >>> events = learner.learn_many(shown.frames)
+            >>> events = learner.begin_stream(shown.channels[:90])  # four markers fewer
+            >>> events = learner.learn_many(shown.frames[:, :90])
+        """
+        channels = tuple(channels)
+        if self.watching is None:
+            self._checks.channels_are(channels)
+            return self.end_stream()
+        watch = self.watching.find(channels)
+        events = self.end_stream()
+        self.watching.turn_to(watch, channels)
+        self._checks = StreamChecks(channels, self.config.rate_hz, gaps=True)
+        return events
 
     def end_stream(self) -> list[Event]:
         """Close what is open: what comes next is another stream, perhaps of another person."""
@@ -222,7 +266,8 @@ class MotionLearner:
         """
         return LearnerState(
             config=self.config,
-            observer=None if self.observer is None else self.observer.state(),
+            watches=() if self.watching is None else self.watching.state(),
+            stream=self._checks.channels,
             segmenter=self._segmenter.state(),
             buffer=self._buffer.state(),
             tree=self.tree.state(),
@@ -232,7 +277,6 @@ class MotionLearner:
             n_frames=self.n_frames,
             stream_start=self._stream_start,
             person=self._person,
-            n_people=self._n_people,
             lost_from=self._lost_from,
             lost_why=self._lost_why,
             absurd=self._absurd.state(),
@@ -248,12 +292,13 @@ class MotionLearner:
         state = validated(state)
         with within("config"):
             learner = cls(state.config)
-        observer = learner.observer
-        watches = observer is not None
-        require((state.observer is not None) == watches, "observer", f"is needed: {watches}")
-        if observer is not None and state.observer is not None:
-            with within("observer"):
-                observer.load_state(state.observer)
+        if learner.watching is not None:
+            learner.watching.load_state(state.watches, state.stream)
+            learner._checks = StreamChecks(state.stream, state.config.rate_hz, gaps=True)
+        else:
+            require(not state.watches, "watches", "must be none where no body is observed")
+            same = state.stream == state.config.channels
+            require(same, "stream", "must be the configuration's channels")
         with within("segmenter"):
             learner._segmenter.load_state(state.segmenter)
         with within("absurd"):
@@ -268,8 +313,7 @@ class MotionLearner:
         learner.chain.load_state(state.chain)
         learner._clock_s, learner.n_frames = state.clock_s, state.n_frames
         learner._stream_start, learner._lost_from = state.stream_start, state.lost_from
-        learner._lost_why = state.lost_why
-        learner._person, learner._n_people = state.person, state.n_people
+        learner._lost_why, learner._person = state.lost_why, state.person
         return learner
 
     def save(self, path: str | Path) -> Path:
@@ -298,20 +342,16 @@ class MotionLearner:
     def _body(self) -> str:
         return self._view.body.name if isinstance(self._view, BodyView) else ""
 
-    def _new_observer(self) -> MotionObserver | None:
-        if not self._watches:
-            return None
-        names = tuple(channel[:-2] for channel in self.config.channels[::3])
-        return MotionObserver(names, self.config.rate_hz)
-
     def _watch(self, frames: FloatArray) -> list[Event]:
         """Take frames of the stream, shape (T, D)."""
-        if self.observer is None:
+        if self.watching is None:
             held, absurd = self._absurd.hold(frames)
             return self._pass_on(held, absurd, ABSURD)
+        observer = self.watching.observer
+        frames = self.watching.arranged(frames)
         events: list[Event] = []
         while len(frames):
-            watched = self.observer.watch(frames[:BLOCK_FRAMES])
+            watched = observer.watch(frames[:BLOCK_FRAMES])
             events += self._take(watched)
             frames = frames[watched.taken :]
         return events
@@ -323,16 +363,15 @@ class MotionLearner:
             events += self._cut()
             self._begin_loss(watched.why)
             self._skip(watched.dropped)
-        observer = self.observer
-        if not watched.joins and observer is not None:
+        watching = self.watching
+        if not watched.joins and watching is not None:
             events += self._cut() if self.n_frames > self._stream_start else []
-            before, self._person = self._person, observer.person
+            new = watching.meet()
+            before, self._person = self._person, watching.watch.person
             if before not in (-1, self._person):
-                new = self._person >= self._n_people
                 events.append(PersonChanged(self.n_frames, self._person, new))
-            self._n_people = max(self._n_people, self._person + 1)
-        if watched.moved is not None and observer is not None and observer.axes is not None:
-            events.append(AxesChanged(self.n_frames, 1.0 / observer.axes.size))
+        if watched.moved is not None and watching is not None and watching.observer.axes:
+            events.append(AxesChanged(self.n_frames, 1.0 / watching.observer.axes.size))
         return events + self._pass_on(watched.features, watched.lost, watched.why)
 
     def _pass_on(self, rows: FloatArray, lost: BoolArray, why: str) -> list[Event]:

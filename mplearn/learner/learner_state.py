@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
-from ..body import ObserverState
+from ..errors import StateError
 from ..graph import GraphState
 from ..people import PeopleState
 from ..segmentation import SegmenterState
-from ..state import Count, Range, State, require
+from ..state import Count, FileFormat, Range, State, require
 from .absurd import AbsurdState
 from .buffer import BufferState
 from .chain import ChainState
 from .config import LearnerConfig
+from .watching import WatchState
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +25,8 @@ class LearnerState(State):
 
     Attributes:
         config: The stream, and how to learn from it.
-        observer: What is known of people and their markers; None where no markers are watched.
+        watches: What is known of people, by each set of markers; none where no body is observed.
+        stream: Channels of the stream that goes on.
         segmenter: The open segment.
         buffer: Its frames.
         tree: The primitives, of all people.
@@ -34,14 +36,14 @@ class LearnerState(State):
         n_frames: Frames seen, of all streams.
         stream_start: The first of the stream that goes on.
         person: Number of the person who moves; -1 before the first.
-        n_people: How many people were seen.
         lost_from: First frame of what is lost now; -1 where nothing is.
         lost_why: Why it is.
         absurd: What frames of plain channels are held against.
     """
 
     config: LearnerConfig
-    observer: ObserverState | None
+    watches: tuple[WatchState, ...]
+    stream: tuple[str, ...]
     segmenter: SegmenterState
     buffer: BufferState
     tree: PeopleState
@@ -51,7 +53,6 @@ class LearnerState(State):
     n_frames: Count
     stream_start: Count
     person: Annotated[int, Range(-1)]
-    n_people: Count
     lost_from: Annotated[int, Range(-1)]
     lost_why: str
     absurd: AbsurdState
@@ -63,13 +64,14 @@ class LearnerState(State):
         require(since >= 0, "stream_start", f"must be at most {self.n_frames}")
         require(held == since, "n_frames", f"must be {held} after stream_start, not {since}")
         require(self.segmenter.n_frames == since, "segmenter.n_frames", f"must be {since}")
-        n_people = 0 if self.observer is None else self.observer.identity.bodies.n_people
-        require(self.n_people == n_people, "n_people", f"must be {n_people}, as many as were met")
-        require(self.person < max(n_people, 0), "person", f"must be below {n_people}")
+        people = sorted(person for watch in self.watches for person in watch.people)
+        n_people = len(people)
+        require(people == list(range(n_people)), "watches", f"must number {n_people} people once")
+        require(self.person < n_people, "person", f"must be below {n_people}")
         for k, each in enumerate(self.tree.trees):
             met = each.person < max(n_people, 1)
             require(met, f"tree.trees[{k}].person", f"must be below {max(n_people, 1)}")
-        if self.observer is None and since:
+        if not self.watches and since:
             seen = bool(np.isfinite(self.absurd.last).all())
             require(seen, "absurd.last", "must be a frame once there was one")
         require(self.lost_from <= self.n_frames, "lost_from", f"must be at most {self.n_frames}")
@@ -90,3 +92,18 @@ class LearnerState(State):
             inside = (block.end <= self.n_frames) & (block.number < self.tree.n_seen)
             inside &= block.decided_at <= self.n_frames
             require(bool(inside.all()), f"{place}.end", "must have been seen")
+
+
+def _one_watch(content: dict[str, Any]) -> dict[str, Any]:
+    """Bring a learner up to date that knew one set of markers."""
+    content = dict(content)
+    observer, n_people = content.pop("observer"), content.pop("n_people")
+    channels = content["config"]["channels"]
+    watch = {"channels": channels, "people": list(range(n_people)), "observer": observer}
+    content |= {"watches": [] if observer is None else [watch], "stream": channels}
+    return content
+
+
+FILES = FileFormat(
+    "mplearn-learner", "learner", StateError, 2, migrations={1: _one_watch}, compression=1
+)

@@ -6,3 +6,4 @@ from .learners import merge_learners as merge_learners
 from .observers import merge_observers as merge_observers
 from .people import merge_people as merge_people
 from .trees import merge_trees as merge_trees
+from .watching import merge_watching as merge_watching

@@ -6,19 +6,20 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..errors import InvalidValueError
-from ..learner import MotionLearner
+from ..learner import LearnerConfig, MotionLearner
 from ..learner.chain import Chain
 from .graphs import merge_graphs
-from .observers import merge_observers
 from .people import merged_into
+from .watching import merge_watching
 
 
 def merge_learners(learners: Sequence[MotionLearner]) -> MotionLearner:
     """Return a learner that knows what all of some know, as if their streams followed each other.
 
     The learners stay as they are; a stream that one is in the middle of is ended for the merged
-    one. Where markers are observed, people are matched by their bodies: who is known to both is one
-    person, all others are kept apart; without markers all is one person's. Primitives that several
+    one. Where markers are observed, people are matched by their bodies, as seen by the same
+    markers: who is known to both is one person, all others are kept apart; without markers all is
+    one person's. Primitives that several
     have learned become one (`merge_people`); the counts of transitions are added, so that they do
     not depend on the order of the learners but for the names of primitives; what none had
     recognised alone is counted where it is known now. The first learner's primitives keep their
@@ -27,12 +28,13 @@ def merge_learners(learners: Sequence[MotionLearner]) -> MotionLearner:
     Each learner is copied once, however many there are; exemplars never are.
 
     Raises:
-        InvalidValueError: There are no learners, or they have other configurations.
+        InvalidValueError: There are no learners, or they have other configurations; bodies may be
+            observed by other markers.
     """
     if not learners:
         raise InvalidValueError("at least one learner is needed to merge")
     for other in learners[1:]:
-        if other.config != learners[0].config:
+        if _rules(other) != _rules(learners[0]):
             raise InvalidValueError(
                 f"learners must have the same configuration, not {learners[0].config} and "
                 f"{other.config}"
@@ -42,6 +44,12 @@ def merge_learners(learners: Sequence[MotionLearner]) -> MotionLearner:
     for other in ended:
         merged.take(other)
     return merged.learner()
+
+
+def _rules(learner: MotionLearner) -> LearnerConfig:
+    """Return a configuration without what a merged learner can have several of."""
+    config = learner.config
+    return config if learner.watching is None else replace(config, channels=learner.channels)
 
 
 def _ended(learner: MotionLearner) -> MotionLearner:
@@ -62,17 +70,14 @@ class _Merged:
         self._first = first
         self._state = first.state()
         self._tree, self._graph, self._chain = first.tree, first.graph, first.chain
-        self._observer = first.observer
+        self._watching = first.watching
 
     def take(self, other: MotionLearner) -> None:
         """Merge another learner into what is known."""
         state, n_frames = other.state(), self._state.n_frames
         people = {person: person for person in other.tree.people}
-        if self._observer is not None and other.observer is not None:
-            seen, numbers = merge_observers(self._observer, other.observer)
-            self._observer.load_state(seen)
-            people |= numbers
-            self._state = replace(self._state, n_people=seen.identity.bodies.n_people)
+        if self._watching is not None and other.watching is not None:
+            people |= merge_watching(self._watching, other.watching)
         merged = merged_into(self._tree, other.tree, people)
         parts = ((self._graph, merged.first), (other.graph, merged.second))
         graph = merge_graphs((each, {id: new[id] for id in each.ids}) for each, new in parts)
@@ -101,7 +106,7 @@ class _Merged:
         return MotionLearner.from_state(
             replace(
                 self._state,
-                observer=None if self._observer is None else self._observer.state(),
+                watches=() if self._watching is None else self._watching.state(),
                 tree=self._tree.state(),
                 graph=self._graph.state(),
                 chain=self._chain.state(),

@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> None:
         )
         say_takes(console, takes)
         recordings = _of_persons(args, takes.recordings)
-        recordings = _of_one_kind(args, recordings, console)
+        recordings = _as_learned(args, recordings, console)
     recordings = _at_one_rate(args, recordings, console)
     first = recordings[0]
     config = LearnerConfig(
@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> None:
     library.save(args.out)
     console.print(primitive_table(library))
     console.print(
-        f"{len(library)} primitives from {len(recordings) - len(log.refused)} takes, "
+        f"{len(library)} primitives from {_takes_of(recordings, log)}, "
         f"{log.watched_s / 60:.1f} minutes of motion in {len(log.moving)} segments, "
         f"{log.times_real_time:.0f} x real time; written to {printable(str(args.out))}",
         markup=False,
@@ -103,6 +103,13 @@ def run(args: argparse.Namespace) -> None:
             f"{log.reasons}",
             markup=False,
         )
+
+
+def _takes_of(recordings: tuple[Recording, ...], log: LearningLog) -> str:
+    """Return how many takes were learned, and by how many sets of markers."""
+    learned = [recording for recording in recordings if recording.name not in log.refused]
+    sets = len({recording.channels for recording in learned})
+    return f"{len(learned)} takes" + (f" of {sets} marker sets" if sets > 1 else "")
 
 
 def why_nothing(learner: MotionLearner, log: LearningLog) -> str:
@@ -138,10 +145,10 @@ def _of_persons(
     return chosen
 
 
-def _of_one_kind(
+def _as_learned(
     args: argparse.Namespace, recordings: tuple[Recording, ...], console: Console
 ) -> tuple[Recording, ...]:
-    """Return the takes with the same channels: as bodies, or joined by the names they share."""
+    """Return the takes as they are learned: as bodies, or joined by the channels they share."""
     from mplearn.anatomy import as_bodies, read_map
     from mplearn.mocap import join_by_name
 

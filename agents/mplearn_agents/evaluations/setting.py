@@ -49,7 +49,8 @@ class Setting:
     def bodies(self) -> tuple[Recording, ...]:
         """The recordings as a learner takes them: people as points of one body, at own rates.
 
-        Recordings in which there are no points are taken as they are, those of most channels.
+        Those of most channels are taken: of one marker set, or, where there are no points, as they
+        are.
         """
         from mplearn.anatomy import as_bodies
         from mplearn.evaluation import alike
@@ -63,7 +64,7 @@ class Setting:
             return alike(found)
         bodies = as_bodies(people)
         self._refused.update(bodies.refused)
-        return bodies.recordings
+        return alike(bodies.recordings)
 
     @cached_property
     def annotations(self) -> tuple[Annotations, ...]:
