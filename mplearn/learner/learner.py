@@ -186,9 +186,8 @@ class MotionLearner:
             BodyError: Its markers belong to no known set; nothing has changed then.
 
         Example:
-            >>> from mplearn import LearnerConfig, MotionLearner
             >>> from mplearn.demonstrator import demonstrate
-            >>> shown = demonstrate(["BAR"] * 4, seed=1).recording
+            >>> shown = demonstrate(["BAR", "BAL"], seed=1).recording
             >>> learner = MotionLearner(LearnerConfig(shown.channels, shown.rate_hz))
             >>> events = learner.learn_many(shown.frames)
             >>> events = learner.begin_stream(shown.channels[:90])  # four markers fewer
