@@ -12,11 +12,11 @@ import numpy as np
 
 from ..graph import TransitionGraph
 from ..recording import CAUSES, BoolArray, FloatArray, IntArray, Segment
-from ..state import Array, Count, SharedState, State, require
+from ..state import Array, Count, SharedState, State, require, saved_as
 from ..tree import ROOT, Change, Placement
 from .events import Anomaly, Event, TransitionSeen
 from .foresight import NextMotion, foresee
-from .links import Link, run_before, step_s
+from .seen_segment import SeenSegment, run_before, step_s
 
 REMEMBERED = 2048  # segments; older ones cannot be counted again
 
@@ -25,8 +25,8 @@ BLOCK = 64  # segments that are kept together
 
 
 @dataclass(frozen=True, eq=False)
-class LinksState(SharedState):
-    """Segments of a chain, shape (n,) each, as `Link` and `Segment` say; -1 stands for None."""
+class SeenSegmentsState(SharedState):
+    """Segments of a chain, shape (n,) each, see `SeenSegment` and `Segment`; -1 is None."""
 
     number: Annotated[IntArray, Array("n", low=0)]
     primitive: Annotated[IntArray, Array("n", low=-1)]
@@ -48,16 +48,16 @@ class LinksState(SharedState):
         require(bool((self.like < self.number).all()), "like", "must be an earlier segment")
 
     @classmethod
-    def of(cls, rows: Sequence[tuple[Any, ...]]) -> LinksState:
-        """Return the state of some links, a row of plain values each."""
+    def of(cls, rows: Sequence[tuple[Any, ...]]) -> SeenSegmentsState:
+        """Return the state of some segments, a row of plain values each."""
         columns = zip(*rows, strict=True)
         return cls(*(np.array(each, kind) for each, kind in zip(columns, _DTYPES, strict=True)))
 
-    def links(self) -> list[Link]:
-        """Return the links."""
+    def segments(self) -> list[SeenSegment]:
+        """Return the segments."""
         columns = (getattr(self, each.name).tolist() for each in fields(self))
         return [
-            Link(
+            SeenSegment(
                 number,
                 None if primitive < 0 else primitive,
                 follows,
@@ -84,40 +84,41 @@ class LinksState(SharedState):
 _DTYPES = ("i8", "i8", "?", "i8", "i8", "f8", "i8", "?", "i8", "i8", "i8")
 
 
-def _plain(link: Link) -> tuple[Any, ...]:
-    """Return a link as a row of plain values."""
-    ids = (-1 if id is None else id for id in (link.primitive, link.nearest, link.like))
+def _plain(seen: SeenSegment) -> tuple[Any, ...]:
+    """Return a segment of a chain as a row of plain values."""
+    ids = (-1 if id is None else id for id in (seen.primitive, seen.nearest, seen.like))
     primitive, nearest, like = ids
-    segment = link.segment
+    segment = seen.segment
     ends = segment.start, segment.end, segment.confidence, segment.decided_at, segment.still
     cause = CAUSES.index(segment.cause)
-    return (link.number, primitive, link.follows, *ends, cause, nearest, like)
+    return (seen.number, primitive, seen.follows, *ends, cause, nearest, like)
 
 
+@saved_as(segments="links", n_segments="n_links")
 @dataclass(frozen=True, eq=False)
 class ChainState(State):
     """The latest segments of a stream.
 
     Attributes:
-        links: The segments, some at a time.
+        segments: The segments, some at a time.
         paused_frames: Frames of the pause that goes on.
         broken: Whether what comes next does not follow what came.
-        n_links: How many segments there are.
+        n_segments: How many segments there are.
     """
 
-    links: tuple[LinksState, ...]
+    segments: tuple[SeenSegmentsState, ...]
     paused_frames: Count
     broken: bool
-    n_links: Count
+    n_segments: Count
 
     def check(self) -> None:
         """Check that the parts follow each other, and that none is missing."""
-        n = sum(len(block.number) for block in self.links)
-        require(self.n_links == n, "links", f"must be {self.n_links} segments, not {n}")
-        for k, (one, two) in enumerate(pairwise(self.links), start=1):
+        n = sum(len(block.number) for block in self.segments)
+        require(self.n_segments == n, "segments", f"must be {self.n_segments} segments, not {n}")
+        for k, (one, two) in enumerate(pairwise(self.segments), start=1):
             rises = len(one.number) and len(two.number) and one.number[-1] < two.number[0]
-            require(bool(rises), f"links[{k}].number", "must rise")
-            require(bool(one.end[-1] <= two.start[0]), f"links[{k}].start", "must rise")
+            require(bool(rises), f"segments[{k}].number", "must rise")
+            require(bool(one.end[-1] <= two.start[0]), f"segments[{k}].start", "must rise")
 
 
 class Chain:
@@ -137,10 +138,10 @@ class Chain:
         self.graph = graph
         self.rate_hz = rate_hz
         self.longest_pause_s = longest_pause_s
-        self._links: list[Link] = []
+        self._segments: list[SeenSegment] = []
         self._paused_frames = 0
         self._broken = True
-        self._kept: dict[int, tuple[tuple[tuple[Any, ...], ...], LinksState]] = {}
+        self._kept: dict[int, tuple[tuple[tuple[Any, ...], ...], SeenSegmentsState]] = {}
 
     def paused(self, segment: Segment) -> None:
         """Take note of a segment in which nothing moved."""
@@ -154,7 +155,7 @@ class Chain:
 
     def foresee(self, k: int) -> tuple[NextMotion, ...]:
         """Return the ``k`` motions most likely to come next, see `foresee`."""
-        return foresee(self.graph, self._links, self.rate_hz, k, broken=self._broken)
+        return foresee(self.graph, self._segments, self.rate_hz, k, broken=self._broken)
 
     def follow(self, segment: Segment, placement: Placement, false_alarms: float) -> list[Event]:
         """Take the next segment, count what is known by it, and say what is surprising.
@@ -171,17 +172,17 @@ class Chain:
         if placement.recognised and not placement.splits:
             known = placement.node_id
         follows, nearest, like = not self._broken, placement.nearest, placement.like
-        self._links.append(Link(placement.number, known, follows, segment, nearest, like))
+        self._segments.append(SeenSegment(placement.number, known, follows, segment, nearest, like))
         self._paused_frames, self._broken = 0, False
         events: list[Event] = []
         if known is not None and not placement.born:
             events += self._surprised(false_alarms)
-            events += self._count(len(self._links) - 1)
+            events += self._count(len(self._segments) - 1)
         moved = dict(placement.moved)
         if placement.number not in moved and placement.node_id in placement.born:
             moved[placement.number] = placement.node_id
         events += self._revise(placement, moved)
-        del self._links[:-REMEMBERED]
+        del self._segments[:-REMEMBERED]
         return events
 
     def revise(self, change: Change) -> list[Event]:
@@ -200,51 +201,51 @@ class Chain:
             if id in self.graph:
                 self.graph.remove_node(id)
             self._rename({id}, None)
-        for link in self._links:
-            link.primitive = moved.get(link.number, link.primitive)
-            if link.primitive == ROOT:
-                link.primitive = None
+        for seen in self._segments:
+            seen.primitive = moved.get(seen.number, seen.primitive)
+            if seen.primitive == ROOT:
+                seen.primitive = None
         for id in change.born:
             self.graph.add_node(id)
         events: list[Event] = []
-        for i in range(1, len(self._links)) if change.born else ():
-            pair = {self._links[i - 1].primitive, self._links[i].primitive}
+        for i in range(1, len(self._segments)) if change.born else ():
+            pair = {self._segments[i - 1].primitive, self._segments[i].primitive}
             if pair & set(change.born):
                 events += self._count(i)
         return events
 
     def _rename(self, ids: Collection[int], to: int | None) -> None:
-        for link in self._links:
-            if link.primitive in ids:
-                link.primitive = to
-            if link.nearest in ids:
-                link.nearest = to
+        for seen in self._segments:
+            if seen.primitive in ids:
+                seen.primitive = to
+            if seen.nearest in ids:
+                seen.nearest = to
 
     def _run(self, i: int) -> list[int]:
-        """Return the primitives before link i, oldest first, as far as nothing breaks them off."""
-        return run_before(self._links, i, self.graph.order, lambda link: link.primitive)
+        """Return the primitives before segment i, oldest first, as far as nothing breaks off."""
+        return run_before(self._segments, i, self.graph.order, lambda seen: seen.primitive)
 
     def _count(self, i: int) -> list[Event]:
-        """Count the transition to link i, if there is one."""
-        link, run = self._links[i], self._run(i)
-        if link.primitive is None or not run:
+        """Count the transition to segment i, if there is one."""
+        seen, run = self._segments[i], self._run(i)
+        if seen.primitive is None or not run:
             return []
-        duration_s = step_s(self._links, i, self.rate_hz)
-        self.graph.observe(run[-1], link.primitive, duration_s, before=run[:-1])
-        count = self.graph.count(run[-1], link.primitive)
-        return [TransitionSeen(link.segment, run[-1], link.primitive, count)]
+        duration_s = step_s(self._segments, i, self.rate_hz)
+        self.graph.observe(run[-1], seen.primitive, duration_s, before=run[:-1])
+        count = self.graph.count(run[-1], seen.primitive)
+        return [TransitionSeen(seen.segment, run[-1], seen.primitive, count)]
 
     def _surprised(self, false_alarms: float) -> list[Event]:
         """Return the anomaly of the newest transition, if it is one; before it is counted."""
-        link, run = self._links[-1], self._run(len(self._links) - 1)
-        if not run or link.primitive is None:
+        seen, run = self._segments[-1], self._run(len(self._segments) - 1)
+        if not run or seen.primitive is None:
             return []
-        sequence = [*run, link.primitive]
+        sequence = [*run, seen.primitive]
         score = float(self.graph.surprises(sequence)[-1])
         if score <= -math.log(false_alarms):  # as likely as that is no alarm
             return []
         p_value = float(self.graph.p_values(sequence)[-1])
-        return [Anomaly(link.segment, "order", score, p_value)] if p_value <= false_alarms else []
+        return [Anomaly(seen.segment, "order", score, p_value)] if p_value <= false_alarms else []
 
     # ---- learners that are merged
 
@@ -256,36 +257,36 @@ class Chain:
             n_segments: Segments that were seen here before.
             n_frames: Frames that were seen here before.
         """
-        for link in other._links:
+        for seen in other._segments:
             segment = replace(
-                link.segment,
-                start=link.segment.start + n_frames,
-                end=link.segment.end + n_frames,
-                decided_at=link.segment.decided_at + n_frames,
+                seen.segment,
+                start=seen.segment.start + n_frames,
+                end=seen.segment.end + n_frames,
+                decided_at=seen.segment.decided_at + n_frames,
             )
-            like = None if link.like is None else link.like + n_segments
-            new = replace(link, number=link.number + n_segments, segment=segment, like=like)
-            self._links.append(new)
+            like = None if seen.like is None else seen.like + n_segments
+            new = replace(seen, number=seen.number + n_segments, segment=segment, like=like)
+            self._segments.append(new)
 
     def rename(self, new_id: Mapping[int, int]) -> None:
         """Let primitives have other names; those without a name are none any more."""
-        for link in self._links:
-            link.primitive = None if link.primitive is None else new_id.get(link.primitive)
-            link.nearest = None if link.nearest is None else new_id.get(link.nearest)
+        for seen in self._segments:
+            seen.primitive = None if seen.primitive is None else new_id.get(seen.primitive)
+            seen.nearest = None if seen.nearest is None else new_id.get(seen.nearest)
 
     def correct(self, moved: Mapping[int, int]) -> None:
         """Let segments, by number, be what they turned out to be: transitions were counted."""
-        for link in self._links:
-            primitive = moved.get(link.number, link.primitive)
-            link.primitive = None if primitive == ROOT else primitive
+        for seen in self._segments:
+            primitive = moved.get(seen.number, seen.primitive)
+            seen.primitive = None if primitive == ROOT else primitive
 
     def count_late(self, placed: Mapping[int, int]) -> None:
         """Count the transitions of segments, by number, that are known only now."""
-        late = {i for i, link in enumerate(self._links) if link.number in placed}
-        late = {i for i in late if self._links[i].primitive is None}
+        late = {i for i, seen in enumerate(self._segments) if seen.number in placed}
+        late = {i for i in late if self._segments[i].primitive is None}
         for i in late:
-            self._links[i].primitive = placed[self._links[i].number]
-        for i in range(1, len(self._links)):
+            self._segments[i].primitive = placed[self._segments[i].number]
+        for i in range(1, len(self._segments)):
             if late & {i - 1, i}:
                 self._count(i)
 
@@ -293,20 +294,20 @@ class Chain:
 
     def state(self) -> ChainState:
         """Return everything but the graph."""
-        blocks: dict[int, list[Link]] = {}
-        for link in self._links:
-            blocks.setdefault(link.number // BLOCK, []).append(link)
+        blocks: dict[int, list[SeenSegment]] = {}
+        for seen in self._segments:
+            blocks.setdefault(seen.number // BLOCK, []).append(seen)
         kept = {}
-        for at, links in blocks.items():
-            now = tuple(map(_plain, links))
+        for at, segments in blocks.items():
+            now = tuple(map(_plain, segments))
             known = self._kept.get(at)
-            kept[at] = known if known and known[0] == now else (now, LinksState.of(now))
+            kept[at] = known if known and known[0] == now else (now, SeenSegmentsState.of(now))
         self._kept = kept
-        links_states = tuple(state for _, state in kept.values())
-        return ChainState(links_states, self._paused_frames, self._broken, len(self._links))
+        states = tuple(state for _, state in kept.values())
+        return ChainState(states, self._paused_frames, self._broken, len(self._segments))
 
     def load_state(self, state: ChainState) -> None:
         """Resume from what `state` returned."""
-        self._links = [link for block in state.links for link in block.links()]
+        self._segments = [seen for block in state.segments for seen in block.segments()]
         self._paused_frames, self._broken = state.paused_frames, state.broken
         self._kept = {}

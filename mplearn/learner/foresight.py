@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..graph import Extension, TransitionGraph
-from .links import Link, run_before, step_s
+from ..graph import ProvisionalGraph, TransitionGraph
+from .seen_segment import SeenSegment, run_before, step_s
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class NextMotion:
 
 
 def foresee(
-    graph: TransitionGraph, links: Sequence[Link], rate_hz: float, k: int, *, broken: bool
+    graph: TransitionGraph, segments: Sequence[SeenSegment], rate_hz: float, k: int, *, broken: bool
 ) -> tuple[NextMotion, ...]:
     """Return the ``k`` motions most likely to come next, the most likely first.
 
@@ -42,7 +42,7 @@ def foresee(
 
     Args:
         graph: The transitions between primitives.
-        links: The latest segments.
+        segments: The latest segments.
         rate_hz: Frames per second [1/s].
         k: How many to return at most.
         broken: Whether what comes next does not follow the last of them.
@@ -50,24 +50,24 @@ def foresee(
     Raises:
         InvalidValueError: ``k`` is not positive.
     """
-    motions = motions_of(links)
-    seen = Extension(graph)
+    motions = motions_of(segments)
+    extended = ProvisionalGraph(graph)
 
     def run(i: int) -> list[int]:
-        return run_before(links, i, graph.order, lambda link: motions[link.number])
+        return run_before(segments, i, graph.order, lambda seen: motions[seen.number])
 
-    for i, link in enumerate(links):
-        motion = motions[link.number]
+    for i, seen in enumerate(segments):
+        motion = motions[seen.number]
         if motion < 0:
-            seen.add_node(motion)
-        if link.follows and i > 0 and min(motion, motions[links[i - 1].number]) < 0:
+            extended.add_node(motion)
+        if seen.follows and i > 0 and min(motion, motions[segments[i - 1].number]) < 0:
             before = run(i)
-            seen.observe(before[-1], motion, step_s(links, i, rate_hz), before=before[:-1])
+            extended.observe(before[-1], motion, step_s(segments, i, rate_hz), before=before[:-1])
     history: list[int] = []
-    if links and not broken:
-        last, nearest = motions[links[-1].number], links[-1].nearest
-        history = [*run(len(links) - 1), last]
-        if nearest is not None and nearest in graph and not seen.followers((last,)).any():
+    if segments and not broken:
+        last, nearest = motions[segments[-1].number], segments[-1].nearest
+        history = [*run(len(segments) - 1), last]
+        if nearest is not None and nearest in graph and not extended.followers((last,)).any():
             history = [nearest]
     shown: dict[int, list[int]] = {}
     for number, motion in motions.items():
@@ -80,21 +80,21 @@ def foresee(
             each.duration_s,
             each.duration_std_s,
         )
-        for each in seen.predict(history, k)
+        for each in extended.predict(history, k)
     )
 
 
-def motions_of(links: Sequence[Link]) -> dict[int, int]:
+def motions_of(segments: Sequence[SeenSegment]) -> dict[int, int]:
     """Return the motion that each segment shows, by number.
 
     It is the primitive, or that of the segment which it is like; where there is neither, the motion
     is new and goes by -1 minus the segment's number.
     """
     motions: dict[int, int] = {}
-    for link in links:
-        motion = link.primitive
+    for seen in segments:
+        motion = seen.primitive
         if motion is None:
-            like = None if link.like is None else motions.get(link.like)
-            motion = -1 - link.number if like is None else like
-        motions[link.number] = motion
+            like = None if seen.like is None else motions.get(seen.like)
+            motion = -1 - seen.number if like is None else like
+        motions[seen.number] = motion
     return motions

@@ -78,8 +78,8 @@ class LearnerState(State):
         primitives = self.tree.primitives
         ids = set(self.graph.ids.tolist())
         require(ids <= primitives, "graph.ids", f"must be primitives, {sorted(primitives)}")
-        for k, block in enumerate(self.chain.links):
-            place = f"chain.links[{k}]"
+        for k, block in enumerate(self.chain.segments):
+            place = f"chain.segments[{k}]"
             known = block.primitive[block.primitive >= 0]
             require(
                 bool(np.isin(known, self.graph.ids).all()), f"{place}.primitive", "must be known"

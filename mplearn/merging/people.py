@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from ..people import PeopleTree
+from ..people.constraints import Key
 from ..people.leaf import Leaf
 from ..people.nodes import tidied
-from ..people.pins import Key
 from ..people.sharing import Sharing
 from ..tree import ROOT, Node
 from .trees import merge_trees
@@ -86,12 +86,12 @@ def _of_several(first: PeopleTree, second: PeopleTree, people: Mapping[int, int]
     origins = [_Origin.of(mine, leaf, 0, leaf.key) for leaf in mine.leaves]
     origins += [_Origin.of(theirs, leaf, ids, new_key[leaf.key]) for leaf in theirs.leaves]
     _join_leaves(mine, theirs, new_key, ids)
-    mine.pins = mine.pins.merged(theirs.pins.renamed(new_key))
-    for each in theirs.waiting:
+    mine.constraints = mine.constraints.merged(theirs.constraints.renamed(new_key))
+    for each in theirs.provisional:
         shapes = {n + numbers: shape for n, shape in each.shapes.items()}
-        mine.waiting.join(people[each.person], each.primitive + ids, shapes)
+        mine.provisional.join(people[each.person], each.primitive + ids, shapes)
     for (person, _), number in placed:
-        mine.waiting.leave(person, {number})
+        mine.provisional.leave(person, {number})
     for id, node in theirs.above.items():
         mine.above[id + ids] = Node(id + ids, None, node.born_at, history=list(node.history))
     mine.parents |= {
@@ -173,7 +173,7 @@ def _regrouped(
         than that.
     """
     before = {leaf.key: leaf.primitive for leaf in sharing.leaves}
-    of_leaves, of_waiting = sharing.regroup()
+    of_leaves, of_provisional = sharing.regroup()
     groups = dict(zip(before, of_leaves, strict=True))
     held: dict[int, Counter[int]] = {}
     for origin in origins:
@@ -198,8 +198,8 @@ def _regrouped(
         if new.get(before[leaf.key], leaf.primitive) != leaf.primitive
         for number in sharing.members(leaf)
     }
-    homes = [ids.get(group, ROOT) for group in of_waiting]
-    moved |= dict(sharing.waiting.move(homes, new, sharing.own()))
+    homes = [ids.get(group, ROOT) for group in of_provisional]
+    moved |= dict(sharing.provisional.move(homes, new, sharing.own()))
     sharing.name_leaves()
     tidied(sharing.above, sharing.parents, sharing.primitives)
     return new, moved

@@ -14,7 +14,7 @@ class PeopleConfig:
     """Rules by which leaves of several people's trees become one primitive.
 
     Distances are those between mean trajectories (`shapes`), in units of how far a person's own
-    primitives usually lie apart (`links.unit_of`): no label sets the scale, and neither does the
+    primitives usually lie apart (`matching.unit_of`): no label sets the scale, and neither does the
     number of people.
 
     Attributes:
@@ -22,7 +22,7 @@ class PeopleConfig:
         repertoire: Primitives of a person from which on that scale is taken as it is; the fewer
             are known, the farther they lie apart.
         link: Two groups of leaves by different people are one primitive up to this tension
-            (`links.tension`), taken of the average distance over all pairs of leaves.
+            (`matching.tension`), taken of the average distance over all pairs of leaves.
         link_own: Two leaves of one person are one primitive only up to this distance.
         join: A segment that is in none of its person's leaves joins another person's primitive up
             to this tension, unless its person has a leaf in it.

@@ -42,7 +42,7 @@ def split(sharing: Sharing, id: int, groups: Sequence[Sequence[int]] | None) -> 
             continue
         change = sharing.trees[leaf.person].split(leaf.local, part)
         heirs = [sharing.new_leaf(leaf.person, local) for local in change.splits[0].into]
-        sharing.pins.follow({leaf.key: [heir.key for heir in heirs]})
+        sharing.constraints.follow({leaf.key: [heir.key for heir in heirs]})
         sharing.drop_leaf(leaf)
         for side, heir in zip(own, heirs, strict=True):
             into[side].append(heir)
@@ -70,7 +70,7 @@ def merge(sharing: Sharing, first: int, second: int) -> Change:
     older, younger = sorted(leaves)
     for leaf in leaves[younger]:
         _join(sharing, leaf, older)
-    sharing.pins.join(leaf.key for leaf in sharing.leaves_of(older))
+    sharing.constraints.must_link(leaf.key for leaf in sharing.leaves_of(older))
     return _settled(sharing, Change(merges=(Merge(older, younger),)))
 
 
@@ -111,7 +111,7 @@ def move(sharing: Sharing, id: int, parent: int) -> Change:
         change = Change(born=(home,), moved=tuple((n, home) for n in moved))
         return _settled(sharing, change)
     _join(sharing, leaf, parent)
-    sharing.pins.join(each.key for each in sharing.leaves_of(parent))
+    sharing.constraints.must_link(each.key for each in sharing.leaves_of(parent))
     if not staying:
         return _settled(sharing, Change(merges=(Merge(parent, left),)))
     change = Change(
@@ -131,7 +131,7 @@ def remove(sharing: Sharing, id: int, *, forget: bool) -> Change:
     for leaf in leaves:
         moved += [(n, ROOT) for n in sharing.members(leaf)]
         sharing.trees[leaf.person].remove(leaf.local, forget=forget)
-        sharing.pins.follow({leaf.key: ()})
+        sharing.constraints.follow({leaf.key: ()})
         sharing.drop_leaf(leaf)
     gone = [id, *(leaf.primitive for leaf in leaves)]
     removed = tuple(dict.fromkeys(each for each in gone if each not in sharing.primitives))
@@ -201,7 +201,7 @@ def _join(sharing: Sharing, leaf: Leaf, primitive: int) -> None:
             kept, gone = other, leaf
             if change.merges[0].kept == leaf.local:
                 kept, gone = leaf, other
-            sharing.pins.follow({gone.key: [kept.key]})
+            sharing.constraints.follow({gone.key: [kept.key]})
             sharing.drop_leaf(gone)
             sharing.look_again(kept)
             leaf = kept
@@ -209,7 +209,7 @@ def _join(sharing: Sharing, leaf: Leaf, primitive: int) -> None:
 
 def _part(sharing: Sharing, sides: Sequence[Sequence[Leaf]]) -> None:
     """Keep leaves on different sides apart; a person's own in that person's tree, too."""
-    sharing.pins.part([[leaf.key for leaf in side] for side in sides])
+    sharing.constraints.cannot_link([[leaf.key for leaf in side] for side in sides])
     for side in sides:
         for leaf in side:
             others = [each for other in sides if other is not side for each in other]
@@ -221,9 +221,9 @@ def _settled(sharing: Sharing, change: Change) -> Change:
     """Let what waits, names and nodes above follow a change."""
     absorbed = {merge.absorbed: merge.kept for merge in change.merges}
     known = set(sharing.primitives)
-    wanted = [absorbed.get(each.primitive, each.primitive) for each in sharing.waiting]
+    wanted = [absorbed.get(each.primitive, each.primitive) for each in sharing.provisional]
     homes = [id if id in known else ROOT for id in wanted]
-    moved = sharing.waiting.move(homes, absorbed, sharing.own())
+    moved = sharing.provisional.move(homes, absorbed, sharing.own())
     sharing.name_leaves()
     change = change.then(Change(moved=tuple(moved)))
     return change.then(tidied(sharing.above, sharing.parents, sharing.primitives))

@@ -97,7 +97,7 @@ class PeopleState(State):
                 "sharing.numbers",
                 f"must name the segments of person {person}",
             )
-        for name in ("numbers", "offsets", "waiting"):
+        for name in ("numbers", "offsets", "provisional"):
             for k, each in enumerate(getattr(sharing, name)):
                 require(each.person in trees, f"sharing.{name}[{k}].person", f"is {each.person}")
 
@@ -106,8 +106,8 @@ class PeopleTree:
     """Groups segments of several people; a primitive is one node, with a leaf a person below it.
 
     Each person has a tree as of a single person. A leaf that is born there is held against
-    everybody's leaves (`links`): it joins a primitive, or is one. A segment that is in none of its
-    person's leaves, as all of a newcomer's are, can join another person's primitive. As long as
+    everybody's leaves (`matching`): it joins a primitive, or is one. A segment that is in none of
+    its person's leaves, as all of a newcomer's are, can join another person's primitive. As long as
     there is one person, all is as in that person's tree.
 
     Args:
@@ -379,9 +379,11 @@ class PeopleTree:
         for k, leaf in enumerate(state.leaves):
             fits = (len(leaf.shape.posture), len(leaf.shape.movement)) == (posture, movement)
             require(fits, f"leaves[{k}].shape", f"must have shapes ({posture},) and ({movement},)")
-        for k, each in enumerate(state.waiting):
+        for k, each in enumerate(state.provisional):
             fits = (each.postures.shape[1], each.movements.shape[1]) == (posture, movement)
-            require(fits, f"waiting[{k}].postures", f"must be {posture} wide, movements {movement}")
+            require(
+                fits, f"provisional[{k}].postures", f"must be {posture} wide, movements {movement}"
+            )
         for k, offset in enumerate(state.offsets):
             require(
                 len(offset.offset) == posture, f"offsets[{k}].offset", f"must be {posture} wide"

@@ -12,7 +12,7 @@ from ..recording import FloatArray
 from ..tree import Change, Node, Placement, PrimitiveTree, Recogniser
 from . import editing
 from .common import CommonRecogniser, common_model
-from .pins import Key
+from .constraints import Key
 from .sharing import Sharing
 from .sharing_state import SharingState
 

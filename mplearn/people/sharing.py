@@ -10,16 +10,16 @@ import numpy as np
 from ..recording import FloatArray, IntArray
 from ..tree import ROOT, Change, Merge, MirrorMap, Node, Placement, PrimitiveTree, Split, TreeConfig
 from .config import PeopleConfig
+from .constraints import Constraints
 from .identities import executions_held, identities, recognised_as, split_into
 from .leaf import Leaf
-from .links import Known, solve, tension
+from .matching import Known, solve, tension
 from .nodes import nodes_of, tidied
 from .offsets import offsets_of
-from .pins import Pins
+from .provisional import ProvisionalLeaf, ProvisionalLeaves
 from .shape_table import ShapeTable
 from .shapes import Shape, shape_of
 from .sharing_state import AboveState, NumbersState, OffsetState, SharingState
-from .waiting import Waiting, WaitingRoom
 
 TIDY = 32  # segments after which those are forgotten that the tree has forgotten
 
@@ -40,13 +40,13 @@ class Sharing:
 
     Attributes:
         leaves: Leaves of all people.
-        pins: What a person said of them.
+        constraints: What a person said of them.
         above: Nodes above primitives: what was split.
         parents: The node above each of those, and of each primitive.
         numbers: Person -> number of a segment in that person's tree -> number here.
         table: The shapes.
-        waiting: What joined primitives of others.
-        unit: The unit of distance (`links.unit_of`).
+        provisional: What joined primitives of others.
+        unit: The unit of distance (`matching.unit_of`).
     """
 
     def __init__(
@@ -63,12 +63,12 @@ class Sharing:
         self.next_id = next_id
         self.n_seen = 0
         self.leaves: list[Leaf] = []
-        self.pins = Pins()
+        self.constraints = Constraints()
         self.above: dict[int, Node] = {}
         self.parents: dict[int, int] = {}
         self.numbers: dict[int, dict[int, int]] = {}
         self.table = ShapeTable(mirror)
-        self.waiting = WaitingRoom(self.table)
+        self.provisional = ProvisionalLeaves(self.table)
         self._offsets: dict[int, FloatArray] = {}
         self.unit = float("inf")
         for person, tree in trees.items():
@@ -131,11 +131,13 @@ class Sharing:
     def _known(self) -> Known:
         """Return all leaves, and what waits, for the search of what is one motion."""
         places = {person: place for place, person in enumerate(self.trees)}
-        entries = [*self.leaves, *self.waiting]
+        entries = [*self.leaves, *self.provisional]
         n, n_leaves = len(entries), len(self.leaves)
         together, apart = np.zeros((2, n, n), dtype=np.bool_)
         for all_pairs, pairs in zip(
-            (together, apart), self.pins.among([leaf.key for leaf in self.leaves]), strict=True
+            (together, apart),
+            self.constraints.among([leaf.key for leaf in self.leaves]),
+            strict=True,
         ):
             all_pairs[:n_leaves, :n_leaves] = pairs
         people = np.array([places[each.person] for each in entries], dtype=np.int64)
@@ -144,7 +146,7 @@ class Sharing:
     def measure_offsets(self) -> None:
         """Learn from what joined how its person deviates from others."""
         known = self._known()
-        primitives = [each.primitive for each in (*self.leaves, *self.waiting)]
+        primitives = [each.primitive for each in (*self.leaves, *self.provisional)]
         offsets = offsets_of(
             self.table.postures(known.slots),
             known.people,
@@ -219,8 +221,8 @@ class Sharing:
             nearest = other if nearest is None else nearest
             if other is not None and ratio <= 1:
                 said = nearest = other
-                self.waiting.join(person, other, {number: shape})
-        joined = self.waiting.homes()
+                self.provisional.join(person, other, {number: shape})
+        joined = self.provisional.homes()
         change = Change()
         if self._take_up(person, placement):
             change = self._solve(before, joined, person, placement)
@@ -275,9 +277,9 @@ class Sharing:
             self.new_leaf(person, local)
         heirs = {(person, each.absorbed): [(person, each.kept)] for each in placement.merges}
         heirs |= {(person, s.node): [(person, to) for to in s.into] for s in placement.splits}
-        self.pins.follow(heirs)
+        self.constraints.follow(heirs)
         own = self.numbers[person]
-        self.waiting.leave(person, {own[n] for n, node in placed.items() if node != ROOT})
+        self.provisional.leave(person, {own[n] for n, node in placed.items() if node != ROOT})
         return now != known.keys()
 
     def _solve(
@@ -288,7 +290,7 @@ class Sharing:
         placement: Placement,
     ) -> Change:
         """Find again which leaves are one primitive, and say what changed by it."""
-        groups, of_waiting = self.regroup()
+        groups, of_provisional = self.regroup()
         held = executions_held(
             self.leaves, groups, before, self.trees, self.numbers, joined, person, placement
         )
@@ -318,8 +320,8 @@ class Sharing:
             leaf.primitive = ids[group]
             if absorbed.get(old, old) != leaf.primitive:
                 moved += [(n, leaf.primitive) for n in self.members(leaf)]
-        homes = [ids.get(group, ROOT) for group in of_waiting]
-        moved += self.waiting.move(homes, absorbed, self.own())
+        homes = [ids.get(group, ROOT) for group in of_provisional]
+        moved += self.provisional.move(homes, absorbed, self.own())
         self.name_leaves()
         change = Change(
             tuple(born), tuple(splits), tuple(merges), tuple(moved), removed=tuple(removed)
@@ -334,13 +336,13 @@ class Sharing:
         held = {n for node in tree.nodes for n in node.members}
         own = self.numbers[person]
         self.numbers[person] = {there: here for there, here in own.items() if there in held}
-        self.waiting.leave(person, {here for there, here in own.items() if there not in held})
+        self.provisional.leave(person, {here for there, here in own.items() if there not in held})
 
     def _home(self, person: int, node: int, number: int) -> int:
         for leaf in self.leaves:
             if leaf.key == (person, node):
                 return leaf.primitive
-        return self.waiting.homes().get(number, ROOT)
+        return self.provisional.homes().get(number, ROOT)
 
     # ---- keeping
 
@@ -351,7 +353,7 @@ class Sharing:
             n_seen=self.n_seen,
             unit=self.unit,
             leaves=tuple(leaf.state(self.table) for leaf in self.leaves),
-            waiting=self.waiting.state(),
+            provisional=self.provisional.state(),
             numbers=tuple(
                 NumbersState(
                     person, np.array(list(own), np.int64), np.array(list(own.values()), np.int64)
@@ -363,7 +365,7 @@ class Sharing:
                 for node in self.above.values()
             ),
             parents=tuple(self.parents.items()),
-            pins=self.pins.state(),
+            constraints=self.constraints.state(),
             offsets=tuple(
                 OffsetState(person, offset.copy()) for person, offset in self._offsets.items()
             ),
@@ -378,8 +380,8 @@ class Sharing:
             slot = self.table.add(Shape(leaf.shape.posture, leaf.shape.movement))
             ids = leaf.person, leaf.local, leaf.id, leaf.primitive, leaf.founded
             self.leaves.append(Leaf(*ids, slot))
-        self.waiting = WaitingRoom(self.table)
-        self.waiting.load_state(state.waiting)
+        self.provisional = ProvisionalLeaves(self.table)
+        self.provisional.load_state(state.provisional)
         self.numbers = {
             own.person: dict(zip(own.there.tolist(), own.here.tolist(), strict=True))
             for own in state.numbers
@@ -389,7 +391,7 @@ class Sharing:
             for node in state.above
         }
         self.parents = dict(state.parents)
-        self.pins.load_state(state.pins)
+        self.constraints.load_state(state.constraints)
         self._offsets = {each.person: each.offset.copy() for each in state.offsets}
 
     # ---- shapes
@@ -409,6 +411,6 @@ class Sharing:
         return np.asarray(self.table.postures(self.slots(leaves)) - offsets)
 
     @staticmethod
-    def slots(entries: Iterable[Leaf | Waiting]) -> IntArray:
+    def slots(entries: Iterable[Leaf | ProvisionalLeaf]) -> IntArray:
         """Return where the shapes of some leaves, or of what waits, are, shape (n,)."""
         return np.array([each.slot for each in entries], dtype=np.int64)

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from ..recording import FloatArray, IntArray
-from ..state import Array, Count, Range, State, require, require_no_cycle
+from ..state import Array, Count, Range, State, require, require_no_cycle, saved_as
 from ..tree import ROOT
 from ..tree.nodes.node import Happening
+from .constraints import ConstraintsState
 from .leaf import LeafState
-from .pins import PinsState
-from .waiting import WaitingState
+from .provisional import ProvisionalState
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +41,7 @@ class OffsetState(State):
     offset: Annotated[FloatArray, Array(None)]
 
 
+@saved_as(provisional="waiting", constraints="pins")
 @dataclass(frozen=True, eq=False)
 class SharingState(State):
     """What people share; attributes are those of `Sharing`."""
@@ -49,11 +50,11 @@ class SharingState(State):
     n_seen: Count
     unit: Annotated[float, Range(0.0, math.inf)]
     leaves: tuple[LeafState, ...]
-    waiting: tuple[WaitingState, ...]
+    provisional: tuple[ProvisionalState, ...]
     numbers: tuple[NumbersState, ...]
     above: tuple[AboveState, ...]
     parents: tuple[tuple[Count, Count], ...]
-    pins: PinsState
+    constraints: ConstraintsState
     offsets: tuple[OffsetState, ...]
 
     def check(self) -> None:
@@ -80,13 +81,14 @@ class SharingState(State):
                 f"node {id} must lie below one of {sorted({ROOT, *above})}, not {parent}",
             )
         require_no_cycle(parents, lambda id: f"parents[{list(parents).index(id)}]")
-        for k, each in enumerate(self.waiting):
-            require(each.primitive in primitives, f"waiting[{k}].primitive", "must be a primitive")
-        waiting = {(each.person, each.primitive) for each in self.waiting}
-        require(len(waiting) == len(self.waiting), "waiting", "must differ")
+        for k, each in enumerate(self.provisional):
+            place = f"provisional[{k}].primitive"
+            require(each.primitive in primitives, place, "must be a primitive")
+        homes = {(each.person, each.primitive) for each in self.provisional}
+        require(len(homes) == len(self.provisional), "provisional", "must differ")
         for name in ("together", "apart"):
-            for k, pair in enumerate(getattr(self.pins, name)):
-                require(keys.issuperset(pair), f"pins.{name}[{k}]", "must name leaves")
+            for k, pair in enumerate(getattr(self.constraints, name)):
+                require(keys.issuperset(pair), f"constraints.{name}[{k}]", "must name leaves")
         seen: set[int] = set()
         for k, own in enumerate(self.numbers):
             here = set(own.here.tolist())

@@ -18,7 +18,7 @@ from .exemplars import normalisation
 from .exemplars.bank import BankState, ExemplarBank
 from .nodes.search import IndexState, NodeIndex
 from .placement import Match
-from .rejection import Strangers, spreads
+from .rejection import Impostors, spreads
 
 
 class Recognition(NamedTuple):
@@ -99,13 +99,13 @@ class Recogniser:
         there is no second one.
         """
         index = self._index
-        return Strangers.of(index, self._bank, index.radii()).rate(1.0)
+        return Impostors.of(index, self._bank, index.radii()).rate(1.0)
 
     def calibrated(self, false_acceptance: float | None) -> Recogniser:
-        """Return a recogniser with radii at which no more strangers are accepted than stated.
+        """Return a recogniser with radii at which no more impostors are accepted than stated.
 
         Radii are only ever made smaller: what lies outside of the rules' own is no execution of the
-        primitive, however far strangers are.
+        primitive, however far impostors are.
 
         Args:
             false_acceptance: Share of the motions of unknown kinds that may be taken for known;
@@ -119,8 +119,8 @@ class Recogniser:
         index.caps = None
         if false_acceptance is not None:
             units = spreads(index, self._bank)
-            strangers = Strangers.of(index, self._bank, units)
-            index.caps = strangers.threshold(false_acceptance) * units
+            impostors = Impostors.of(index, self._bank, units)
+            index.caps = impostors.threshold(false_acceptance) * units
         return Recogniser(config, self._bank, index, self.shortest_frames)
 
     def recognise(self, frames: FloatArray) -> Recognition:

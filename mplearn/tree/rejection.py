@@ -2,11 +2,11 @@
 
 Every known primitive was unknown once. For the exemplars of a leaf the other leaves are what is
 known: how near they come to the nearest of those, in units of how far that leaf's own exemplars lie
-apart, is what a stranger's distance is like. The rule is that of conformal prediction [Vovk2005],
+apart, is what an impostor's distance is like. The rule is that of conformal prediction [Vovk2005],
 over leaves and not over exemplars, for executions of one motion come equally near [Dunn2023]: where
-a share s_k of the exemplars of leaf k comes nearer than t, a stranger does with a probability of
+a share s_k of the exemplars of leaf k comes nearer than t, an impostor does with a probability of
 (1 + sum of s_k) / (K + 1) at most. It is 2 / (K + 1) at the nearest that was seen, for who comes
-nearer than anyone makes a stranger of a leaf as well. A smaller rate lies beyond that; down there
+nearer than anyone makes an impostor of a leaf as well. A smaller rate lies beyond that; down there
 the probability falls with the third power of t, as it does where motions fill three dimensions.
 """
 
@@ -25,7 +25,7 @@ _PAIR = 2.0
 _SHARED = 6.0  # exemplars that the spread all leaves share counts for beside a leaf's own
 
 
-class Strangers:
+class Impostors:
     """How near motions come to primitives that are not theirs.
 
     Args:
@@ -42,7 +42,7 @@ class Strangers:
         self._expected = np.maximum(_PAIR, sums)
 
     @classmethod
-    def of(cls, index: NodeIndex, bank: ExemplarBank, units: FloatArray) -> Strangers:
+    def of(cls, index: NodeIndex, bank: ExemplarBank, units: FloatArray) -> Impostors:
         """Return those of all leaves of an index, in a unit of each node, shape (n,)."""
         unit = dict(zip(index.ids.tolist(), units.tolist(), strict=True))
         found = []
@@ -58,7 +58,7 @@ class Strangers:
         return cls([np.array(each) for each in found])
 
     def threshold(self, rate: float) -> float:
-        """Return the distance within which a share ``rate`` of strangers comes at most.
+        """Return the distance within which a share ``rate`` of impostors comes at most.
 
         It is inf where there was none.
         """
@@ -71,7 +71,7 @@ class Strangers:
         return float(self._distances[min(within, len(self._distances) - 1)])
 
     def rate(self, distance: float) -> float:
-        """Return the largest share of strangers expected nearer than that; NaN if none was seen."""
+        """Return the largest share of impostors expected nearer than that; NaN if none was seen."""
         if not self._n_leaves:
             return float("nan")
         below = int(np.searchsorted(self._distances, distance, side="left"))

@@ -4,22 +4,22 @@ from hypothesis import strategies as st
 
 from mplearn.graph import TransitionGraph
 from mplearn.learner.foresight import foresee, motions_of
-from mplearn.learner.links import Link
+from mplearn.learner.seen_segment import SeenSegment
 from mplearn.recording import Segment
 
 LABELS = 5
 
 
-def links_of(sequence, known, breaks=()):
+def chain_of(sequence, known, breaks=()):
     """A chain in which the labels of ``known`` are primitives; others are like one before them."""
-    links, last = [], {}
+    segments, last = [], {}
     for i, label in enumerate(sequence):
         like = None if label in known else last.get(label)
         primitive = label if label in known else None
         segment = Segment(100 * i, 100 * i + 90)
-        links.append(Link(i, primitive, i not in breaks and i > 0, segment, like=like))
+        segments.append(SeenSegment(i, primitive, i not in breaks and i > 0, segment, like=like))
         last[label] = i
-    return links
+    return segments
 
 
 def counted(sequence, chosen, breaks=()):
@@ -41,11 +41,11 @@ def counted(sequence, chosen, breaks=()):
     st.sets(st.integers(2, 39), max_size=3),
 )
 def test_motions_that_are_no_primitives_are_foretold_as_labels_would_be(sequence, breaks):
-    links = links_of(sequence, set(), breaks)
+    segments = chain_of(sequence, set(), breaks)
     perfect = counted(sequence, lambda *_: True, breaks)
     history = sequence[-1:] if len(sequence) - 1 in breaks else sequence[-2:]
     expected = {each.id: each for each in perfect.predict(history, 99)}
-    foreseen = foresee(TransitionGraph(), links, 100.0, 99, broken=False)
+    foreseen = foresee(TransitionGraph(), segments, 100.0, 99, broken=False)
     assert all(each.id is None for each in foreseen)
     assert {sequence[each.segments[0]] for each in foreseen} == set(sequence)
     for each in foreseen:
@@ -61,7 +61,7 @@ def test_primitives_and_others_are_foretold_together(sequence):
     graph = counted(sequence, lambda a, b: a in known and b in known)
     for id in [id for id in graph.ids if id not in known]:
         graph.remove_node(id)
-    foreseen = foresee(graph, links_of(sequence, known), 100.0, 99, broken=False)
+    foreseen = foresee(graph, chain_of(sequence, known), 100.0, 99, broken=False)
     perfect = counted(sequence, lambda *_: True)
     expected = {each.id: each for each in perfect.predict(sequence[-1:], 99)}
     assert sum(each.probability for each in foreseen) == pytest.approx(1.0)
@@ -73,16 +73,18 @@ def test_primitives_and_others_are_foretold_together(sequence):
 
 
 def test_what_comes_after_a_break_depends_on_nothing():
-    links = links_of([0, 1, 0, 1, 0], set())
-    after = foresee(TransitionGraph(), links, 100.0, 2, broken=True)
+    segments = chain_of([0, 1, 0, 1, 0], set())
+    after = foresee(TransitionGraph(), segments, 100.0, 2, broken=True)
     assert [each.probability for each in after] == pytest.approx([0.5, 0.5])
     assert foresee(TransitionGraph(), [], 100.0, 2, broken=False) == ()
 
 
 def test_a_motion_is_that_of_what_it_is_like():
     segment = Segment(0, 50)
-    links = [Link(i, None, True, segment, like=like) for i, like in ((4, None), (6, 4), (9, 6))]
-    assert set(motions_of(links).values()) == {-5}
-    links[0].primitive = 3  # a primitive was born of it, or it was moved there
-    assert set(motions_of(links).values()) == {3}
-    assert motions_of(links[1:]) == {6: -7, 9: -7}  # what it was like is forgotten
+    segments = [
+        SeenSegment(i, None, True, segment, like=like) for i, like in ((4, None), (6, 4), (9, 6))
+    ]
+    assert set(motions_of(segments).values()) == {-5}
+    segments[0].primitive = 3  # a primitive was born of it, or it was moved there
+    assert set(motions_of(segments).values()) == {3}
+    assert motions_of(segments[1:]) == {6: -7, 9: -7}  # what it was like is forgotten

@@ -74,10 +74,10 @@ def test_the_past_of_a_new_primitive_counts(
         len(early) >= len(born) - 1
     )  # one demonstration of each was before, none before the first
     # as many as there are neighbours that are known by now
-    links = learner.chain._links
-    known = [link.primitive is not None for link in links]
+    segments = learner.chain._segments
+    known = [seen.primitive is not None for seen in segments]
     assert len(seen) == sum(
-        a and b and link.follows for a, b, link in zip(known, known[1:], links[1:], strict=False)
+        a and b and seen.follows for a, b, seen in zip(known, known[1:], segments[1:], strict=False)
     )
 
 

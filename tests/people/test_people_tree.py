@@ -157,7 +157,7 @@ def test_memory_does_not_grow_with_the_stream():
         tree.insert(teacher(i % 2, int(teacher.rng.integers(N_MOTIONS))), i % 2)
     kept = tree.state().sharing
     assert all(len(own.here) <= most < 160 for own in kept.numbers)
-    assert sum(len(each.numbers) for each in kept.waiting) <= 2 * most
+    assert sum(len(each.numbers) for each in kept.provisional) <= 2 * most
 
 
 def test_what_is_unknown_is_named():

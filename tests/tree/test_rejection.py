@@ -12,7 +12,7 @@ from motions import RATE_HZ, Motions
 
 from mplearn.errors import InvalidValueError
 from mplearn.tree import PrimitiveTree, TreeConfig
-from mplearn.tree.rejection import Strangers
+from mplearn.tree.rejection import Impostors
 
 
 def nearest_others(points):
@@ -32,7 +32,7 @@ def test_no_more_strangers_are_accepted_than_stated(rate, n_dimensions):
     for _ in range(1500):
         middles = rng.normal(size=(n_known + 1, 1, n_dimensions))
         points = middles + rng.normal(0, 0.1, (n_known + 1, 8, n_dimensions))
-        threshold = Strangers(nearest_others(points[:-1])).threshold(rate)
+        threshold = Impostors(nearest_others(points[:-1])).threshold(rate)
         stranger = cdist(points[-1], points[:-1].mean(axis=1)).min(axis=1)
         shares.append((stranger < threshold).mean())
     error = np.std(shares) / np.sqrt(len(shares))
@@ -41,10 +41,10 @@ def test_no_more_strangers_are_accepted_than_stated(rate, n_dimensions):
 
 
 def test_the_estimate_and_the_threshold_are_inverse():
-    nobody = Strangers([])
+    nobody = Impostors([])
     assert np.isnan(nobody.rate(1.0)) and nobody.threshold(0.01) == np.inf
     rng = np.random.default_rng(0)
-    strangers = Strangers([rng.lognormal(k / 20, 0.2, 12) for k in range(30)])
+    strangers = Impostors([rng.lognormal(k / 20, 0.2, 12) for k in range(30)])
     for rate in (0.001, 0.01, 0.05, 0.1, 0.5):
         assert rate / 2 < strangers.rate(strangers.threshold(rate)) <= rate * (1 + 1e-9)
     rates = [strangers.rate(t) for t in np.linspace(0, 20, 200)]

@@ -1,4 +1,4 @@
-"""The segments of a stream as links of a chain."""
+"""What a learner remembers of each segment of its stream, one after the other."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from ..recording import Segment
 
 
 @dataclass
-class Link:
-    """A segment in the chain.
+class SeenSegment:
+    """A segment of the stream, and what it was recognised as.
 
     Attributes:
         number: The tree's number of the segment.
@@ -30,26 +30,29 @@ class Link:
 
 
 def run_before(
-    links: Sequence[Link], i: int, longest: int, motion_of: Callable[[Link], int | None]
+    segments: Sequence[SeenSegment],
+    i: int,
+    longest: int,
+    motion_of: Callable[[SeenSegment], int | None],
 ) -> list[int]:
-    """Return the motions before link i, oldest first, as far as nothing breaks them off.
+    """Return the motions before segment i, oldest first, as far as nothing breaks them off.
 
     Args:
-        links: The chain.
-        i: Place of the link.
+        segments: The chain.
+        i: Place of the segment.
         longest: How many are returned at most.
-        motion_of: Returns the motion that a link shows; None breaks the run.
+        motion_of: Returns the motion that a segment shows; None breaks the run.
     """
     run: list[int] = []
-    while i > 0 and links[i].follows and len(run) < longest:
+    while i > 0 and segments[i].follows and len(run) < longest:
         i -= 1
-        motion = motion_of(links[i])
+        motion = motion_of(segments[i])
         if motion is None:
             break
         run.insert(0, motion)
     return run
 
 
-def step_s(links: Sequence[Link], i: int, rate_hz: float) -> float:
-    """Return the time from the start of the link before link i to its own start [s]."""
-    return (links[i].segment.start - links[i - 1].segment.start) / rate_hz
+def step_s(segments: Sequence[SeenSegment], i: int, rate_hz: float) -> float:
+    """Return the time from the start of the segment before segment i to its own start [s]."""
+    return (segments[i].segment.start - segments[i - 1].segment.start) / rate_hz

@@ -1,4 +1,4 @@
-"""What joined other people's primitives, of people who have no such leaf yet."""
+"""Provisional leaves: what joined primitives of others, of people who have no such leaf yet."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from .shapes import Shape, mean_shape
 
 
 @dataclass(frozen=True, eq=False)
-class WaitingState(SharedState):
-    """Segments of one person that joined one primitive.
+class ProvisionalState(SharedState):
+    """The state of a `ProvisionalLeaf`.
 
     Attributes:
         person: Whose they are.
@@ -40,7 +40,7 @@ class WaitingState(SharedState):
 
 
 @dataclass
-class Waiting:
+class ProvisionalLeaf:
     """Segments of one person that joined one primitive.
 
     Attributes:
@@ -54,14 +54,14 @@ class Waiting:
     primitive: int
     slot: int
     shapes: dict[int, Shape] = field(default_factory=dict)
-    _kept: WaitingState | None = field(default=None, repr=False, compare=False)
+    _kept: ProvisionalState | None = field(default=None, repr=False, compare=False)
 
-    def state(self) -> WaitingState:
+    def state(self) -> ProvisionalState:
         """Return everything: the same object as long as nothing has changed."""
         kept = self._kept
         if kept is None or kept.numbers.tolist() != list(self.shapes):
             postures, movements = zip(*self.shapes.values(), strict=True)
-            kept = self._kept = WaitingState(
+            kept = self._kept = ProvisionalState(
                 self.person,
                 self.primitive,
                 np.array(list(self.shapes), np.int64),
@@ -71,8 +71,8 @@ class Waiting:
         return kept
 
 
-class WaitingRoom:
-    """All that waits, by person and primitive.
+class ProvisionalLeaves:
+    """All provisional leaves, by person and primitive.
 
     Each counts as a leaf of its person when it is found out which leaves are one primitive.
 
@@ -82,9 +82,9 @@ class WaitingRoom:
 
     def __init__(self, table: ShapeTable) -> None:
         self._table = table
-        self._all: dict[tuple[int, int], Waiting] = {}
+        self._all: dict[tuple[int, int], ProvisionalLeaf] = {}
 
-    def __iter__(self) -> Iterator[Waiting]:
+    def __iter__(self) -> Iterator[ProvisionalLeaf]:
         """Go through what waits."""
         return iter(list(self._all.values()))
 
@@ -97,7 +97,7 @@ class WaitingRoom:
         each = self._all.get((person, primitive))
         if each is None:
             slot = self._table.add(mean_shape(list(shapes.values())))
-            self._all[person, primitive] = Waiting(person, primitive, slot, dict(shapes))
+            self._all[person, primitive] = ProvisionalLeaf(person, primitive, slot, dict(shapes))
             return
         each.shapes |= shapes
         self._table.put(each.slot, mean_shape(list(each.shapes.values())))
@@ -136,18 +136,18 @@ class WaitingRoom:
                     self.join(each.person, home, shapes)
         return moved
 
-    def state(self) -> tuple[WaitingState, ...]:
+    def state(self) -> tuple[ProvisionalState, ...]:
         """Return all that waits."""
         return tuple(each.state() for each in self)
 
-    def load_state(self, state: Sequence[WaitingState]) -> None:
+    def load_state(self, state: Sequence[ProvisionalState]) -> None:
         """Resume from what `state` returned."""
         for each in state:
             shapes = map(Shape, each.postures, each.movements)
             known = dict(zip(each.numbers.tolist(), shapes, strict=True))
             self.join(each.person, each.primitive, known)
 
-    def _keep(self, each: Waiting, numbers: Collection[int]) -> None:
+    def _keep(self, each: ProvisionalLeaf, numbers: Collection[int]) -> None:
         each.shapes = {n: shape for n, shape in each.shapes.items() if n in numbers}
         if each.shapes:
             self._table.put(each.slot, mean_shape(list(each.shapes.values())))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from mplearn.errors import InvalidValueError
 from mplearn.people import PeopleConfig
-from mplearn.people.links import Known, agglomerate, solve, tension, unit_of
+from mplearn.people.matching import Known, agglomerate, solve, tension, unit_of
 from mplearn.people.offsets import offsets_of
 from mplearn.people.shape_table import ShapeTable
 from mplearn.people.shapes import Shape, mirrored, shape_of

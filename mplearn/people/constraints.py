@@ -1,4 +1,4 @@
-"""What a person said of leaves: that they are one motion, or different ones."""
+"""What a person said of leaves: must-link and cannot-link constraints [Wagstaff2001]."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ Pair = tuple[Key, Key]
 
 
 @dataclass(frozen=True, eq=False)
-class PinsState(State):
+class ConstraintsState(State):
     """Pairs of leaves that a person said are one motion, and pairs that are not."""
 
     together: tuple[tuple[tuple[Count, Count], tuple[Count, Count]], ...]
     apart: tuple[tuple[tuple[Count, Count], tuple[Count, Count]], ...]
 
 
-class Pins:
+class Constraints:
     """Pairs of leaves that are, or are not, one motion; the rules respect them.
 
     The latest word counts.
@@ -32,13 +32,13 @@ class Pins:
         self._together: set[Pair] = set()
         self._apart: set[Pair] = set()
 
-    def join(self, keys: Iterable[Key]) -> None:
+    def must_link(self, keys: Iterable[Key]) -> None:
         """Note that some leaves are one motion."""
         pairs = _pairs(keys)
         self._together |= pairs
         self._apart -= pairs
 
-    def part(self, sides: Sequence[Iterable[Key]]) -> None:
+    def cannot_link(self, sides: Sequence[Iterable[Key]]) -> None:
         """Note that leaves on different sides are different motions."""
         groups = [list(side) for side in sides]
         pairs = _pairs(key for side in groups for key in side)
@@ -67,26 +67,26 @@ class Pins:
                 matrix[i, j] = matrix[j, i] = True
         return together, apart
 
-    def renamed(self, new_key: Mapping[Key, Key]) -> Pins:
+    def renamed(self, new_key: Mapping[Key, Key]) -> Constraints:
         """Return the same of leaves that have other names."""
-        pins = Pins()
+        constraints = Constraints()
         for name in ("_together", "_apart"):
             pairs = {_pair(new_key[one], new_key[two]) for one, two in getattr(self, name)}
-            setattr(pins, name, {pair for pair in pairs if pair[0] != pair[1]})
-        return pins
+            setattr(constraints, name, {pair for pair in pairs if pair[0] != pair[1]})
+        return constraints
 
-    def merged(self, other: Pins) -> Pins:
+    def merged(self, other: Constraints) -> Constraints:
         """Return what was said here and there; where that differs, leaves are together."""
-        pins = Pins()
-        pins._together = self._together | other._together
-        pins._apart = (self._apart | other._apart) - pins._together
-        return pins
+        constraints = Constraints()
+        constraints._together = self._together | other._together
+        constraints._apart = (self._apart | other._apart) - constraints._together
+        return constraints
 
-    def state(self) -> PinsState:
+    def state(self) -> ConstraintsState:
         """Return everything that was said."""
-        return PinsState(tuple(sorted(self._together)), tuple(sorted(self._apart)))
+        return ConstraintsState(tuple(sorted(self._together)), tuple(sorted(self._apart)))
 
-    def load_state(self, state: PinsState) -> None:
+    def load_state(self, state: ConstraintsState) -> None:
         """Resume from what `state` returned."""
         self._together = {_pair(*pair) for pair in state.together}
         self._apart = {_pair(*pair) for pair in state.apart}

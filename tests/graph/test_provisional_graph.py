@@ -6,7 +6,7 @@ from graph_examples import learned, sequences
 from hypothesis import given
 
 from mplearn.errors import InvalidValueError
-from mplearn.graph import Extension, TransitionGraph
+from mplearn.graph import ProvisionalGraph, TransitionGraph
 
 
 def by_id(predictions):
@@ -18,7 +18,7 @@ def test_two_parts_foretell_as_their_sum(inside, beside):
     graph = learned(inside)
     whole = graph.copy()
     whole.add(learned(beside))
-    extension = Extension(graph)
+    extension = ProvisionalGraph(graph)
     for id in sorted(set(beside)):
         extension.add_node(id)
     for t in range(1, len(beside)):
@@ -34,10 +34,10 @@ def test_two_parts_foretell_as_their_sum(inside, beside):
 
 def test_nothing_beside_changes_nothing():
     graph = learned([0, 1, 2, 0, 1, 2, 0, 2])
-    assert Extension(graph).predict([1, 2], 3) == graph.predict([1, 2], 3)
-    assert Extension(TransitionGraph()).predict([], 3) == ()
+    assert ProvisionalGraph(graph).predict([1, 2], 3) == graph.predict([1, 2], 3)
+    assert ProvisionalGraph(TransitionGraph()).predict([], 3) == ()
     with pytest.raises(InvalidValueError, match="k must be at least 1"):
-        Extension(graph).predict([], 0)
+        ProvisionalGraph(graph).predict([], 0)
 
 
 def test_times_are_those_of_the_part_that_saw_the_transition():
@@ -45,7 +45,7 @@ def test_times_are_those_of_the_part_that_saw_the_transition():
     for id in (0, 1):
         graph.add_node(id)
     graph.observe(0, 1, 0.6)
-    extension = Extension(graph)
+    extension = ProvisionalGraph(graph)
     extension.observe(0, 7, 2.0)
     extension.observe(7, 0, 3.0)
     times = {id: each.duration_s for id, each in by_id(extension.predict([0], 9)).items()}

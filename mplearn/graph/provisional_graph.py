@@ -11,7 +11,7 @@ from .prediction import History, Prediction, backed_off, most_likely, usable_con
 from .transition_graph import TransitionGraph
 
 
-class Extension:
+class ProvisionalGraph:
     """A graph, and beside it transitions of what is no primitive yet; the graph stays as it is.
 
     Args:
