@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import ModelError
 from ..recording import FloatArray, IntArray
 from . import kernels
+from .model import LeftRightHMM
 from .sequences import SequenceBatch
-
-if TYPE_CHECKING:
-    from .model import LeftRightHMM
 
 # multiply-adds from which on waking the other cores is worth its cost
 _WORTH_THREADS = 20_000_000

@@ -21,7 +21,7 @@ from mplearn.hmm import (
     fit_factorial,
     needs_more_chains,
 )
-from mplearn.hmm.factorial_posterior import variational_moments
+from mplearn.hmm.factorial.posterior import variational_moments
 
 
 def random_model(rng, sizes=(2, 3), n_channels=2):

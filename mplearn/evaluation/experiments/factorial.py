@@ -9,7 +9,7 @@ import numpy as np
 
 from ...body import view_of
 from ...hmm import MotionModel, distance, fit, fit_factorial, needs_more_chains
-from ...hmm.factorial_fit import margins
+from ...hmm.factorial.fit import margins
 from ...recording import FloatArray, Recording
 from ..executions import split_repetitions
 from ..observing import observe

@@ -11,12 +11,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ..errors import ModelError
-from ..recording import FloatArray, IntArray
-from .factorial_posterior import Moments, exact_moments, variational_moments
-from .model import LeftRightHMM
+from ...errors import ModelError
+from ...recording import FloatArray, IntArray
+from ..model import LeftRightHMM
+from ..sequences import as_frames, as_weights
+from .posterior import Moments, exact_moments, variational_moments
 from .product_chain import ProductChain
-from .sequences import as_frames, as_weights
 
 MOST_COMBINATIONS = 1024  # up to here the E-step is exact
 _SHORTEST_STAY = 1.05  # frames: a state is never left for certain, or staying were impossible

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from ..recording import FloatArray, IntArray
-from .kernels import log_add
+from ...recording import FloatArray, IntArray
+from ..kernels import log_add
 
 
 class ProductChain(NamedTuple):

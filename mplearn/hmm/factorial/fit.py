@@ -10,15 +10,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..errors import InvalidValueError, ModelError
-from ..recording import FloatArray
-from .factorial import FactorialHMM
-from .factorial_posterior import Moments
-from .fit import fit
-from .model import LeftRightHMM
-from .motion_model import MotionModel
-from .parameters import as_floor
-from .sequences import as_frames, as_weights
+from ...errors import InvalidValueError, ModelError
+from ...recording import FloatArray
+from ..fit import fit
+from ..model import LeftRightHMM
+from ..motion_model import MotionModel
+from ..parameters import as_floor
+from ..sequences import as_frames, as_weights
+from .model import FactorialHMM
+from .posterior import Moments
 
 
 def fit_factorial(

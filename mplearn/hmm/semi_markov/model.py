@@ -12,16 +12,16 @@ from functools import cached_property
 
 import numpy as np
 
-from ..errors import InvalidValueError, ModelError
-from ..recording import FloatArray
-from . import semi_markov_kernels as kernels
-from .em import maximise_gaussians
-from .fit import fit
-from .kernels import log_densities, log_norms
-from .model import checked_gaussians
-from .motion_model import held
-from .parameters import as_floor
-from .sequences import SequenceBatch, as_frames, as_weights
+from ...errors import InvalidValueError, ModelError
+from ...recording import FloatArray
+from ..em import maximise_gaussians
+from ..fit import fit
+from ..kernels import log_densities, log_norms
+from ..model import checked_gaussians
+from ..motion_model import held
+from ..parameters import as_floor
+from ..sequences import SequenceBatch, as_frames, as_weights
+from . import kernels as kernels
 
 LEAST_SPREAD = 0.7  # frames: below it a normal distribution over whole frames has other moments
 

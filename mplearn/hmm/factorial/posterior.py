@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..recording import FloatArray
-from . import kernels, product_chain
-from .model import LeftRightHMM
+from ...recording import FloatArray
+from .. import kernels
+from ..model import LeftRightHMM
+from . import product_chain
 from .product_chain import ProductChain
 
 SWEEPS = 50

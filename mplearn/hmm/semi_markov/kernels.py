@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from ..recording import FloatArray
-from .em import accumulate
-from .kernels import log_densities, log_norms
+from ...recording import FloatArray
+from ..em import accumulate
+from ..kernels import log_densities, log_norms
 
 
 @njit(cache=True)

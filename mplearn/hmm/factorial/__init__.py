@@ -1,0 +1,1 @@
+"""Factorial HMMs: several left-right chains whose outputs add up [Kulic2008b]."""

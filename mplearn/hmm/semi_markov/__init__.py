@@ -1,0 +1,1 @@
+"""Hidden semi-Markov models: left-right chains with explicit state durations."""
