@@ -247,6 +247,19 @@ class Chain:
         p_value = float(self.graph.p_values(sequence)[-1])
         return [Anomaly(seen.segment, "order", score, p_value)] if p_value <= false_alarms else []
 
+    def successions(self) -> list[tuple[SeenSegment, SeenSegment, float]]:
+        """Return the latest segments that followed each other, as far as they are remembered.
+
+        Returns:
+            The earlier segment, the later one, and the time from the start of the one to that of
+            the other [s], as transitions are counted.
+        """
+        return [
+            (one, other, step_s(self._segments, i, self.rate_hz))
+            for i, (one, other) in enumerate(pairwise(self._segments), start=1)
+            if other.follows
+        ]
+
     # ---- learners that are merged
 
     def append(self, other: Chain, n_segments: int, n_frames: int) -> None:

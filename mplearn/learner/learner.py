@@ -43,6 +43,7 @@ from .events import (
 )
 from .foresight import NextMotion
 from .learner_state import FILES, LearnerState
+from .shown_once import with_shown_once
 from .snapshot import Snapshots
 from .watching import Watching
 
@@ -253,9 +254,18 @@ class MotionLearner:
         """
         return self.chain.foresee(k)
 
-    def snapshot(self) -> PrimitiveLibrary:
-        """Return what is known now, frozen."""
-        return self._snapshots.take(self.tree, self.graph)
+    def snapshot(self, *, shown_once: bool = False) -> PrimitiveLibrary:
+        """Return what is known now, frozen.
+
+        Args:
+            shown_once: Whether the library holds motions, too, that are no primitives as yet, such
+                as were shown once: each as one that has a single exemplar, to be performed. Nothing
+                is ever recognised as such.
+        """
+        library = self._snapshots.take(self.tree, self.graph)
+        return (
+            with_shown_once(library, self.tree, self.chain, self._view) if shown_once else library
+        )
 
     def state(self) -> LearnerState:
         """Return all that the learner knows: `from_state` resumes bit for bit.

@@ -58,15 +58,17 @@ class Snapshots:
             if (made.n_exemplars, made.mean_duration_s, made.parent) == now:
                 return seen, made
         view = self._view
-        hmm = LeftRightHMM(
-            view.read(seen.means), view.read_variances(seen.variances), seen.log_stay
-        )
         return seen, Primitive.from_exemplars(
             node.id,
-            hmm,
+            read_model(view, seen),
             [view.read(frames) for frames in tree.exemplars(node.id)],
             self._rate_hz,
             n_exemplars=node.n_placed,
             mean_duration_s=mean_duration_s,
             parent=node.parent,
         )
+
+
+def read_model(view: View, seen: LeftRightHMM) -> LeftRightHMM:
+    """Return the model of frames that were seen so."""
+    return LeftRightHMM(view.read(seen.means), view.read_variances(seen.variances), seen.log_stay)

@@ -202,6 +202,19 @@ class PeopleTree:
         best = max(found, key=lambda each: (each.times, -each.apart))
         return best._replace(n_waiting=sum(each.n_waiting for each in found))
 
+    def unplaced(self) -> dict[int, tuple[FloatArray, LeftRightHMM]]:
+        """Return the segments that are in no primitive, shape (L, D), and a model of each.
+
+        They are what was shown once, or not yet often enough, by number; the latest are kept.
+        """
+        numbers, joined = self._primitives.numbers, self._primitives.joined
+        found = {
+            numbers[person][number] if numbers else number: segment
+            for person, tree in self._trees.items()
+            for number, segment in tree.unplaced().items()
+        }
+        return {number: found[number] for number in sorted(found) if number not in joined}
+
     def is_provisional(self, id: int) -> bool:
         """Return whether too few demonstrations have confirmed a primitive as yet.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from operator import is_not
 from typing import Protocol
 
@@ -31,6 +31,14 @@ class Primitives(Protocol):
     @property
     def nodes(self) -> tuple[Node, ...]:
         """All nodes, the root first."""
+
+    @property
+    def numbers(self) -> Mapping[int, Mapping[int, int]]:
+        """Number here of each segment of a person's tree, by person; empty if they are the same."""
+
+    @property
+    def joined(self) -> Collection[int]:
+        """Numbers of the segments in no leaf of their person that are in others' primitives."""
 
     def node(self, id: int) -> Node:
         """Return a node."""
@@ -93,6 +101,16 @@ class OnePersonsPrimitives:
     def nodes(self) -> tuple[Node, ...]:
         """All nodes of the tree, the root first."""
         return self.tree.nodes
+
+    @property
+    def numbers(self) -> Mapping[int, Mapping[int, int]]:
+        """Nothing: segments have the numbers of the tree."""
+        return {}
+
+    @property
+    def joined(self) -> Collection[int]:
+        """Nothing: there are no others."""
+        return ()
 
     def node(self, id: int) -> Node:
         """Return a node of the tree."""
@@ -180,6 +198,16 @@ class SharedPrimitives:
     def nodes(self) -> tuple[Node, ...]:
         """All nodes, the root first: primitives, and below them a leaf for each person."""
         return self.sharing.nodes
+
+    @property
+    def numbers(self) -> Mapping[int, Mapping[int, int]]:
+        """Number here of each segment of a person's tree, by person."""
+        return self.sharing.numbers
+
+    @property
+    def joined(self) -> Collection[int]:
+        """Numbers of the segments that are in another person's primitive."""
+        return self.sharing.provisional.homes()
 
     def node(self, id: int) -> Node:
         """Return a node.

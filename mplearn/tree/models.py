@@ -47,6 +47,10 @@ class GroupModels:
             self._kept[key] = self._apart(*key) if neighbour else self._single(key[0])
         return self._kept[key]
 
+    def of_segment(self, number: int) -> LeftRightHMM:
+        """Return the model of one segment by itself."""
+        return self._single((number,))
+
     def forget(self) -> None:
         """Let the models of nodes that are gone, or have changed, go."""
         held = {tuple(node.members) for node in self._structure.nodes.values()}

@@ -246,6 +246,16 @@ class PrimitiveTree:
         """Return what comes nearest to a primitive among the segments that wait to become one."""
         return most_repeated(self._structure.root.matrix, self._memory.scale())
 
+    def unplaced(self) -> dict[int, tuple[FloatArray, LeftRightHMM]]:
+        """Return the segments that wait to become part of a primitive, and a model of each.
+
+        Returns:
+            The segment as it came, shape (L, D), and the model of it alone, by its number.
+        """
+        root, frames = self._structure.root, self._memory.frames
+        waiting = [number for number in root.members if number not in root.settled]
+        return {number: (frames[number], self._models.of_segment(number)) for number in waiting}
+
     def is_provisional(self, id: int) -> bool:
         """Return whether too few demonstrations have confirmed a primitive as yet.
 

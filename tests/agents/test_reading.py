@@ -145,3 +145,19 @@ def test_takes_are_joined_by_name() -> None:
             assert np.array_equal(after.markers[:, "ABC".index(name)], before.markers[:, at])
     plain = [Recording(np.ones((3, 2)), 50.0, names) for names in (("p", "q"), ("q", "p"))]
     assert join_by_name(plain).recordings[1].channels == ("p", "q")
+
+
+def test_what_was_shown_once_is_kept_to_be_performed_and_said(
+    motion: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "library.mplearn"
+    take = write(tmp_path / "take.csv", motion)
+    assert main(["learn", str(take), "--out", str(out)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "0 primitives from 1 takes" in said and "Why:" in said
+    assert "2 motions that were shown once are in the library" in said
+    assert [each.n_exemplars for each in PrimitiveLibrary.load(out).primitives] == [1, 1]
+    assert main(["perform", str(out), "--steps", "2", "--dynamics", "kinematic"]) == 0
+    assert "2 primitives" in capsys.readouterr().out
+    assert main(["learn", str(take), "--out", str(out), "--demonstrations", "0"]) == 2
+    assert "--demonstrations must be at least 1, not 0" in capsys.readouterr().err

@@ -46,7 +46,7 @@ def learned(*recordings: Recording) -> MotionLearner:
 
 def primitives(learner: MotionLearner, start: int, end: int) -> list[tuple[int, int, int | None]]:
     """Segments of a stretch of frames, from its start, and what they are known as in the end."""
-    links = [link for block in learner.chain.state().links for link in block.links()]
+    links = [seen for block in learner.chain.state().segments for seen in block.segments()]
     return [
         (link.segment.start - start, link.segment.end - start, link.primitive)
         for link in links

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mplearn.errors import MPLearnError, RecordingError
+from mplearn.errors import InvalidValueError, MPLearnError, RecordingError
 from mplearn_agents.reading import (
     add_reading_arguments,
     hints_of,
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from mplearn.learner import MotionLearner
     from mplearn.recording import Recording
+    from mplearn.tree import TreeConfig
     from mplearn_agents.learning import LearningLog
 
 _SAME_RATE = 1e-3  # rates that differ by a smaller share are one
@@ -46,6 +47,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "positions of markers and joints, or the file's own channels (a skeleton's joint angles)",
     )
     parser.add_argument("--segmenter", help="how the stream is cut (default: the learner's own)")
+    parser.add_argument(
+        "--demonstrations",
+        type=int,
+        metavar="N",
+        help="how often a motion must be shown to be known (default: 2); with 1, what was shown "
+        "once is kept as well, to be performed, not to be recognised. Where nothing was shown "
+        "twice, that is the default",
+    )
     parser.add_argument(
         "--person", action="append", help="learn from this person's takes only; may be repeated"
     )
@@ -81,28 +90,45 @@ def run(args: argparse.Namespace) -> None:
     )
     if args.segmenter:
         config = replace(config, segmenter=args.segmenter)
+    if args.demonstrations is not None:
+        config = replace(config, tree=_shown_so_often(config.tree, args.demonstrations))
     learner = MotionLearner(config)
     log = learn(learner, recordings, console, strict=args.strict)
     for name, error in log.refused.items():
         say_left_out(console, name, error)
-    library = learner.snapshot()
+    library = learner.snapshot(shown_once=args.demonstrations == 1)
+    n_known = len(learner.tree.leaves)
+    if not len(library):
+        library = learner.snapshot(shown_once=True)
     args.out.parent.mkdir(parents=True, exist_ok=True)
     library.save(args.out)
     console.print(primitive_table(library))
     console.print(
-        f"{len(library)} primitives from {_takes_of(recordings, log)}, "
+        f"{n_known} primitives from {_takes_of(recordings, log)}, "
         f"{log.watched_s / 60:.1f} minutes of motion in {len(log.moving)} segments, "
         f"{log.times_real_time:.0f} x real time; written to {printable(str(args.out))}",
         markup=False,
     )
-    if not len(library):
+    if not n_known:
         console.print(why_nothing(learner, log))
+    if len(library) > n_known:
+        console.print(
+            f"{len(library) - n_known} motions that were shown once are in the library as they "
+            "came, named once-...: they can be performed, and are recognised as nothing."
+        )
     if log.lost:
         console.print(
             f"{log.n_lost / first.rate_hz:.1f} s in {len(log.lost)} stretches were left out: "
             f"{log.reasons}",
             markup=False,
         )
+
+
+def _shown_so_often(rules: TreeConfig, demonstrations: int) -> TreeConfig:
+    """Return the rules by which a motion must be shown so often to be a primitive."""
+    if demonstrations < 1:
+        raise InvalidValueError(f"--demonstrations must be at least 1, not {demonstrations}")
+    return replace(rules, min_exemplars=demonstrations) if demonstrations > 1 else rules
 
 
 def _takes_of(recordings: tuple[Recording, ...], log: LearningLog) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
 HELP = "Let the robot walk the graph of a library, or do a task."
 _GOAL = "path"
+_CUT_OFF = {"overshoot": math.inf, "slowest": 0.05}  # what is shown where not all can be
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,6 +41,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, help="seed of the walk (default: 0)")
     parser.add_argument(
         "--speed", type=float, default=0.5, help="share of the human's speed (default: 0.5)"
+    )
+    parser.add_argument(
+        "--upper-body",
+        action="store_true",
+        help="show only arms, head and the trunk's turn, standing: the default where the robot can "
+        "perform none of the motions whole",
     )
     parser.add_argument("--robot", default="humanoid", help="humanoid (default) or unitree_g1")
     parser.add_argument("--video", type=Path, metavar="FILE.mp4", help="write a film of it")
@@ -76,15 +84,25 @@ def run(args: argparse.Namespace) -> None:
     trained = TrainingConfig(task="free")
     if args.agent is not None:
         trained, *_ = TrainingConfig.load(args.agent / CONFIG)
-    env = gymnasium.make(
-        "mplearn/PrimitiveHumanoid-v0",
-        library=args.library or trained.library,
-        task=args.task or trained.task,
-        dynamics=args.dynamics,
-        motion={"speed": args.speed},
-        robot=make_robot(args.robot),
-        disable_env_checker=True,
-    )
+    options: dict[str, Any] = {
+        "library": args.library or trained.library,
+        "task": args.task or trained.task,
+        "dynamics": args.dynamics,
+        "robot": make_robot(args.robot),
+        "disable_env_checker": True,
+    }
+    name = "mplearn/PrimitiveHumanoid-v0"
+    whole: dict[str, Any] = {"speed": args.speed}
+    standing = whole | {"upper_body": True, "feasibility": _CUT_OFF}
+    env = gymnasium.make(name, motion=standing if args.upper_body else whole, **options)
+    repertoire = env.unwrapped.repertoire  # type: ignore[attr-defined]
+    if not args.upper_body and not repertoire.any_feasible:
+        problem = repertoire.skills.feasibility(repertoire.ids[0]).problems[0]
+        print(
+            f"the robot can perform none of the {len(repertoire.ids)} motions whole ({problem}): "
+            "it stands, and shows arms, head and the trunk's turn"
+        )
+        env = gymnasium.make(name, motion=standing, **options)
     policy = _policy(args, env)
     record = args.video is not None
     result = walk(env, policy, args.steps, args.seed, episodes=args.episodes, record=record)

@@ -118,10 +118,12 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
     def _made_repertoire(self) -> Repertoire:
         library, motion = self.source.now(), self.motion
         what = (self.actions.capacity, motion.speed, motion.style, motion.feasibility)
-        novel = self.actions.novel_penalty is not None
+        upper_body, novel = motion.upper_body, self.actions.novel_penalty is not None
         if self.source.live:
-            return Repertoire(library, self.robot, *what, novel=novel, growing=True)
-        return shared_repertoire(library, self.robot, *what, novel)
+            return Repertoire(
+                library, self.robot, *what, upper_body=upper_body, novel=novel, growing=True
+            )
+        return shared_repertoire(library, self.robot, *what, upper_body, novel)
 
     @cached_property
     def performer(self) -> Performer:

@@ -55,13 +55,17 @@ class MotionOptions(Options):
         speed: Speed of performance as a share of the human's. The paper's robot moved at 0.5.
         style: How motions are generated from primitives, see `mplearn.generation`.
         feasibility: What the robot is allowed.
+        upper_body: Whether only arms, head and the trunk's turn are performed, by a robot that
+            stands: for motions whose legs it cannot follow.
     """
 
     speed: float = 0.5
     style: StyleName = "deterministic"
     feasibility: FeasibilityConfig = field(default_factory=FeasibilityConfig)
+    upper_body: bool = False
 
     def __post_init__(self) -> None:
+        require_one_of("upper_body", self.upper_body, (False, True))
         require_number("speed", self.speed, 1e-6, 1e6, "positive and finite")
         require_one_of("style", self.style, tuple(STYLES))
         given: object = self.feasibility

@@ -39,6 +39,7 @@ class Repertoire:
         speed: Speed of performance, as a share of the human's.
         style: How motions are generated from primitives.
         limits: What counts as feasible.
+        upper_body: Whether only the upper body performs, see `Skills`.
         novel: Whether transitions are allowed that were never observed.
         growing: Whether the library will be replaced by `update`; it may be empty then.
 
@@ -63,6 +64,7 @@ class Repertoire:
         style: StyleName = "deterministic",
         limits: FeasibilityConfig | None = None,
         *,
+        upper_body: bool = False,
         novel: bool = False,
         growing: bool = False,
     ) -> None:
@@ -70,7 +72,7 @@ class Repertoire:
             raise LibraryError("the library is empty: there is nothing to perform")
         self._slots = Slots(capacity, len(library))
         self._slots.require_room(len(library))
-        self.skills = Skills(library, robot, speed, style, limits)
+        self.skills = Skills(library, robot, speed, style, limits, upper_body=upper_body)
         self.capacity = self._slots.capacity
         self.novel = novel
         self.growing = growing
@@ -127,6 +129,11 @@ class Repertoire:
     def feasible_ids(self) -> tuple[int, ...]:
         """Ids of the primitives that the robot can perform; judges them all."""
         return tuple(id for id in self.ids if self.skills.feasibility(id).feasible)
+
+    @property
+    def any_feasible(self) -> bool:
+        """Whether there is a primitive that the robot can perform; judges no more than it must."""
+        return any(self.skills.feasibility(id).feasible for id in self.ids)
 
     def after(self, id: int) -> Choices:
         """Return what may follow a primitive: observed transitions that are feasible, and hold."""
@@ -238,15 +245,17 @@ def shared_repertoire(
     speed: float,
     style: StyleName,
     limits: FeasibilityConfig | None,
+    upper_body: bool,
     novel: bool,
 ) -> Repertoire:
     """Return the repertoire of a library that will not change; arguments as `Repertoire`'s.
 
     All environments of a process that ask for the same get the same.
     """
-    key = (library.version, robot, capacity, speed, style, limits, novel)
+    key = (library.version, robot, capacity, speed, style, limits, upper_body, novel)
     found = _SHARED.get(key)
     if found is None:
-        found = Repertoire(library, robot, capacity, speed, style, limits, novel=novel)
+        what = (library, robot, capacity, speed, style, limits)
+        found = Repertoire(*what, upper_body=upper_body, novel=novel)
         _SHARED[key] = found
     return found

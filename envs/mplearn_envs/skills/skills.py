@@ -13,7 +13,7 @@ from mplearn.errors import InvalidValueError, LibraryError, RobotError
 from mplearn.generation import StyleName, Trajectory
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import FloatArray
-from mplearn_envs.mechanics.reference import Reference, rest_reference
+from mplearn_envs.mechanics.reference import N_BASE, Reference, rest_reference
 from mplearn_envs.planning import Motion, Plan, Planner
 from mplearn_envs.robot import Retargeting, Robot
 
@@ -54,6 +54,8 @@ class Skills:
         speed: Speed of performance, as a share of the human's.
         style: How motions are generated from primitives.
         limits: What counts as feasible.
+        upper_body: Whether only arms, head and the trunk's turn are performed, by a robot that
+            stands: for motions whose legs it cannot follow.
 
     Attributes:
         library: The primitives, as `take` had them last.
@@ -71,6 +73,8 @@ class Skills:
         speed: float = 0.5,
         style: StyleName = "deterministic",
         limits: FeasibilityConfig | None = None,
+        *,
+        upper_body: bool = False,
     ) -> None:
         if not (np.isfinite(speed) and speed > 0):
             raise InvalidValueError(f"speed must be positive and finite, not {speed}")
@@ -78,6 +82,7 @@ class Skills:
         self.speed = float(speed)
         self.style = style
         self.limits = limits
+        self.upper_body = upper_body
         self.lock = RLock()
         self._version: dict[int, int] = {}
         self.forget()
@@ -133,6 +138,8 @@ class Skills:
     def _renew(self, id: int) -> None:
         generated = self.library.generate([id], style=self.style)
         frames = self.frames_of(generated)
+        if self.upper_body:
+            frames = self._standing(frames)
         if len(frames) == 1:
             frames = np.repeat(frames, 2, axis=0)
         known = self._known.get(id)
@@ -143,6 +150,14 @@ class Skills:
         ):
             version = self._version[id] = self._version.get(id, 0) + 1
             self._known[id] = Skill(frames, self.planner.motion(frames, generated.rate_hz), version)
+
+    def _standing(self, frames: FloatArray) -> FloatArray:
+        """Return frames, shape (T, 3 + n), in which base and legs are as the robot stands."""
+        frames, base = frames.copy(), self._rest.target[:N_BASE]
+        frames[:, :N_BASE] = base
+        legs = self.robot.leg_joints
+        frames[:, N_BASE + legs] = self._rest.q[7 + legs]
+        return frames
 
     def feasibility(self, id: int) -> Feasibility:
         """Return whether the robot can perform a primitive; judged once."""
