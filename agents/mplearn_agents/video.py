@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mplearn.errors import InvalidValueError
-
-from .extras import require
+from mplearn.extras import require
 
 
 def write_video(path: str | Path, frames: Iterable[NDArray[np.uint8]], rate_hz: float) -> int:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mplearn.errors import InvalidValueError, MissingDependencyError
-from mplearn_agents.extras import require
+from mplearn.extras import require
 from mplearn_agents.video import write_video
 
 ffmpeg = pytest.importorskip("imageio_ffmpeg")

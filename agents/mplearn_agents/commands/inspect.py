@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> None:
 
 
 def _draw(args: argparse.Namespace, found: list[Inspection], console: Console) -> None:
-    from mplearn_agents.extras import require
+    from mplearn.extras import require
 
     if args.no_picture:
         return

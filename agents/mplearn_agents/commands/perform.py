@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Walk, print each step, and write the film where one is asked for."""
-    from mplearn_agents.extras import require
+    from mplearn.extras import require
     from mplearn_envs.rendering.backend import choose_backend
 
     if (args.policy == _GOAL) != (args.goal is not None):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mplearn_agents.extras import require
+from mplearn.extras import require
 from mplearn_agents.film import accompany, film, middle_pictures, with_captions
 from mplearn_agents.policies import RandomWalk
 from mplearn_agents.report.figures import data_uri

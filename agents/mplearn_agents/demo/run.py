@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mplearn.errors import InvalidValueError
-from mplearn_agents.extras import require
+from mplearn.extras import require
 from mplearn_agents.learning import learn
 from mplearn_agents.report import render_page
 from mplearn_envs.rendering.backend import choose_backend

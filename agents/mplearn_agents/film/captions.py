@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mplearn_agents.extras import require
+from mplearn.extras import require
 
 
 def captioned(picture: NDArray[np.uint8], text: str, note: str = "") -> NDArray[np.uint8]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import Literal
 
-from mplearn_agents.extras import require
+from mplearn.extras import require
 
 
 @dataclass(frozen=True)

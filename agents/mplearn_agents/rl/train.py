@@ -17,7 +17,7 @@ import gymnasium
 import numpy as np
 
 from mplearn.errors import InvalidValueError
-from mplearn_agents.extras import require
+from mplearn.extras import require
 
 from .config import TrainingConfig
 from .encoding import measure_scaling

@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 
 from mplearn.errors import InvalidValueError
-from mplearn_agents.extras import require
+from mplearn.extras import require
 from mplearn_agents.policies import Policy, legal_actions
 from mplearn_envs.skills.repertoire import ENTRY_GAP
 

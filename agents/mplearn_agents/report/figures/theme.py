@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mplearn_agents.extras import require
+from mplearn.extras import require
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

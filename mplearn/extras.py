@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from types import ModuleType
 
-from mplearn.errors import MissingDependencyError
+from .errors import MissingDependencyError
 
 
 def require(module: str, extra: str) -> ModuleType:
