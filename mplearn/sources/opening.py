@@ -7,12 +7,17 @@ from typing import Any
 
 from ..mocap import Hints
 from .played import play_demonstrator, play_recording
+from .protocols.lsl import open_lsl
+from .protocols.own import open_ndjson, open_udp
 from .recognised import RecognisedSource
 from .registry import Observe, Wanted, connect, register_source
 from .source import Source
 
 register_source("recording", play_recording)
 register_source("demonstrator", play_demonstrator)
+register_source("lsl", open_lsl)
+register_source("ndjson", open_ndjson)
+register_source("udp", open_udp)
 
 
 def open_source(

@@ -52,7 +52,7 @@ def play_recording(
         subject=recording.person,
         recording=recording,
     )
-    return PlayedSource(stream, [recording.frames], speed)
+    return PlayedSource(stream, [recording.frames], speed, f"recording:{address}")
 
 
 def play_demonstrator(
@@ -74,7 +74,7 @@ def play_demonstrator(
     demonstrator = Demonstrator(seed=int(address or 0), rate_hz=rate_hz)
     stream = Stream(demonstrator.channels, rate_hz, unit_m=1.0, up="z")
     blocks = (b.markers.reshape(len(b.markers), -1) for b in demonstrator.blocks())
-    return PlayedSource(stream, blocks, speed)
+    return PlayedSource(stream, blocks, speed, f"demonstrator:{demonstrator.seed}")
 
 
 class PlayedSource(Source):
@@ -84,16 +84,22 @@ class PlayedSource(Source):
         stream: What they are.
         pieces: The frames, in pieces of shape (T, D); taken when they are needed.
         speed: Times as fast as the stream's rate; ``inf`` for as fast as they are read.
+        name: What it was opened by.
 
     Raises:
         InvalidValueError: The speed is not positive.
     """
 
-    def __init__(self, stream: Stream, pieces: Iterable[FloatArray], speed: float = 1.0) -> None:
+    def __init__(
+        self,
+        stream: Stream,
+        pieces: Iterable[FloatArray],
+        speed: float = 1.0,
+        name: str = "played:",
+    ) -> None:
         if not speed > 0:
             raise InvalidValueError(f"speed must be positive, not {speed}")
-        self.name = "played"
-        self.tally = Tally()
+        self.name, self.tally = name, Tally()
         self._stream = stream
         self._pieces = iter(pieces)
         self._left = np.empty((0, len(stream.channels)))

@@ -90,9 +90,7 @@ def connect(name: str, wanted: Wanted | None = None, **options: Any) -> Source:
                 f"the source {kind!r} has no option {option!r}; it has "
                 f"{', '.join(allowed) or 'none'}"
             )
-    source = factory(address, wanted or Wanted(), **options)
-    source.name = name
-    return source
+    return factory(address, wanted or Wanted(), **options)
 
 
 @cache

@@ -124,7 +124,7 @@ def test_what_cannot_be_opened_is_refused(name: str, options: dict, message: str
 def test_a_source_of_a_users_own() -> None:
     def mine(address: str, wanted: object, *, n: int = 3) -> Source:
         """Numbers of mine."""
-        return PlayedSource(Stream((address,), 50.0), [np.ones((n, 1))], FAST)
+        return PlayedSource(Stream((address,), 50.0), [np.ones((n, 1))], FAST, f"mine:{address}")
 
     register_source("mine", mine)
     with open_source("mine:a", n=4) as source:

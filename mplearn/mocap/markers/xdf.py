@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -40,7 +42,7 @@ class XDFReader(Reader):
         streams, cut = parse_xdf(path, read_bytes(path))
         if cut:
             findings.warn("the file is cut off; what is there is read")
-        found = [(_markers(stream), stream) for stream in streams if stream.times]
+        found = [(described_markers(s.info, s.n_channels), s) for s in streams if s.times]
         found = sorted(((m, s) for m, s in found if m), key=lambda pair: -len(pair[0]))
         if not found:
             raise bad_file(
@@ -59,7 +61,8 @@ class XDFReader(Reader):
         points = values.reshape(len(values), -1, 3)
         seen = (~np.isnan(points).any(axis=2)).sum(axis=0)
         kept, names = chosen_names(path, list(markers), seen, findings)
-        space = _space(stream, columns)
+        unit = described_unit(stream.info, stream.n_channels, columns)
+        space = Space(unit or 1.0, says_unit=unit is not None)
         at = placed(path, points[:, kept], names, rate_hz, space, hints, findings)
         return Recording(
             at.points.reshape(len(points), -1),
@@ -70,16 +73,17 @@ class XDFReader(Reader):
         )
 
 
-def _channel_texts(stream: Stream, field: str) -> list[str]:
-    channels = stream.info.findall("desc/channels/channel")[: stream.n_channels]
-    texts = [channel.findtext(field, "").strip() for channel in channels]
-    return texts + [""] * (stream.n_channels - len(texts))
+def described_markers(
+    info: ElementTree.Element, n_channels: int
+) -> dict[str, tuple[int, int, int]]:
+    """Return the markers of a stream by name, each with its channels x, y, z.
 
-
-def _markers(stream: Stream) -> dict[str, tuple[int, int, int]]:
-    """Return the markers of a stream by name, each with its channels x, y, z."""
+    Args:
+        info: The stream's description, as the lab streaming layer has it.
+        n_channels: How many values a sample has.
+    """
     names = []
-    fields = (_channel_texts(stream, field) for field in ("label", "marker", "object", "type"))
+    fields = (_texts(info, n_channels, each) for each in ("label", "marker", "object", "type"))
     for i, (label, marker, thing, kind) in enumerate(zip(*fields, strict=True)):
         axis = _POSITION.fullmatch(kind)
         if axis is None:
@@ -89,10 +93,19 @@ def _markers(stream: Stream) -> dict[str, tuple[int, int, int]]:
     return meaning_of(names).markers
 
 
-def _space(stream: Stream, columns: list[int]) -> Space:
-    units = {_channel_texts(stream, "unit")[i] for i in columns} - {""}
-    unit = named_unit(units.pop()) if len(units) == 1 else None
-    return Space(unit or 1.0, says_unit=unit is not None)
+def described_unit(
+    info: ElementTree.Element, n_channels: int, columns: Sequence[int]
+) -> float | None:
+    """Return the length of the unit in which some channels are [m]; None where it is not said."""
+    texts = _texts(info, n_channels, "unit")
+    units = {texts[i] for i in columns} - {""}
+    return named_unit(units.pop()) if len(units) == 1 else None
+
+
+def _texts(info: ElementTree.Element, n_channels: int, field: str) -> list[str]:
+    channels = info.findall("desc/channels/channel")[:n_channels]
+    texts = [channel.findtext(field, "").strip() for channel in channels]
+    return texts + [""] * (n_channels - len(texts))
 
 
 def _even(

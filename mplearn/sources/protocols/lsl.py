@@ -1,0 +1,172 @@
+"""The lab streaming layer [LSL]: any stream of motion capture on the network, by its name."""
+
+from __future__ import annotations
+
+import time
+from types import ModuleType
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from ...errors import InvalidValueError
+from ...extras import require
+from ...mocap import UNITS_M
+from ...mocap.markers.xdf import described_markers, described_unit
+from ...recording import marker_channels
+from ..inbox import Inbox, Sample
+from ..received import ReceivedSource, Receiver
+from ..registry import Wanted
+from ..sender import Sender
+from ..source import Block, Source, Stream
+
+EXTRA = "live"
+SEARCH_S, WAKE_S, BUFFER_S = 1.0, 0.1, 60
+AT_ONCE = 256  # samples
+TYPE = "MoCap"  # as the layer's conventions call motion capture
+
+
+def open_lsl(address: str, wanted: Wanted) -> Source:
+    """A stream of the lab streaming layer: ``lsl:NAME``; ``lsl:`` takes the first of type MoCap."""
+    receiver = LSLReceiver(address)
+    return ReceivedSource(f"lsl:{address}", receiver, wanted.hints.rate_hz)
+
+
+class LSLReceiver(Receiver):
+    """Pulls a stream; where it is lost, one of the same name is looked for.
+
+    Args:
+        name: Of the stream; the first one of type MoCap where empty.
+
+    Raises:
+        MissingDependencyError: pylsl is not installed.
+    """
+
+    ordered = True
+
+    def __init__(self, name: str) -> None:
+        self._lsl, self._name = lsl(), name
+        self.hint = f"no stream {name!r} is on the network" if name else f"no stream of type {TYPE}"
+
+    def receive(self, inbox: Inbox) -> None:
+        """Look for the stream, and pull until it is lost."""
+        what = ("name", self._name) if self._name else ("type", TYPE)
+        found: list[Any] = []
+        while not found:
+            if inbox.closed:
+                return
+            found = self._lsl.resolve_byprop(*what, minimum=1, timeout=SEARCH_S)
+        inlet = self._lsl.StreamInlet(found[0], max_buflen=BUFFER_S, recover=False)
+        try:
+            stream, columns = described(inlet.info(timeout=5.0).as_xml())
+            while not inbox.closed:
+                chunk, stamps = inlet.pull_chunk(
+                    timeout=WAKE_S, max_samples=AT_ONCE, min_samples=1, as_numpy=True
+                )
+                arrived_s = time.monotonic()
+                for values, stamp in zip(chunk, stamps, strict=True):
+                    row = np.asarray(values, dtype=np.float64)[columns]
+                    row[np.isinf(row)] = np.nan
+                    inbox.put(Sample(stream, row, arrived_s, time_s=float(stamp)))
+        finally:
+            inlet.close_stream()
+
+    def close(self) -> None:
+        """Nothing stays open."""
+
+
+class LSLSender(Sender):
+    """Offers a stream on the network.
+
+    Args:
+        name: Name of the stream.
+
+    Raises:
+        InvalidValueError: There is no name.
+        MissingDependencyError: pylsl is not installed.
+    """
+
+    def __init__(self, name: str) -> None:
+        if not name:
+            raise InvalidValueError("lsl: needs a name for the stream, as in lsl:walk")
+        self._lsl, self._name = lsl(), name
+        self._stream: Stream | None = None
+        self._outlet: Any = None
+        self._start_s = 0.0
+
+    def offer(self, stream: Stream) -> None:
+        """Offer a stream, before its first frame is there."""
+        info = described_info(self._lsl, self._name, stream)
+        self._stream, self._outlet = stream, self._lsl.StreamOutlet(info)
+        self._start_s = self._lsl.local_clock()
+
+    def send(self, block: Block) -> None:
+        """Send the frames that came."""
+        if block.stream is not self._stream:
+            self.offer(block.stream)
+        for values, time_s, gap in zip(block.frames, block.times_s, block.gaps, strict=True):
+            if not gap:
+                self._outlet.push_sample(values.tolist(), self._start_s + float(time_s))
+
+    def close(self) -> None:
+        """Withdraw the stream."""
+        self._outlet = None
+
+
+def lsl() -> ModuleType:
+    """Return pylsl.
+
+    Raises:
+        MissingDependencyError: It is not installed.
+    """
+    return require("pylsl", EXTRA)
+
+
+def described(xml: str) -> tuple[Stream, list[int]]:
+    """Return what the description of a stream says, and which of its columns are used.
+
+    Raises:
+        ValueError: It is none of numbers.
+    """
+    info = ElementTree.fromstring(xml)
+    n_channels = int(info.findtext("channel_count", "0"))
+    if info.findtext("channel_format") == "string":
+        raise ValueError(f"the stream {info.findtext('name', '')!r} holds text")
+    rate_hz = float(info.findtext("nominal_srate", "0"))
+    markers = described_markers(info, n_channels)
+    subject = info.findtext("desc/subject/id", "").strip()
+    if markers:
+        columns = [i for axes in markers.values() for i in axes]
+        return (
+            Stream(
+                marker_channels(tuple(markers)),
+                rate_hz,
+                unit_m=described_unit(info, n_channels, columns),
+                subject=subject,
+            ),
+            columns,
+        )
+    labels = [c.findtext("label", "").strip() for c in info.findall("desc/channels/channel")]
+    names = [label or f"channel {i}" for i, label in enumerate(labels[:n_channels])]
+    names += [f"channel {i}" for i in range(len(names), n_channels)]
+    if len(set(names)) != len(names):
+        names = [f"{name} {i}" for i, name in enumerate(names)]
+    return Stream(tuple(names), rate_hz, subject=subject), list(range(n_channels))
+
+
+def described_info(lsl: ModuleType, name: str, stream: Stream) -> Any:
+    """Return a stream's description, as the layer's conventions for motion capture have it."""
+    info = lsl.StreamInfo(
+        name, TYPE, len(stream.channels), stream.rate_hz, "double64", f"mplearn-{name}"
+    )
+    channels = info.desc().append_child("channels")
+    for label in stream.channels:
+        channel = channels.append_child("channel")
+        channel.append_child_value("label", label)
+        if stream.is_markers:
+            channel.append_child_value("marker", label[:-2])
+            channel.append_child_value("type", f"Position{label[-1].upper()}")
+            unit = next((name for name, m in UNITS_M.items() if m == stream.unit_m), "")
+            if unit:
+                channel.append_child_value("unit", unit)
+    return info

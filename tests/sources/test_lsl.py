@@ -1,0 +1,98 @@
+"""The lab streaming layer, with an outlet of ours."""
+
+import threading
+import time
+import uuid
+from pathlib import Path
+
+import numpy as np
+import pytest
+from played import frames_of, texts_of
+from servers import gather, learned
+
+from mplearn.errors import InvalidValueError
+from mplearn.recording import Recording
+from mplearn.sources import Stream, open_source
+from mplearn.sources.played import PlayedSource
+from mplearn.sources.protocols.lsl import described, described_info
+from mplearn.sources.sending import open_sender, send
+
+pylsl = pytest.importorskip("pylsl")
+
+
+@pytest.fixture
+def name() -> str:
+    return f"test-{uuid.uuid4()}"
+
+
+def connected(source: object, outlet: object) -> None:
+    until = time.monotonic() + 10.0
+    while not outlet.have_consumers():
+        assert time.monotonic() < until
+        time.sleep(0.01)
+
+
+def test_what_an_outlet_pushes_is_learned_bit_for_bit(
+    name: str, session: Recording, learned_session: bytes, tmp_path: Path
+) -> None:
+    stream = Stream(session.channels, 100.0, unit_m=1.0)
+    with open_source(f"lsl:{name}") as source, open_sender(f"lsl:{name}") as sender:
+        sender.offer(stream)
+        connected(source, sender._outlet)
+        played = PlayedSource(stream, [session.frames], 20.0)
+        thread = threading.Thread(target=send, args=(played, sender))
+        items = gather(source, thread.start, len(session))
+        thread.join()
+    np.testing.assert_array_equal(frames_of(items), session.frames)
+    assert learned(items, tmp_path / "live") == learned_session
+    assert source.tally.faults() == {}
+
+
+def test_an_outlet_that_comes_back_is_found_and_what_was_lost_is_counted(name: str) -> None:
+    stream = Stream(("a", "b"), 100.0)
+    frames = np.arange(200.0).reshape(100, 2)
+    with open_source(f"lsl:{name}", observe="channels") as source:
+        items = []
+        for start, end in ((0, 40), (60, 100)):
+            outlet = pylsl.StreamOutlet(described_info(pylsl, name, stream))
+            connected(source, outlet)
+            for i in range(start, end):
+                if i % 10 != 5:  # the sender loses some itself
+                    outlet.push_sample(frames[i].tolist(), 50.0 + i / 100)
+            items += gather(source, lambda: None, end - start - (start == 60))
+            del outlet
+            until = time.monotonic() + 10.0
+            while len(texts_of(items, "disconnected")) < 1 and time.monotonic() < until:
+                items += source.read(0.1)
+    came = frames_of(items)[:, 0]
+    expected = [2.0 * i for i in range(100) if i % 10 != 5 and not 40 <= i < 60]
+    assert came[~np.isnan(came)].tolist() == expected
+    assert source.tally.frames == len(expected)
+    assert source.tally.lost == 100 - len(expected)
+    assert source.tally.reconnected == 1
+
+
+def test_a_description_says_names_and_unit() -> None:
+    info = described_info(pylsl, "x", Stream(("A.x", "A.y", "A.z"), 100.0, unit_m=0.001))
+    stream, columns = described(info.as_xml())
+    assert (stream.channels, stream.rate_hz, stream.unit_m) == (("A.x", "A.y", "A.z"), 100.0, 0.001)
+    assert columns == [0, 1, 2]
+
+
+def test_channels_without_names_are_counted() -> None:
+    stream, _ = described(pylsl.StreamInfo("x", "EEG", 2, 0.0, "float32", "x").as_xml())
+    assert (stream.channels, stream.rate_hz) == (("channel 0", "channel 1"), 0.0)
+    with pytest.raises(ValueError, match="holds text"):
+        described(pylsl.StreamInfo("x", "Markers", 1, 0.0, "string", "x").as_xml())
+
+
+def test_a_stream_needs_a_name_to_be_sent() -> None:
+    with pytest.raises(InvalidValueError, match="needs a name"), open_sender("lsl:"):
+        pass
+
+
+def test_a_source_that_finds_nothing_closes() -> None:
+    source = open_source("lsl:nothing-of-this-name")
+    begin = time.monotonic()
+    source.close()
+    assert time.monotonic() - begin < 3.0
