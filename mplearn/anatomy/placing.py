@@ -11,6 +11,7 @@ from ..maths.rotation_kernels import nearest_rotation
 from ..recording import FloatArray, IntArray, Skeleton
 from .body_map import BodyMap
 from .person import Person, axes_along, cosines, unit
+from .plan import LimbPair
 
 FLAT = 0.8  # cosine between a foot and the vertical up to which it stands on its sole
 _TABLE = TABLES["landmarks"]
@@ -41,12 +42,20 @@ class Placing:
 
     def map(self, told: Mapping[str, str]) -> BodyMap:
         """Return the map; what a user says of joints overrules what was found."""
-        self._limbs()
-        self._trunk()
-        self._head()
-        for side in "lr":
-            self._hand(side)
-            self._foot(side)
+        person = self.person
+        for pair, names in ((person.legs, _LEG), (person.arms, _ARM)):
+            if pair is not None:
+                self._limbs(pair, names)
+        if person.legs is not None:
+            self._pelvis(person.legs)
+        if person.arms is not None:
+            self._chest(person.arms)
+            self._head(person.arms)
+        for k, side in enumerate("lr"):
+            if person.arms is not None:
+                self._hand(side, *person.arms.nodes[k][1:])
+            if person.legs is not None:
+                self._foot(side, person.legs.nodes[k][2], person.legs.outer[k])
         self._as_told(told)
         return self._gathered()
 
@@ -119,43 +128,47 @@ class Placing:
         joints = [joint for joint in self.tree.joints[node] if joint in self.axes]
         return joints[-1] if joints else self.tree.joints[node][-1]
 
-    def _limbs(self) -> None:
-        for pair, names in ((self.person.legs, _LEG), (self.person.arms, _ARM)):
-            for side, nodes in zip("lr", pair.nodes, strict=True):
-                for name, node in zip(names, nodes, strict=True):
-                    if name == "hip" and self.person.one_hip:
-                        self._joint("pelvis", node)
-                    else:
-                        self._joint(f"{name}_{side}", node)
+    def _limbs(self, pair: LimbPair, names: tuple[str, ...]) -> None:
+        for side, nodes in zip("lr", pair.nodes, strict=True):
+            for name, node in zip(names, nodes, strict=True):
+                if name == "hip" and pair.one_root:
+                    self._joint("pelvis", node)
+                else:
+                    self._joint(f"{name}_{side}", node)
 
-    def _trunk(self) -> None:
-        self._joint("neck", self.person.neck)
-        pelvis = self._turner((*self.person.legs.inner[0], *self.person.legs.nodes[0])[0])
-        axes = self._neutral(pelvis)
+    def _pelvis(self, legs: LimbPair) -> None:
+        joint = self._turner((*legs.inner[0], *legs.nodes[0])[0])
+        axes = self._neutral(joint)
         if axes is not None:
             for place in ("pelvis_front", "pelvis_back", "lumbar"):
-                self._on_middle_of_hips(place, pelvis, axes)
+                self._on_middle_of_hips(legs, place, joint, axes)
         elif len(self.person.spine) > 2:
-            self._lumbar_on_spine()
-        chest = self._turner((*self.person.arms.inner[0], *self.person.arms.nodes[0])[0])
-        axes = self._neutral(chest)
-        if axes is not None:
-            for place in ("sternum", "back", "chest_l", "chest_r"):
-                at = np.array(_TABLE[place][1]) - _TABLE["neck"][1]
-                self._on(place, self.person.neck, chest, axes, at, self.person.trunk_sizes)
+            self._lumbar_on_spine(legs)
 
-    def _on_middle_of_hips(self, place: str, joint: int, axes: FloatArray) -> None:
-        left, right = (side[0] for side in self.person.legs.nodes)
+    def _chest(self, arms: LimbPair) -> None:
+        joint = self._turner((*arms.inner[0], *arms.nodes[0])[0])
+        axes, raised = self._neutral(joint), self.person.raised
+        if axes is None or not raised.any():
+            self._joint("neck", self.person.neck)
+        if axes is None:
+            return
+        for place in ("sternum", "back", "chest_l", "chest_r", "neck")[: 5 if raised.any() else 4]:
+            at = np.array(_TABLE[place][1]) - _TABLE["neck"][1]
+            at = raised + self.person.trunk_sizes * at
+            self._on(place, self.person.neck, joint, axes, at, 1.0)
+
+    def _on_middle_of_hips(self, legs: LimbPair, place: str, joint: int, axes: FloatArray) -> None:
+        left, right = (side[0] for side in legs.nodes)
         self._on(place, left, joint, axes, np.array(_TABLE[place][1]), self.person.trunk_sizes)
         row = self.rows[place]
         for node in (left, right):
             first = self.tree.joints[node][0]
             row[first] = row.get(first, 0.0) + (-0.5 if node == left else 0.5)
 
-    def _lumbar_on_spine(self) -> None:
+    def _lumbar_on_spine(self, legs: LimbPair) -> None:
         """Without the pelvis' axes: the lumbar joint lies towards the first joint of the spine."""
-        left, right = (side[0] for side in self.person.legs.nodes)
-        middle = 0.5 * (self.person.at(left) + self.person.at(right))
+        left, right = (side[0] for side in legs.nodes)
+        middle = self.person.middle(legs, 0)
         for node in self.person.spine[:-1]:
             length = float(np.median(np.linalg.norm(self.person.at(node) - middle, axis=1)))
             if length > 0.04 * self.person.size:
@@ -166,10 +179,10 @@ class Placing:
                 self.rows["lumbar"], self.used["lumbar"] = row, (node,)
                 return
 
-    def _head(self) -> None:
-        way = (self.person.arms.root, *self.person.head)
+    def _head(self, arms: LimbPair) -> None:
+        way = (arms.root, *self.person.head)
         after = way[way.index(self.person.neck) + 1 :]
-        if not after and self.person.neck == self.person.arms.root:
+        if not after and self.person.neck == arms.root:
             return
         far = [self.tree.length(self.person.neck, node) for node in after]
         rise = _TABLE["skull"][1][2]
@@ -192,8 +205,7 @@ class Placing:
         way = self.person.at(end) - self.person.at(skull)
         return bool(np.median(cosines(way, self.person.trunk[:, :, 2])[self.person.upright]) > 0.8)
 
-    def _hand(self, side: str) -> None:
-        elbow, wrist = self.person.arms.nodes["lr".index(side)][1:]
+    def _hand(self, side: str, elbow: int, wrist: int) -> None:
         toward = self.tree.way(elbow, wrist)[-2]
         fingers = [node for node in self.tree.edges[wrist] if node != toward]
         if not fingers:
@@ -245,9 +257,7 @@ class Placing:
         off = [float(np.dot(ray, np.mean(rays, axis=0))) for ray in rays]
         return fingers[int(np.argmin(off))]
 
-    def _foot(self, side: str) -> None:
-        leg = "lr".index(side)
-        ankle, outer = self.person.legs.nodes[leg][2], self.person.legs.outer[leg]
+    def _foot(self, side: str, ankle: int, outer: tuple[int, ...]) -> None:
         joint = self._turner(outer[0]) if outer else self._own(ankle)
         axes = self._foot_axes(joint, ankle, outer[-1]) if outer else self._neutral(joint)
         if axes is not None:

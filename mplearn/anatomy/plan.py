@@ -41,6 +41,11 @@ class LimbPair:
     outer: tuple[tuple[int, ...], tuple[int, ...]]
     cost: float
 
+    @property
+    def one_root(self) -> bool:
+        """Whether both limbs begin at one point."""
+        return self.nodes[0][0] == self.nodes[1][0]
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -49,7 +54,8 @@ class Plan:
     Attributes:
         legs: The legs, or None.
         arms: The arms, or None.
-        spine: Nodes from the legs' root to the arms', both included; empty where one is missing.
+        spine: Nodes from the legs' root to the arms', both included; where one is missing, from or
+            to the end of the trunk.
         head: Nodes beyond the arms' root on the way to the top of the head; empty where none.
         cost: Minus the logarithm of its likelihood, relative to a person's.
     """
@@ -62,10 +68,8 @@ class Plan:
 
 
 def find_plan(tree: JointTree) -> Plan | None:
-    """Find the likeliest body in a skeleton; None if no two of its branches are alike."""
+    """Find the likeliest body in a skeleton; None if there are no legs and arms in it."""
     pairs = _pairs(tree)
-    if not pairs:
-        return None
     plans = [
         plan
         for (one, reach_one), (other, reach_other) in combinations(pairs, 2)
@@ -75,10 +79,22 @@ def find_plan(tree: JointTree) -> Plan | None:
             _plan(tree, other, one, reach_one + reach_other),
         )
     ]
-    if not plans:
-        one, reach = pairs[0]
-        plans = [_plan(tree, one, None, reach), _plan(tree, None, one, reach)]
-    return min(plans, key=lambda plan: plan.cost)
+    return min(plans, key=lambda plan: plan.cost, default=None)
+
+
+def find_half(tree: JointTree) -> Plan | None:
+    """Find the likeliest pair of legs, or of arms, in a skeleton that has only those.
+
+    By geometry many things have two branches that are alike: names must call them legs or arms.
+    """
+    halves = []
+    for pair, reach in _pairs(tree):
+        named = says_leg([name for nodes in pair[1] for node in nodes for name in tree.names[node]])
+        if named:
+            legs, arms = (pair, None) if named > 0 else (None, pair)
+            halves.append(_plan(tree, legs, arms, reach))
+    found = [plan for plan in halves if plan.legs is not None or plan.arms is not None]
+    return min(found, key=lambda plan: plan.cost, default=None)
 
 
 _Ways = tuple[int, tuple[tuple[int, int], ...]]  # where they part, and the nodes on both
@@ -116,6 +132,10 @@ def _plan(tree: JointTree, legs: _Ways | None, arms: _Ways | None, reach: float)
     cost += sum(pair.cost if pair else 0.5 * STRANGE for pair in (found_legs, found_arms))
     spine: tuple[int, ...] = ()
     head: tuple[int, ...] = ()
+    if legs is not None and arms is None:
+        spine = (legs[0], *_trunk(tree, legs, up=1))
+    if arms is not None and legs is None:
+        spine = (*reversed(_trunk(tree, arms, up=-1)), arms[0])
     if legs is not None and arms is not None:
         spine = tree.way(legs[0], arms[0])
         rise = tree.points[:, arms[0], 2] - tree.points[:, legs[0], 2]
@@ -152,6 +172,20 @@ def _limbs(tree: JointTree, pair: _Ways | None, law: LimbLaw, legs: int) -> Limb
 
 def _sides(chains: Sequence[tuple[int, ...]], part):  # type: ignore[no-untyped-def]
     return part(chains[0]), part(chains[1])
+
+
+def _trunk(tree: JointTree, pair: _Ways, up: int) -> tuple[int, ...]:
+    """Return the nodes of the trunk beyond the root of the only limbs: above legs, below arms."""
+    root, ways = pair
+    best: tuple[float, tuple[int, ...]] = (0.02 * tree.extent, ())
+    for branch in tree.edges[root]:
+        if branch in ways[0]:
+            continue
+        length, way = tree.longest(branch, root)
+        rise = float(np.median(tree.points[:, way[-1], 2] - tree.points[:, root, 2]))
+        if length + tree.length(root, branch) > best[0] and up * rise > 0:
+            best = (length + tree.length(root, branch), way)
+    return best[1]
 
 
 def _head(tree: JointTree, arms: _Ways, spine: tuple[int, ...]) -> tuple[int, ...]:

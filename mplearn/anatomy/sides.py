@@ -19,26 +19,27 @@ FACES = 0.3  # how clearly a person must face somewhere
 
 def limbs_left_first(
     name: str, tree: JointTree, plan: Plan, told: Mapping[str, str]
-) -> tuple[LimbPair, LimbPair]:
-    """Return legs and arms, of each the left one first.
+) -> tuple[LimbPair | None, LimbPair | None]:
+    """Return legs and arms, of each that there are the left one first.
 
     Args:
         name: What the recording is called.
         tree: Its skeleton.
-        plan: The body in it, with legs and arms.
+        plan: The body in it.
         told: Place of the body by joint, as a user says.
 
     Raises:
         BodyError: Facing and names contradict each other, or neither tells.
     """
     legs, arms = plan.legs, plan.arms
-    assert legs is not None and arms is not None
+    first = legs or arms
+    assert first is not None
     votes = facing_votes(tree, plan)
     facing = sum(value for _, value in votes) / max(1.0, np.sqrt(len(votes)))
-    said = _told_left(tree, legs, told) or _told_left(tree, arms, told)
+    said = _told_left(tree, first, told) or (_told_left(tree, arms, told) if arms else 0)
     user = bool(said)
     if not user:
-        said = left_of_pair(*_names(tree, legs))
+        said = left_of_pair(*_names(tree, first))
         if abs(facing) > FACES and said and np.sign(facing) != said:
             seen = ", ".join(f"{why} {value:+.1f}" for why, value in votes)
             raise BodyError(
@@ -52,6 +53,9 @@ def limbs_left_first(
                 f"names do not say; {option('names')} does"
             )
     left_first = (said or np.sign(facing)) > 0
+    if legs is None or arms is None:
+        only = first if left_first else _exchanged(first)
+        return (None, only) if legs is None else (only, None)
     hips = _between(tree, legs) * (1.0 if left_first else -1.0)
     arms_left_first = np.median((hips * _between(tree, arms)).sum(axis=1)) > 0
     arms_said = left_of_pair(*_names(tree, arms))
@@ -88,7 +92,7 @@ def _between(tree: JointTree, pair: LimbPair) -> FloatArray:
         tree.points[:, one] - tree.points[:, other] for one, other in zip(*pair.nodes, strict=True)
     ]
     # limbs that begin at one point part further down
-    return ways[1] + ways[2] if pair.nodes[0][0] == pair.nodes[1][0] else ways[0]
+    return ways[1] + ways[2] if pair.one_root else ways[0]
 
 
 def _exchanged(pair: LimbPair) -> LimbPair:

@@ -19,10 +19,11 @@ from ..mocap.skeletons.kinematics import AXIS_MARK
 from ..recording import Recording, Skeleton
 from .body_map import BodyMap
 from .joint_tree import JointTree
+from .likeness import likelier
 from .markers import recognise_markers
 from .person import Person
 from .placing import Placing
-from .plan import find_plan
+from .plan import find_half, find_plan
 
 MOST_NODES = 400  # joints at different places; the largest skeletons of people have 165 joints
 SOME_FRAMES = 120  # of a recording are looked at
@@ -48,20 +49,22 @@ def recognise_skeleton(recording: Recording, names: Mapping[str, str] | None = N
     if not len(some):
         raise BodyError(f"recording {recording.name!r} has no frame in which all joints are known")
     tree = JointTree.of(body, some[:, : len(body)])
-    plan = find_plan(tree) if len(tree) <= MOST_NODES else None
-    if plan is None or plan.legs is None or plan.arms is None:
+    small = len(tree) <= MOST_NODES
+    plan, half = (find_plan(tree), find_half(tree)) if small else (None, None)
+    if plan is None and half is None:
         if names:
             return recognise_markers(recording, names)
         some_names = ", ".join(skeleton.names[:6])
         raise BodyError(
             f"no body in the skeleton of {recording.name!r} ({len(body)} joints: {some_names}, "
-            "...): two legs and two arms were not found among its branches; "
-            f"{option('names')} says which joint is which"
+            "...): two legs and two arms were not found among its branches, and none that are "
+            f"named so; {option('names')} says which joint is which"
         )
     report = recording.report
     doubt = report is None or any("points up is in doubt" in text for text in report.warnings)
     unit_m = (report.unit_m if report else None) or 1.0
-    person = Person(recording.name, tree, plan, names or {}, unit_m=unit_m, up_in_doubt=doubt)
+    chosen = likelier(recording.name, tree, plan, half, sure=bool(names))
+    person = Person(recording.name, tree, chosen, names or {}, unit_m=unit_m, up_in_doubt=doubt)
     return Placing(person, skeleton, some, axes).map(names or {})
 
 
