@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -180,4 +181,22 @@ def _show(progress: Progress, bar: TaskID, log: LearningLog) -> None:
         speed=log.times_real_time,
         primitives=log.n_primitives,
         segments=len(log.moving),
+    )
+
+
+def why_nothing(learner: MotionLearner, n_moving: int, watched_s: float) -> str:
+    """Return why nothing became a primitive, and what would help."""
+    if not n_moving:
+        return (
+            f"Why: nothing moved in {watched_s:.1f} s, or too little was seen of it. Record "
+            "longer, with the whole body in view."
+        )
+    found, least = learner.tree.most_repeated(), learner.config.tree.min_exemplars
+    came = f"the most repeated came {found.times} times" if found.times > 1 else "none came twice"
+    apart = f"{found.apart:.1f} times as far apart as executions of one motion may be"
+    if not math.isfinite(found.apart):
+        apart = "nothing to compare with"
+    return (
+        f"Why: of {found.n_waiting} segments {came}, the nearest {apart}. Show each motion at "
+        f"least {least} times, more where it varies widely; or let the recording be learned twice."
     )

@@ -3,6 +3,7 @@
 from .opening import open_source as open_source
 from .registry import Observe as Observe
 from .registry import Wanted as Wanted
+from .registry import connect as connect
 from .registry import register_source as register_source
 from .registry import source_kinds as source_kinds
 from .source import Block as Block

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..mocap import Hints
 from .played import play_demonstrator, play_recording
 from .protocols.lsl import open_lsl
 from .protocols.own import open_ndjson, open_udp
+from .rate import ResampledSource
 from .recognised import RecognisedSource
 from .registry import Observe, Wanted, connect, register_source
 from .source import Source
@@ -26,6 +27,7 @@ def open_source(
     observe: Observe = "robot",
     hints: Hints | None = None,
     names: Mapping[str, str] | None = None,
+    at_hz: float | Callable[[float], float] | None = None,
     **options: Any,
 ) -> Source:
     """Open a live source: what it yields can be learned as it comes.
@@ -36,6 +38,8 @@ def open_source(
             ``"positions"`` of markers and joints, or the stream's own ``"channels"``.
         hints: What the stream does not say about itself: its unit, its vertical axis.
         names: Place of the body by marker or joint, for what is known better.
+        at_hz: Frames per second of what is yielded [1/s], or what gives it for the stream's own
+            rate, as `mplearn.learner.learnable_rate`; the stream's own where None.
         options: Of the source, as ``speed=2.0`` for a recording.
 
     Returns:
@@ -63,4 +67,5 @@ def open_source(
         ('LFHD.x', 100.0)
     """
     wanted = Wanted(observe, hints or Hints(), names)
-    return RecognisedSource(connect(name, wanted, **options), wanted)
+    source = RecognisedSource(connect(name, wanted, **options), wanted)
+    return source if at_hz is None else ResampledSource(source, at_hz)

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from threading import Event
 from typing import BinaryIO
 
 import numpy as np
@@ -16,7 +17,7 @@ from .protocols.addresses import LOOPBACK, host_and_port
 from .protocols.lines import frame_line, header_line
 from .protocols.own import PORT
 from .sender import Sender
-from .source import Block, Source, Stream
+from .source import WAIT_S, Block, Source, Stream
 
 HEADER_EACH_S = 1.0  # in datagrams, of which one may be lost: so often
 CONNECT_S = 10.0
@@ -86,13 +87,20 @@ def open_sender(to: str) -> Iterator[Sender]:
         )
 
 
-def send(source: Source, sender: Sender) -> int:
-    """Send all that a source yields, as it comes; return the number of frames sent."""
+def send(source: Source, sender: Sender, stop: Event | None = None) -> int:
+    """Send all that a source yields, as it comes; return the number of frames sent.
+
+    Args:
+        source: What to send; it is left open.
+        sender: How.
+        stop: Set to stop.
+    """
     n = 0
-    for item in source:
-        if isinstance(item, Block):
-            sender.send(item)
-            n += int(np.count_nonzero(~item.gaps))
+    while not (source.ended or (stop is not None and stop.is_set())):
+        for item in source.read(WAIT_S):
+            if isinstance(item, Block):
+                sender.send(item)
+                n += int(np.count_nonzero(~item.gaps))
     return n
 
 

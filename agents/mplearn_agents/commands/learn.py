@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mplearn.errors import InvalidValueError, MPLearnError, RecordingError
+from mplearn_agents.live_learning import add_live_arguments, learn_from_source
 from mplearn_agents.reading import (
     add_reading_arguments,
     hints_of,
@@ -22,19 +23,20 @@ from mplearn_agents.reading import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from mplearn.learner import MotionLearner
+    from mplearn.learner import LearnerConfig
     from mplearn.recording import Recording
     from mplearn.tree import TreeConfig
     from mplearn_agents.learning import LearningLog
 
 _SAME_RATE = 1e-3  # rates that differ by a smaller share are one
 
-HELP = "Learn primitives and their order from recordings."
+HELP = "Learn primitives and their order from recordings, or from a live stream."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    parser.add_argument("data", type=Path, help="a recording, or a folder of them")
+    parser.add_argument("data", type=Path, nargs="?", help="a recording, or a folder of them")
+    add_live_arguments(parser)
     parser.add_argument("--out", type=Path, required=True, help="library file to write")
     parser.add_argument(
         "--rate-hz", type=float, help="resample to this rate [1/s] (default: the recordings' own)"
@@ -63,11 +65,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Learn, save the library and print a summary."""
+    if (args.data is None) == (args.live is None):
+        raise InvalidValueError("give a recording, or --live SOURCE")
+    if args.live is not None:
+        learn_from_source(args, partial(_configured, args))
+    else:
+        _learn_from_files(args)
+
+
+def _learn_from_files(args: argparse.Namespace) -> None:
     from rich.console import Console
 
     from mplearn.learner import LearnerConfig, MotionLearner
     from mplearn.mocap import command_line, open_takes
-    from mplearn_agents.learning import learn
+    from mplearn_agents.learning import learn, why_nothing
     from mplearn_agents.tables import primitive_table
 
     console = Console()
@@ -83,16 +94,7 @@ def run(args: argparse.Namespace) -> None:
         recordings = _as_learned(args, recordings, console)
     recordings = _at_one_rate(args, recordings, console)
     first = recordings[0]
-    config = LearnerConfig(
-        channels=first.channels,
-        rate_hz=first.rate_hz,
-        observe="robot" if args.observe == "robot" else "markers",
-    )
-    if args.segmenter:
-        config = replace(config, segmenter=args.segmenter)
-    if args.demonstrations is not None:
-        config = replace(config, tree=_shown_so_often(config.tree, args.demonstrations))
-    learner = MotionLearner(config)
+    learner = MotionLearner(_configured(args, LearnerConfig(first.channels, first.rate_hz)))
     log = learn(learner, recordings, console, strict=args.strict)
     for name, error in log.refused.items():
         say_left_out(console, name, error)
@@ -110,7 +112,7 @@ def run(args: argparse.Namespace) -> None:
         markup=False,
     )
     if not n_known:
-        console.print(why_nothing(learner, log))
+        console.print(why_nothing(learner, len(log.moving), log.watched_s))
     if len(library) > n_known:
         console.print(
             f"{len(library) - n_known} motions that were shown once are in the library as they "
@@ -122,6 +124,16 @@ def run(args: argparse.Namespace) -> None:
             f"{log.reasons}",
             markup=False,
         )
+
+
+def _configured(args: argparse.Namespace, config: LearnerConfig) -> LearnerConfig:
+    """Return what the options make of a learner's configuration."""
+    config = replace(config, observe="robot" if args.observe == "robot" else "markers")
+    if args.segmenter:
+        config = replace(config, segmenter=args.segmenter)
+    if args.demonstrations is not None:
+        config = replace(config, tree=_shown_so_often(config.tree, args.demonstrations))
+    return config
 
 
 def _shown_so_often(rules: TreeConfig, demonstrations: int) -> TreeConfig:
@@ -136,24 +148,6 @@ def _takes_of(recordings: tuple[Recording, ...], log: LearningLog) -> str:
     learned = [recording for recording in recordings if recording.name not in log.refused]
     sets = len({recording.channels for recording in learned})
     return f"{len(learned)} takes" + (f" of {sets} marker sets" if sets > 1 else "")
-
-
-def why_nothing(learner: MotionLearner, log: LearningLog) -> str:
-    """Return why nothing became a primitive, and what would help."""
-    if not log.moving:
-        return (
-            f"Why: nothing moved in {log.watched_s:.1f} s, or too little was seen of it. Record "
-            "longer, with the whole body in view."
-        )
-    found, least = learner.tree.most_repeated(), learner.config.tree.min_exemplars
-    came = f"the most repeated came {found.times} times" if found.times > 1 else "none came twice"
-    apart = f"{found.apart:.1f} times as far apart as executions of one motion may be"
-    if not math.isfinite(found.apart):
-        apart = "nothing to compare with"
-    return (
-        f"Why: of {found.n_waiting} segments {came}, the nearest {apart}. Show each motion at "
-        f"least {least} times, more where it varies widely; or let the recording be learned twice."
-    )
 
 
 def _of_persons(

@@ -1,0 +1,218 @@
+"""Learning from a live source: events as they come, what was lost, and an orderly end."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event as Flag
+from typing import TYPE_CHECKING, Any
+
+from mplearn.errors import InvalidValueError, RecordingError
+
+from .event_lines import change_json, change_text, event_json, event_text
+from .interrupts import asked_to_stop
+from .learning import why_nothing
+from .reading import hints_of, printable
+
+if TYPE_CHECKING:
+    from mplearn.learner import Event, LearnerConfig, MotionLearner
+    from mplearn.sources import Block, Source
+
+_WAIT_S = 0.2  # a wish to stop is heard so soon
+
+
+def add_live_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what learning from a live source takes."""
+    from mplearn.sources import source_kinds
+
+    group = parser.add_argument_group("live motion, instead of recordings")
+    kinds = "; ".join(text.rstrip(".") for text in source_kinds().values())
+    group.add_argument("--live", metavar="SOURCE", help=f"what to learn from: {kinds}")
+    group.add_argument(
+        "--speed",
+        type=float,
+        help="times as fast as in time, for a recording and the demonstrator; inf: as fast as "
+        "it is learned",
+    )
+    group.add_argument("--seconds", type=float, help="stop after so much of the stream [s]")
+    group.add_argument(
+        "--json",
+        action="store_true",
+        help="print each event as a line of JSON, and the summary as the last one",
+    )
+
+
+@dataclass
+class LiveLog:
+    """What came of a stream: numbers only, for it may be endless.
+
+    Attributes:
+        learner: Who learned; None where no frame could be learned.
+        watched_s: Length of what was learned from [s].
+        segments: Motions, pauses left out.
+        lost_s: Length of what nothing could be learned from, though it came or was filled in [s].
+        delay_s: From a frame's arrival to the event that it caused: the longest [s].
+    """
+
+    learner: MotionLearner | None = None
+    watched_s: float = 0.0
+    segments: int = 0
+    lost_s: float = 0.0
+    delay_s: float = 0.0
+
+
+def learn_from_source(
+    args: argparse.Namespace, configure: Callable[[LearnerConfig], LearnerConfig]
+) -> None:
+    """Learn from a live source until it ends or somebody stops it; save the library.
+
+    Args:
+        args: The options of ``mplearn learn``.
+        configure: What they make of a learner's configuration.
+    """
+    from rich.console import Console
+
+    from mplearn.anatomy import read_map
+    from mplearn.learner import learnable_rate
+    from mplearn.mocap import command_line
+    from mplearn.sources import open_source
+
+    if args.seconds is not None and not args.seconds > 0:
+        raise InvalidValueError(f"--seconds must be positive, not {args.seconds}")
+    console = Console(stderr=args.json)
+    with command_line(), asked_to_stop() as stop:
+        source = open_source(
+            args.live,
+            observe=args.observe,
+            hints=hints_of(args),
+            names=None if args.map is None else read_map(args.map),
+            at_hz=args.rate_hz or learnable_rate,
+            **({} if args.speed is None else {"speed": args.speed}),
+        )
+        with source:
+            console.print(
+                f"learning from {printable(source.name)}; Ctrl-C ends it, and writes "
+                f"{printable(str(args.out))}",
+                markup=False,
+                highlight=False,
+            )
+            log = learn_live(
+                source, stop, _say(), config=configure, as_json=args.json, seconds=args.seconds
+            )
+        _report(console, args, source, log, stopped=stop.is_set())
+
+
+def learn_live(
+    source: Source,
+    stop: Flag,
+    say: Callable[[str], object],
+    *,
+    config: Callable[[LearnerConfig], LearnerConfig] = lambda config: config,
+    as_json: bool = False,
+    seconds: float | None = None,
+) -> LiveLog:
+    """Learn from a source until it ends, or until it is asked to stop.
+
+    Args:
+        source: What to learn from; it is left open.
+        stop: Set to stop.
+        say: Takes a line on each event, as it comes.
+        config: Changes the learner's configuration.
+        as_json: Whether lines are JSON.
+        seconds: How much of the stream to learn [s]; all of it where None.
+    """
+    from mplearn.learner import FramesLost, LearnerConfig, MotionLearner, SegmentClosed
+    from mplearn.sources import Change
+
+    log = LiveLog()
+
+    def tell(events: list[Event], arrived_s: float, rate_hz: float) -> None:
+        for event in events:
+            if isinstance(event, SegmentClosed) and not event.segment.still:
+                log.segments += 1
+            elif isinstance(event, FramesLost):
+                log.lost_s += (event.end - event.start) / rate_hz
+            line = event_json(event, rate_hz) if as_json else event_text(event, rate_hz)
+            if line is not None:
+                say(line)
+        if events:
+            log.delay_s = max(log.delay_s, time.monotonic() - arrived_s)
+
+    def take(block: Block) -> None:
+        if log.learner is None:
+            log.learner = MotionLearner(config(LearnerConfig(block.channels, block.rate_hz)))
+        elif not block.joins:
+            tell(log.learner.end_stream(), _newest(block), block.rate_hz)
+        tell(log.learner.learn_many(block.frames), _newest(block), block.rate_hz)
+        log.watched_s += len(block) / block.rate_hz
+
+    while not (source.ended or stop.is_set() or (seconds and log.watched_s >= seconds)):
+        for item in source.read(_WAIT_S):
+            if isinstance(item, Change):
+                say(change_json(item) if as_json else change_text(item))
+            else:
+                take(item)
+    if log.learner is not None:
+        tell(log.learner.end_stream(), time.monotonic(), log.learner.config.rate_hz)
+    return log
+
+
+def _newest(block: Block) -> float:
+    """Return when the last frame of a block came that came at all."""
+    came = block.arrived_s[~block.gaps]
+    return float(came[-1]) if len(came) else time.monotonic()
+
+
+def _say() -> Callable[[str], object]:
+    def say(line: str) -> None:
+        print(line, flush=True)
+
+    return say
+
+
+def _report(
+    console: Any, args: argparse.Namespace, source: Source, log: LiveLog, *, stopped: bool
+) -> None:
+    """Write the library, and say what came of it all."""
+    from .tables import primitive_table
+
+    faults = source.tally.faults()
+    if log.learner is None:
+        told = ", ".join(f"{n} {name}" for name, n in faults.items()) or "nothing came"
+        raise RecordingError(f"nothing could be learned from {source.name}: {told}")
+    library = log.learner.snapshot()
+    path = Path(args.out)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    library.save(path)
+    if args.json:
+        summary = {
+            "event": "Summary",
+            "primitives": len(library),
+            "segments": log.segments,
+            "watched_s": log.watched_s,
+            "lost_s": log.lost_s,
+            "longest_delay_s": log.delay_s,
+            "stopped": stopped,
+            "library": str(path),
+            **vars(source.tally),
+        }
+        print(json.dumps(summary), flush=True)
+        return
+    console.print(primitive_table(library))
+    console.print(
+        f"{len(library)} primitives from {log.watched_s / 60:.1f} minutes of motion in "
+        f"{log.segments} segments; "
+        f"{'stopped, ' if stopped else ''}written to {printable(str(path))}",
+        markup=False,
+    )
+    if not len(library):
+        console.print(why_nothing(log.learner, log.segments, log.watched_s))
+    if faults:
+        told = ", ".join(f"{n} {name}" for name, n in faults.items())
+        console.print(f"frames and packets that were not as they should be: {told}", markup=False)
+    if log.lost_s:
+        console.print(f"nothing was learned from {log.lost_s:.1f} s", markup=False)

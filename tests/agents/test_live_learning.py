@@ -1,0 +1,191 @@
+"""Learning live on the command line: events as they come, an orderly end, a sender."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mplearn.demonstrator import demonstrate
+from mplearn.learner import LearnerConfig, MotionLearner
+from mplearn.library import PrimitiveLibrary
+from mplearn.sources import Block, Change, Source, Stream, Tally
+from mplearn.sources.played import PlayedSource
+from mplearn_agents.cli import main
+from mplearn_agents.event_lines import change_text
+from mplearn_agents.interrupts import asked_to_stop
+from mplearn_agents.live_learning import learn_live
+
+ENV = {**os.environ, "NO_COLOR": "1", "COLUMNS": "120"}
+RUN = [sys.executable, "-m", "mplearn_agents.cli"]
+
+
+@pytest.fixture(scope="module")
+def take(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording of a person, as a table."""
+    recording = demonstrate(["BAR", "BAL"] * 4, seed=2).recording
+    path = tmp_path_factory.mktemp("take") / "take.csv"
+    rows = [["Time", *recording.channels]]
+    for i, frame in enumerate(recording.frames):
+        rows.append([f"{i / 100:.2f}", *("" if np.isnan(v) else repr(float(v)) for v in frame)])
+    path.write_text("\n".join(",".join(row) for row in rows))
+    return path
+
+
+def test_a_library_learned_live_is_that_of_the_file(
+    take: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    live, file = tmp_path / "live.mplearn", tmp_path / "file.mplearn"
+    assert main(["learn", "--live", f"recording:{take}", "--speed", "inf", "--out", str(live)]) == 0
+    said = capsys.readouterr().out
+    assert "learned primitive" in said
+    assert "a body by 34 places" in said
+    assert main(["learn", str(take), "--out", str(file)]) == 0
+    assert PrimitiveLibrary.load(live).version == PrimitiveLibrary.load(file).version
+    assert live.read_bytes() == file.read_bytes()
+
+
+def test_events_as_lines_of_json(
+    take: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "live.mplearn"
+    command = ["learn", "--live", f"recording:{take}", "--speed", "inf", "--json"]
+    assert main([*command, "--out", str(out)]) == 0
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    names = [line["event"] for line in lines]
+    assert {"Change", "SegmentClosed", "PrimitiveBorn", "Recognised", "Summary"} <= set(names)
+    born = next(line for line in lines if line["event"] == "PrimitiveBorn")
+    assert born["segment"]["end"] / 100 == born["time_s"]
+    assert lines[-1]["primitives"] == len(PrimitiveLibrary.load(out))
+    assert lines[-1]["frames"] == round(lines[-1]["watched_s"] * 100)
+    assert not lines[-1]["stopped"]
+
+
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM])
+def test_stopped_it_writes_what_was_learned(ending: signal.Signals, tmp_path: Path) -> None:
+    out = tmp_path / "live.mplearn"
+    command = [*RUN, "learn", "--live", "demonstrator", "--speed", "20", "--out", str(out)]
+    with subprocess.Popen(command, env=ENV, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            if "primitive" in line:
+                break
+        process.send_signal(ending)
+        said = process.stdout.read()
+        assert process.wait(30) == 0
+    assert "stopped, written to" in " ".join(said.split())
+    assert len(PrimitiveLibrary.load(out)) > 0
+
+
+def test_what_is_sent_to_a_pipe_is_learned(take: Path, tmp_path: Path) -> None:
+    out = tmp_path / "live.mplearn"
+    send = [*RUN, "send", str(take), "--to", "ndjson:-", "--speed", "inf"]
+    learn = [*RUN, "learn", "--live", "ndjson:-", "--json", "--out", str(out)]
+    with subprocess.Popen(send, env=ENV, stdout=subprocess.PIPE) as sender:
+        learned = subprocess.run(learn, env=ENV, stdin=sender.stdout, capture_output=True)
+    assert learned.returncode == 0, learned.stderr
+    summary = json.loads(learned.stdout.splitlines()[-1])
+    assert summary["frames"] == len(take.read_text().splitlines()) - 1
+    file = tmp_path / "file.mplearn"
+    assert main(["learn", str(take), "--out", str(file)]) == 0
+    assert out.read_bytes() == file.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ([], "give a recording, or --live SOURCE"),
+        (["x.csv", "--live", "demonstrator"], "give a recording, or --live SOURCE"),
+        (["--live", "radio:"], "a source begins with one of"),
+        (["--live", "demonstrator", "--speed", "-1"], "speed must be positive, not -1"),
+        (["--live", "udp:1", "--speed", "2"], "no option 'speed'"),
+        (["--live", "demonstrator", "--seconds", "0"], "--seconds must be positive, not 0"),
+        (["--live", "demonstrator", "--rate-hz", "0.1"], "rate_hz must lie in"),
+        (["--live", "recording:nowhere.csv"], "no such file"),
+    ],
+)
+def test_bad_input_is_refused(
+    more: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["learn", "--out", str(tmp_path / "x"), *more]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_nowhere_to_send_is_refused(take: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["send", str(take), "--to", "radio:1"]) == 2
+    assert "frames are sent to" in capsys.readouterr().err
+    assert main(["send", str(take), "--to", "ndjson:127.0.0.1:1"]) == 2
+    assert "nobody listens" in capsys.readouterr().err
+
+
+class Slow(Source):
+    """Says that it is behind, and breaks off once."""
+
+    def __init__(self, inner: Source) -> None:
+        self.name, self.tally, self._inner = "slow:", Tally(), inner
+
+    @property
+    def ended(self) -> bool:
+        return self._inner.ended
+
+    def read(self, timeout_s: float | None = None) -> list[Block | Change]:
+        return [
+            Change("behind", "frames are read 2.0 s after they \x1b[31mcame"),
+            *self._inner.read(),
+        ]
+
+    def close(self) -> None:
+        self._inner.close()
+
+
+def test_changes_are_said_and_steer_no_terminal() -> None:
+    lines: list[str] = []
+    source = Slow(PlayedSource(Stream(("a",), 100.0), [np.zeros((120, 1))], np.inf))
+    log = learn_live(source, threading.Event(), lines.append)
+    assert log.watched_s == pytest.approx(1.2)
+    assert any("behind: frames are read 2.0 s after they" in line for line in lines)
+    assert not any("\x1b" in line for line in lines)
+    assert "\x1b" not in change_text(Change("names", "\x1b[2J"))
+
+
+def test_a_stretch_that_does_not_join_ends_the_stream() -> None:
+    rng = np.random.default_rng(0)
+    frames = np.cumsum(rng.normal(size=(300, 2)), axis=0) * 0.01
+    stream = Stream(("a", "b"), 100.0)
+    blocks = [
+        Block(stream, part, np.arange(150) / 100, np.zeros(150), joins=False)
+        for part in (frames[:150], frames[150:])
+    ]
+
+    class Two(Slow):
+        def read(self, timeout_s: float | None = None) -> list[Block | Change]:
+            self._inner.read()
+            return [blocks.pop(0)] if blocks else []
+
+    inner = PlayedSource(stream, [np.zeros((100, 2))], np.inf)
+    log = learn_live(Two(inner), threading.Event(), lambda line: None)
+    learner = MotionLearner(LearnerConfig(("a", "b"), 100.0))
+    for part in (frames[:150], frames[150:]):
+        learner.learn_many(part)
+        learner.end_stream()
+    assert log.learner is not None
+    assert log.learner.n_frames == learner.n_frames
+    assert len(log.learner.snapshot()) == len(learner.snapshot())
+
+
+def test_the_first_wish_to_stop_is_noted_and_the_second_interrupts() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with asked_to_stop() as stop:
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.01)
+        assert stop.is_set()
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(1.0)
+    assert signal.getsignal(signal.SIGINT) is before
