@@ -7,6 +7,7 @@ from .levels import tree_levels as tree_levels
 from .prediction import History as History
 from .prediction import Prediction as Prediction
 from .provisional_graph import ProvisionalGraph as ProvisionalGraph
+from .reversal import GraphEdit as GraphEdit
 from .transition_graph import Criterion as Criterion
 from .transition_graph import MergedGraph as MergedGraph
 from .transition_graph import TransitionGraph as TransitionGraph

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal, TypeAlias, Unpack
@@ -20,6 +20,7 @@ from .expected import left_out_surprises
 from .graph_state import GraphState
 from .history import HistoryTable
 from .prediction import History, Prediction, backed_off, most_likely, surprise, usable_context
+from .reversal import GraphEdit, exchanged
 from .search import simple_paths
 from .walks import WalkSampler, stationary
 
@@ -142,6 +143,15 @@ class TransitionGraph:
             self.add_node(node)
         self._edges.add(added._edges.rows)
         self._histories.add(added._histories)
+
+    def exchange(
+        self, edit: GraphEdit, heirs: Mapping[int, int | None], ids: Iterable[int]
+    ) -> None:
+        """Undo an edit, or do it again; see `mplearn.graph.reversal`."""
+        self._before_change()
+        twin = TransitionGraph.from_state(exchanged(self.state(), edit, heirs, ids))
+        self._index, self._edges, self._histories = twin._index, twin._edges, twin._histories
+        self._forget()
 
     # ---- looking
 

@@ -18,4 +18,6 @@ from .events import TransitionSeen as TransitionSeen
 from .foresight import NextMotion as NextMotion
 from .learner import MotionLearner as MotionLearner
 from .learner_state import LearnerState as LearnerState
+from .reversal import Known as Known
+from .reversal import LearnerEdit as LearnerEdit
 from .watching import Watching as Watching

@@ -189,6 +189,31 @@ class Chain:
         """Follow a change of the tree that a person asked for, and count what is known by it."""
         return self._revise(change, dict(change.moved))
 
+    def exchange(
+        self,
+        segments: Mapping[int, tuple[int, int]],
+        heirs: Mapping[int, int | None],
+        moved: Mapping[int, int],
+    ) -> None:
+        """Follow an edit that was undone; the graph has followed it already.
+
+        Args:
+            segments: Segments that the edit had made something else: what they are, if nothing else
+                came since, and what they were; -1 stands for no primitive.
+            heirs: Primitives that are gone, and what has what came to them since.
+            moved: Other segments by number, and the primitive that they are now.
+        """
+        gone: dict[int | None, int | None] = dict(heirs.items())
+        for seen in self._segments:
+            now, was = segments.get(seen.number, (-2, -2))
+            if now == (-1 if seen.primitive is None else seen.primitive):
+                seen.primitive = was
+            else:
+                seen.primitive = moved.get(seen.number, gone.get(seen.primitive, seen.primitive))
+            seen.nearest = gone.get(seen.nearest, seen.nearest)
+            if seen.primitive not in self.graph:
+                seen.primitive = None
+
     def _revise(self, change: Placement | Change, moved: Mapping[int, int]) -> list[Event]:
         """Follow the tree where earlier segments turned out to be something else."""
         for merge in change.merges:

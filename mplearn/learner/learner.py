@@ -21,7 +21,7 @@ from ..people import PeopleTree
 from ..recording import BoolArray, FloatArray, Recording, Segment, are_markers
 from ..segmentation import make_segmenter
 from ..state import from_plain, require, to_plain, validated, within
-from ..tree import Change, MirrorMap, Placement, make_distance
+from ..tree import Change, Exchange, MirrorMap, Placement, Recogniser, make_distance
 from .absurd import AbsurdFrames
 from .buffer import FrameBuffer
 from .chain import Chain
@@ -43,6 +43,7 @@ from .events import (
 )
 from .foresight import NextMotion
 from .learner_state import FILES, LearnerState
+from .reversal import Known, LearnerEdit
 from .shown_once import with_shown_once
 from .snapshot import Snapshots
 from .watching import Watching
@@ -96,6 +97,8 @@ class MotionLearner:
         self._person = -1
         self._lost_from, self._lost_why = -1, ""
         self._absurd = AbsurdFrames(len(config.channels), config.rate_hz)
+        self._paused = False
+        self._looking: Recogniser | None = None
 
     @property
     def person(self) -> int:
@@ -159,7 +162,7 @@ class MotionLearner:
         """
         if at_once < 1:
             raise InvalidValueError(f"at_once must be positive, not {at_once}")
-        self._checks.recording(recording)
+        self.check_recording(recording)
         ended = self.begin_stream(recording.channels)
         if ended:
             yield ended
@@ -204,6 +207,14 @@ class MotionLearner:
         self._checks = StreamChecks(channels, self.config.rate_hz, gaps=True)
         return events
 
+    def check_recording(self, recording: Recording) -> None:
+        """Check that a recording can be learned here.
+
+        Raises:
+            FrameError: The recording has other channels, or another rate.
+        """
+        self._checks.recording(recording)
+
     def end_stream(self) -> list[Event]:
         """Close what is open: what comes next is another stream, perhaps of another person."""
         events: list[Event] = []
@@ -237,8 +248,77 @@ class MotionLearner:
         """Take a primitive out; see `PeopleTree.remove`."""
         return self._edited(self.tree.remove(id, forget=forget))
 
+    def freeze(self, id: int) -> Change:
+        """Let a primitive stay as it is, whatever comes, in every `snapshot`.
+
+        What is like it is recognised, and its transitions are counted; neither rules nor hands
+        change it. How far a motion may lie from it is still measured on the scale of all motion.
+
+        Raises:
+            UnknownPrimitiveError: There is no such primitive.
+        """
+        change = self.tree.freeze(id)
+        self._snapshots.freeze(self.tree, id)
+        return change
+
+    def unfreeze(self, id: int) -> Change:
+        """Let a primitive change again.
+
+        Raises:
+            UnknownPrimitiveError: There is no such primitive.
+        """
+        change = self.tree.freeze(id, frozen=False)
+        self._snapshots.frozen.pop(id, None)
+        return change
+
+    def pause(self) -> None:
+        """Stop learning: motions are recognised from now on, and change nothing."""
+        self._paused, self._looking = True, None
+
+    def resume(self) -> None:
+        """Go on learning; what comes next does not follow what came before."""
+        if self._paused:
+            self._paused = False
+            self.chain.broken()
+
+    @property
+    def paused(self) -> bool:
+        """Whether motions are recognised only."""
+        return self._paused
+
+    def known(self) -> Known:
+        """Return what is known of motions now; two of them make a `LearnerEdit`."""
+        frozen = tuple(self._snapshots.frozen.values())
+        return Known(self.tree.state(), self.graph.state(), self.chain.state(), frozen)
+
+    def exchange(self, edit: LearnerEdit) -> Exchange:
+        """Undo what a person did, however long ago; what was learned since stays.
+
+        Primitives that are gone by the edit come back with their ids, exemplars and counts. What
+        came since to what the edit made goes to the nearest of those that it was made of. With
+        ``edit.reversed()`` it is done again.
+
+        Args:
+            edit: What to take back: its ``before`` is put in the place of its ``after``.
+        """
+        found = self.tree.exchange(edit.people.reversed())
+        self.graph.exchange(edit.graph.reversed(), found.heirs, self.tree.leaves)
+        segments = edit.segments
+        pairs = zip(segments.after.tolist(), segments.before.tolist(), strict=True)
+        was = dict(zip(segments.number.tolist(), pairs, strict=True))
+        self.chain.exchange(was, found.heirs, dict(found.moved))
+        self._looking = None
+        frozen = self._snapshots.frozen
+        for each in edit.frozen_after:
+            frozen.pop(each.primitive.id, None)
+        frozen |= {each.primitive.id: each for each in edit.frozen_before}
+        for id in [id for id in frozen if id not in self.tree.leaves]:
+            del frozen[id]
+        return found
+
     def _edited(self, change: Change) -> Change:
         self.chain.revise(change)
+        self._looking = None
         return change
 
     # ---- what was learned
@@ -289,6 +369,8 @@ class MotionLearner:
             lost_from=self._lost_from,
             lost_why=self._lost_why,
             absurd=self._absurd.state(),
+            frozen=tuple(self._snapshots.frozen.values()),
+            paused=self._paused,
         )
 
     @classmethod
@@ -323,6 +405,8 @@ class MotionLearner:
         learner._clock_s, learner.n_frames = state.clock_s, state.n_frames
         learner._stream_start, learner._lost_from = state.stream_start, state.lost_from
         learner._lost_why, learner._person = state.lost_why, state.person
+        learner._snapshots.frozen = {each.primitive.id: each for each in state.frozen}
+        learner._paused = state.paused
         return learner
 
     def save(self, path: str | Path) -> Path:
@@ -475,7 +559,19 @@ class MotionLearner:
             segment = replace(segment, still=True)
             self.chain.paused(segment)
             return [SegmentClosed(segment)]
+        if self._paused:
+            return self._look(segment, frames)
         return self._place(segment, frames)
+
+    def _look(self, segment: Segment, frames: FloatArray) -> list[Event]:
+        """Recognise a segment, shape (L, V), and learn nothing."""
+        if self._looking is None:
+            self._looking = self.tree.recogniser()
+        found = self._looking.recognise(frames)
+        events: list[Event] = [SegmentClosed(segment)]
+        if found.primitive is not None:
+            events.append(Recognised(segment, found.primitive, found.distance))
+        return events
 
     def _place(self, segment: Segment, frames: FloatArray) -> list[Event]:
         """Learn from a segment in which something moves, as it is seen, shape (L, V)."""

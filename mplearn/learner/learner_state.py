@@ -16,6 +16,7 @@ from .absurd import AbsurdState
 from .buffer import BufferState
 from .chain import ChainState
 from .config import LearnerConfig
+from .snapshot import FrozenState
 from .watching import WatchState
 
 
@@ -39,6 +40,8 @@ class LearnerState(State):
         lost_from: First frame of what is lost now; -1 where nothing is.
         lost_why: Why it is.
         absurd: What frames of plain channels are held against.
+        frozen: Primitives that stay as they were.
+        paused: Whether motions are recognised only.
     """
 
     config: LearnerConfig
@@ -56,6 +59,8 @@ class LearnerState(State):
     lost_from: Annotated[int, Range(-1)]
     lost_why: str
     absurd: AbsurdState
+    frozen: tuple[FrozenState, ...] = ()
+    paused: bool = False
 
     def check(self) -> None:
         """Check that the stages have seen the same."""
@@ -76,6 +81,9 @@ class LearnerState(State):
             require(seen, "absurd.last", "must be a frame once there was one")
         require(self.lost_from <= self.n_frames, "lost_from", f"must be at most {self.n_frames}")
         primitives = self.tree.primitives
+        for k, frozen in enumerate(self.frozen):
+            there = frozen.primitive.id in primitives
+            require(there, f"frozen[{k}]", f"must be one of {sorted(primitives)}")
         ids = set(self.graph.ids.tolist())
         require(ids <= primitives, "graph.ids", f"must be primitives, {sorted(primitives)}")
         for k, block in enumerate(self.chain.segments):

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 from ..body import View
 from ..graph import TransitionGraph
 from ..hmm import LeftRightHMM
 from ..library import Primitive, PrimitiveLibrary, TreeNode
 from ..people import PeopleTree
+from ..state import SharedState
 from ..tree import Node
+
+
+@dataclass(frozen=True, eq=False)
+class FrozenState(SharedState):
+    """A primitive that stays as it was when it was frozen."""
+
+    primitive: Primitive
 
 
 class Snapshots:
@@ -18,6 +28,9 @@ class Snapshots:
         channels: What the primitives are made of.
         rate_hz: Frames per second [1/s].
         body: Name of the body whose features the channels are; empty for none.
+
+    Attributes:
+        frozen: Primitives that stay as they were, by id.
     """
 
     def __init__(self, view: View, channels: tuple[str, ...], rate_hz: float, body: str) -> None:
@@ -26,6 +39,12 @@ class Snapshots:
         self._rate_hz = rate_hz
         self._body = body
         self._made: dict[int, tuple[LeftRightHMM, Primitive]] = {}
+        self.frozen: dict[int, FrozenState] = {}
+
+    def freeze(self, tree: PeopleTree, id: int) -> None:
+        """Let a primitive be what it is now in all libraries to come."""
+        (node,) = (node for node in tree.nodes if node.id == id)
+        self.frozen[id] = FrozenState(self._primitive(tree, node)[1])
 
     def take(self, tree: PeopleTree, graph: TransitionGraph) -> PrimitiveLibrary:
         """Return the primitives and transitions that are known now.
@@ -38,8 +57,12 @@ class Snapshots:
         """
         nodes = {node.id: node for node in tree.nodes}
         self._made = {id: self._primitive(tree, nodes[id]) for id in tree.leaves}
+        primitives = [
+            replace(self.frozen[id].primitive, parent=made.parent) if id in self.frozen else made
+            for id, (_, made) in self._made.items()
+        ]
         return PrimitiveLibrary(
-            primitives=tuple(primitive for _, primitive in self._made.values()),
+            primitives=tuple(primitives),
             graph=graph,
             channels=self._channels,
             rate_hz=self._rate_hz,

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -20,6 +21,18 @@ class ConstraintsState(State):
 
     together: tuple[tuple[tuple[Count, Count], tuple[Count, Count]], ...]
     apart: tuple[tuple[tuple[Count, Count], tuple[Count, Count]], ...]
+
+
+class Said(Protocol):
+    """Pairs of leaves that are together, and apart."""
+
+    @property
+    def together(self) -> Collection[Pair]:
+        """Pairs that are one motion."""
+
+    @property
+    def apart(self) -> Collection[Pair]:
+        """Pairs that are not."""
 
 
 class Constraints:
@@ -56,6 +69,16 @@ class Constraints:
                 taken = {_pair(key, other) for key in new for other in others if key != other}
                 setattr(self, name, (pairs - mine) | taken)
         self._apart -= self._together
+
+    def exchange(self, gone: Said, back: Said, keys: Collection[Key] = ()) -> None:
+        """Take back what was said, and say something else instead, of leaves that are there."""
+        there = set(keys)
+        together, apart = (
+            {pair for pair in pairs if there.issuperset(pair)}
+            for pairs in (back.together, back.apart)
+        )
+        self._together = (self._together - set(gone.together)) | together
+        self._apart = ((self._apart - set(gone.apart)) | apart) - self._together
 
     def among(self, keys: Sequence[Key]) -> tuple[BoolArray, BoolArray]:
         """Return which of some leaves are together, and which apart, shape (n, n) each."""

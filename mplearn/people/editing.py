@@ -26,7 +26,7 @@ def split(sharing: Sharing, id: int, groups: Sequence[Sequence[int]] | None) -> 
 
     Raises:
         UnknownPrimitiveError: There is no such primitive.
-        InvalidValueError: The groups are wrong, or there are too few exemplars.
+        InvalidValueError: The groups are wrong, or there are too few exemplars; it is frozen.
     """
     leaves = _primitive(sharing, id)
     if groups is None and len(leaves) == 1:
@@ -54,7 +54,7 @@ def split(sharing: Sharing, id: int, groups: Sequence[Sequence[int]] | None) -> 
         born.append(sharing.found(group))
         moved += [(n, born[-1]) for leaf in group for n in sharing.members(leaf)]
     sharing.put_above(id, born)
-    return _settled(sharing, Change(tuple(born), (Split(id, tuple(born)),), moved=tuple(moved)))
+    return settled(sharing, Change(tuple(born), (Split(id, tuple(born)),), moved=tuple(moved)))
 
 
 def merge(sharing: Sharing, first: int, second: int) -> Change:
@@ -71,7 +71,7 @@ def merge(sharing: Sharing, first: int, second: int) -> Change:
     for leaf in leaves[younger]:
         _join(sharing, leaf, older)
     sharing.constraints.must_link(leaf.key for leaf in sharing.leaves_of(older))
-    return _settled(sharing, Change(merges=(Merge(older, younger),)))
+    return settled(sharing, Change(merges=(Merge(older, younger),)))
 
 
 def move(sharing: Sharing, id: int, parent: int) -> Change:
@@ -94,7 +94,7 @@ def move(sharing: Sharing, id: int, parent: int) -> Change:
     if id in inner or (id in sharing.primitives and parent in inner):
         _check_above(sharing, id, parent)
         sharing.parents[id] = parent
-        return _settled(sharing, Change(reparented=(Reparent(id, parent),)))
+        return settled(sharing, Change(reparented=(Reparent(id, parent),)))
     leaves = sharing.leaves_of(id)
     if len(leaves) > 1 or parent == leaves[0].primitive:
         raise InvalidValueError(
@@ -103,21 +103,23 @@ def move(sharing: Sharing, id: int, parent: int) -> Change:
         )
     leaf = leaves[0]
     left = leaf.primitive
+    for each in {left, parent} - inner:
+        _primitive(sharing, each)
     staying = [each for each in sharing.leaves_of(left) if each is not leaf]
     _part(sharing, [[leaf], staying])
     moved = sharing.members(leaf)
     if parent in inner:
         home = sharing.found([leaf], below=parent)
         change = Change(born=(home,), moved=tuple((n, home) for n in moved))
-        return _settled(sharing, change)
+        return settled(sharing, change)
     _join(sharing, leaf, parent)
     sharing.constraints.must_link(each.key for each in sharing.leaves_of(parent))
     if not staying:
-        return _settled(sharing, Change(merges=(Merge(parent, left),)))
+        return settled(sharing, Change(merges=(Merge(parent, left),)))
     change = Change(
         moved=tuple((n, parent) for n in moved), reparented=(Reparent(leaf.id, parent),)
     )
-    return _settled(sharing, change)
+    return settled(sharing, change)
 
 
 def remove(sharing: Sharing, id: int, *, forget: bool) -> Change:
@@ -127,6 +129,7 @@ def remove(sharing: Sharing, id: int, *, forget: bool) -> Change:
         UnknownPrimitiveError: There is no such primitive.
     """
     leaves = sharing.leaves_of(id) or _primitive(sharing, id)
+    _primitive(sharing, leaves[0].primitive)
     moved: list[tuple[int, int]] = []
     for leaf in leaves:
         moved += [(n, ROOT) for n in sharing.members(leaf)]
@@ -135,13 +138,32 @@ def remove(sharing: Sharing, id: int, *, forget: bool) -> Change:
         sharing.drop_leaf(leaf)
     gone = [id, *(leaf.primitive for leaf in leaves)]
     removed = tuple(dict.fromkeys(each for each in gone if each not in sharing.primitives))
-    return _settled(sharing, Change(moved=() if forget else tuple(moved), removed=removed))
+    return settled(sharing, Change(moved=() if forget else tuple(moved), removed=removed))
 
 
-def _primitive(sharing: Sharing, id: int) -> list[Leaf]:
+def freeze(sharing: Sharing, id: int, frozen: bool) -> Change:
+    """Let all leaves of a primitive stay as they are, or change again.
+
+    Raises:
+        UnknownPrimitiveError: There is no such primitive.
+    """
+    for leaf in _known(sharing, id):
+        sharing.trees[leaf.person].freeze(leaf.local, frozen)
+    return Change()
+
+
+def _known(sharing: Sharing, id: int) -> list[Leaf]:
     if id not in sharing.primitives:
         raise UnknownPrimitiveError(f"no primitive {id}; known are {list(sharing.primitives)}")
     return sharing.leaves_of(id)
+
+
+def _primitive(sharing: Sharing, id: int) -> list[Leaf]:
+    """Return the leaves of a primitive that may change."""
+    leaves = _known(sharing, id)
+    if any(sharing.frozen(leaf) for leaf in leaves):
+        raise InvalidValueError(f"primitive {id} is frozen; unfreeze it first")
+    return leaves
 
 
 def _branches(sharing: Sharing, leaves: Sequence[Leaf]) -> list[list[int]]:
@@ -217,7 +239,7 @@ def _part(sharing: Sharing, sides: Sequence[Sequence[Leaf]]) -> None:
             sharing.trees[leaf.person].node(leaf.local).apart |= own
 
 
-def _settled(sharing: Sharing, change: Change) -> Change:
+def settled(sharing: Sharing, change: Change) -> Change:
     """Let what waits, names and nodes above follow a change."""
     absorbed = {merge.absorbed: merge.kept for merge in change.merges}
     known = set(sharing.primitives)

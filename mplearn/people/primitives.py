@@ -9,10 +9,11 @@ from typing import Protocol
 from ..errors import UnknownPrimitiveError
 from ..hmm import LeftRightHMM
 from ..recording import FloatArray
-from ..tree import Change, Node, Placement, PrimitiveTree, Recogniser
+from ..tree import Change, Exchange, Node, Placement, PrimitiveTree, Recogniser
 from . import editing
 from .common import CommonRecogniser, common_model
 from .constraints import Key
+from .reversal import PeopleEdit, exchanged
 from .sharing import Sharing
 from .sharing_state import SharingState
 
@@ -75,6 +76,12 @@ class Primitives(Protocol):
 
     def remove(self, id: int, *, forget: bool) -> Change:
         """Take a primitive out."""
+
+    def freeze(self, id: int, frozen: bool) -> Change:
+        """Let a primitive stay as it is, or change again."""
+
+    def exchange(self, edit: PeopleEdit, exchanges: Mapping[int, Exchange]) -> Exchange:
+        """Follow an edit that was undone in people's trees."""
 
     def state(self) -> SharingState | None:
         """Return what is kept beside the trees."""
@@ -160,6 +167,15 @@ class OnePersonsPrimitives:
     def remove(self, id: int, *, forget: bool) -> Change:
         """Take a leaf out of the tree."""
         return self._edited(self.tree.remove(id, forget=forget))
+
+    def freeze(self, id: int, frozen: bool) -> Change:
+        """Freeze a leaf of the tree."""
+        return self.tree.freeze(id, frozen)
+
+    def exchange(self, edit: PeopleEdit, exchanges: Mapping[int, Exchange]) -> Exchange:
+        """Return what the only tree said."""
+        (found,) = exchanges.values()
+        return found
 
     def state(self) -> None:
         """Return nothing: all is in the tree."""
@@ -285,6 +301,14 @@ class SharedPrimitives:
     def remove(self, id: int, *, forget: bool) -> Change:
         """Take a primitive out, or a person's leaf of it."""
         return editing.remove(self.sharing, id, forget=forget)
+
+    def freeze(self, id: int, frozen: bool) -> Change:
+        """Freeze all leaves of a primitive."""
+        return editing.freeze(self.sharing, id, frozen)
+
+    def exchange(self, edit: PeopleEdit, exchanges: Mapping[int, Exchange]) -> Exchange:
+        """Let primitives follow what was undone in people's trees."""
+        return exchanged(self.sharing, edit, exchanges)
 
     def state(self) -> SharingState:
         """Return what people share."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from ..recording import FloatArray, IntArray
+from ..recording import BoolArray, FloatArray, IntArray
 from ..tree import ROOT, Change, Merge, MirrorMap, Node, Placement, PrimitiveTree, Split, TreeConfig
 from .config import PeopleConfig
 from .constraints import Constraints
@@ -140,8 +140,24 @@ class Sharing:
             strict=True,
         ):
             all_pairs[:n_leaves, :n_leaves] = pairs
+        self._keep_frozen(together, apart)
         people = np.array([places[each.person] for each in entries], dtype=np.int64)
         return Known(self.slots(entries), people, np.arange(n) < n_leaves, together, apart)
+
+    def frozen(self, leaf: Leaf) -> bool:
+        """Whether a leaf is to stay as it is."""
+        return self.trees[leaf.person].node(leaf.local).frozen
+
+    def _keep_frozen(self, together: BoolArray, apart: BoolArray) -> None:
+        """Let frozen primitives be what they are; a leaf that is new may join one."""
+        frozen = np.array([self.frozen(leaf) for leaf in self.leaves], dtype=np.bool_)
+        if not frozen.any():
+            return
+        homes = np.array([leaf.primitive for leaf in self.leaves])
+        same, n = homes[:, None] == homes, len(homes)
+        either = (frozen[:, None] | frozen) & (homes[:, None] != ROOT) & (homes != ROOT)
+        together[:n, :n] = np.where(either, same & ~np.eye(n, dtype=np.bool_), together[:n, :n])
+        apart[:n, :n] = np.where(either, ~same, apart[:n, :n])
 
     def measure_offsets(self) -> None:
         """Learn from what joined how its person deviates from others."""

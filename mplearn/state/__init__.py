@@ -2,6 +2,7 @@
 
 from .checkpoint import Checkpoint as Checkpoint
 from .checkpoint import checkpoint as checkpoint
+from .checkpoint import key_of as key_of
 from .checkpoint import resumed as resumed
 from .declared import Blob as Blob
 from .declared import SharedState as SharedState

@@ -22,4 +22,6 @@ from .recogniser import Recognition as Recognition
 from .relations import Relation as Relation
 from .relations import related as related
 from .repetitions import Repetition as Repetition
+from .reversal import Exchange as Exchange
+from .reversal import NodesEdit as NodesEdit
 from .tree import PrimitiveTree as PrimitiveTree

@@ -14,6 +14,19 @@ _LEAST = 2  # exemplars of a primitive; one alone has no width
 
 
 def leaf_of(structure: Structure, id: int) -> Node:
+    """Return a primitive that may change.
+
+    Raises:
+        UnknownPrimitiveError: There is none of this id.
+        InvalidValueError: It is frozen.
+    """
+    node = primitive_of(structure, id)
+    if node.frozen:
+        raise InvalidValueError(f"primitive {id} is frozen; unfreeze it first")
+    return node
+
+
+def primitive_of(structure: Structure, id: int) -> Node:
     """Return a primitive.
 
     Raises:

@@ -86,7 +86,7 @@ def forget_chances(structure: Structure, when: int) -> Change:
     patience = max(config.patience, 4 * len(leaves))
     change = Change()
     for leaf in leaves:
-        by_hand = leaf.whole or leaf.apart or len(leaf.history) > 1
+        by_hand = leaf.whole or leaf.frozen or leaf.apart or len(leaf.history) > 1
         if leaf.n_placed < config.confirmed and when - leaf.born_at > patience and not by_hand:
             change = change.then(structure.remove(leaf, when, forget=True))
     return change
@@ -107,7 +107,7 @@ def split_mixed(structure: Structure, leaf: Node, when: int) -> Change:
     them. Few exemplars look like two groups by chance, so the leaf must keep all that it may.
     """
     config = structure.config
-    if leaf.whole or len(leaf.members) < config.max_exemplars:
+    if leaf.whole or leaf.frozen or len(leaf.members) < config.max_exemplars:
         return Change()
     matrix = structure.memory.bank.matrix(leaf.members, without_tempo=True)
     branches = two_branches(matrix, config.min_branch)
@@ -129,6 +129,8 @@ def merge_duplicates(structure: Structure, matches: Sequence[Match], when: int) 
     if len(inside) < 2:
         return Change()
     older, younger = sorted((structure.nodes[id] for id in inside[:2]), key=lambda node: node.id)
+    if older.frozen or younger.frozen:
+        return Change()
     if older.id in younger.apart or younger.id in older.apart:
         return Change()
     joint = structure.joint(older, younger)

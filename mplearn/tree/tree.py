@@ -23,7 +23,7 @@ from ..state import (
     validated,
 )
 from .config import TreeConfig
-from .editing import chosen_groups, leaf_of, pair_of, place_below
+from .editing import chosen_groups, leaf_of, pair_of, place_below, primitive_of
 from .exemplars.bank import ExemplarBank
 from .exemplars.memory import SegmentMemory
 from .exemplars.renewal import RenewalState
@@ -34,6 +34,7 @@ from .nodes.structure import Structure
 from .placement import ROOT, Change, Placement
 from .recogniser import Recogniser, refusal
 from .repetitions import Repetition, most_repeated
+from .reversal import Exchange, NodesEdit, exchange
 from .rules import forget_chances, form_primitives, merge_duplicates, split_mixed
 
 _SHORTEST_S = 0.1
@@ -414,6 +415,23 @@ class PrimitiveTree:
         """
         leaf = leaf_of(self._structure, id)
         return self._edited(self._structure.remove(leaf, self.n_seen, forget=forget))
+
+    def freeze(self, id: int, frozen: bool = True) -> Change:
+        """Let a primitive stay as it is, whatever comes, or let it change again.
+
+        What is like it is recognised, and not learned; no rule and no hand changes it.
+
+        Raises:
+            UnknownPrimitiveError: There is no such primitive.
+        """
+        primitive_of(self._structure, id).frozen = frozen
+        return Change()
+
+    def exchange(self, edit: NodesEdit) -> Exchange:
+        """Undo an edit, or do it again; see `mplearn.tree.reversal`."""
+        found = exchange(self._structure, edit, self.n_seen)
+        self._models.forget()
+        return found
 
     def _edited(self, change: Change) -> Change:
         self._structure.tune()

@@ -61,6 +61,15 @@ class SegmentMemory:
             if gone is not None:
                 self.release(gone)
 
+    def recall(self, number: int, frames: Blob) -> None:
+        """Take up a segment again that may be forgotten by now, held once."""
+        if number not in self.frames:
+            self._model(number, frames.array)
+            self._blobs[number] = frames
+            if self.renewal is not None:
+                self.renewal.add(number)
+        self.hold(number)
+
     def hold(self, *numbers: int) -> None:
         """Keep segments until they are released as often as they were held."""
         self._holds.update(numbers)
@@ -173,9 +182,13 @@ class SegmentMemory:
         held = [*zip(self._sample.numbers, sample.frames, strict=True), *held]
         self._holds = Counter(number for number, _ in held)
         self._blobs = dict(sorted(dict(held).items()))
-        self.frames = {number: blob.array for number, blob in self._blobs.items()}
+        self.frames = {}
         self.bank = ExemplarBank(self.config, len(floor), floor)
-        for number, frames in self.frames.items():
+        for number, blob in self._blobs.items():
             with within(f"segment {number}"):
-                seen = normalisation.normalised(frames, self.config.normalisation)
-                self.bank.add(number, self.bank.model(seen, len(frames)))
+                self._model(number, blob.array)
+
+    def _model(self, number: int, frames: FloatArray) -> None:
+        seen = normalisation.normalised(frames, self.config.normalisation)
+        self.bank.add(number, self.bank.model(seen, len(frames)))
+        self.frames[number] = frames

@@ -13,7 +13,7 @@ from ...state import Array, Blob, Count, SharedState, require
 from ..exemplars.spread import without
 from .clustering import most_redundant
 
-Happening: TypeAlias = Literal["born", "split", "merged", "moved"]
+Happening: TypeAlias = Literal["born", "split", "merged", "moved", "undone"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +37,7 @@ class NodeState(SharedState):
     history: tuple[tuple[Happening, Count], ...]
     whole: bool
     apart: tuple[Count, ...]
+    frozen: bool = False
 
     def exemplars(self) -> Iterator[tuple[int, Blob]]:
         """Go through the numbers and frames of the exemplars."""
@@ -67,9 +68,10 @@ class Node:
         children: Ids of the nodes below.
         settled: Those of its exemplars that went to one of them.
         history: Kind and time of what happened to it: ("born", n), ("split", n), ("merged", n),
-            ("moved", n).
+            ("moved", n), ("undone", n).
         whole: Whether a person said that it is one motion: the rules never split it.
         apart: Ids of leaves that a person said are other motions: the rules never merge them.
+        frozen: Whether a person said that it is to stay as it is: nothing changes its exemplars.
     """
 
     id: int
@@ -84,6 +86,7 @@ class Node:
     history: list[tuple[Happening, int]] = field(default_factory=list)
     whole: bool = False
     apart: set[int] = field(default_factory=set)
+    frozen: bool = False
     _kept: tuple[tuple[Any, ...], NodeState] | None = field(default=None, repr=False, compare=False)
 
     @property
@@ -141,6 +144,7 @@ class Node:
                 history=tuple(self.history),
                 whole=self.whole,
                 apart=tuple(sorted(self.apart)),
+                frozen=self.frozen,
             )
             self._kept = now, state
         return self._kept[1]
@@ -161,6 +165,7 @@ class Node:
             history=list(state.history),
             whole=state.whole,
             apart=set(state.apart),
+            frozen=state.frozen,
         )
         node._kept = node._plain(), state
         return node
@@ -168,7 +173,7 @@ class Node:
     def _plain(self) -> tuple[Any, ...]:
         """Return all that is changed in place, for comparison."""
         return (
-            *(self.parent, self.born_at, self.n_placed, self.n_frames, self.whole),
+            *(self.parent, self.born_at, self.n_placed, self.n_frames, self.whole, self.frozen),
             *(tuple(self.members), tuple(self.children), tuple(self.history)),
             *(tuple(sorted(self.settled)), tuple(sorted(self.apart))),
         )

@@ -80,7 +80,12 @@ class Structure:
         self.tune()
 
     def add(self, node: Node, number: int) -> None:
-        """Put a segment into a node; the least informative exemplars of a full one go."""
+        """Put a segment into a node; the least informative exemplars of a full one go.
+
+        A frozen one knows it, and stays as it is.
+        """
+        if node.frozen:
+            return
         bank = self.memory.bank
         node.add(number, bank.distances(bank[number], node.members))
         node.n_placed += 1

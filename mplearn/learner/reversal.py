@@ -1,0 +1,108 @@
+"""What a person did to a learner is undone, and what was learned since stays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from ..graph import GraphEdit, GraphState
+from ..people import PeopleEdit, PeopleState
+from ..recording import IntArray
+from ..state import Array, State
+from .chain import ChainState
+from .snapshot import FrozenState
+
+
+class Known(NamedTuple):
+    """What a learner knows of motions at one moment."""
+
+    people: PeopleState
+    graph: GraphState
+    chain: ChainState
+    frozen: tuple[FrozenState, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentsEdit(State):
+    """Segments that an edit made something else, shape (n,) each; -1 stands for no primitive.
+
+    Attributes:
+        number: The segments.
+        before: What they were.
+        after: What they were then.
+    """
+
+    number: Annotated[IntArray, Array("n", low=0)]
+    before: Annotated[IntArray, Array("n", low=-1)]
+    after: Annotated[IntArray, Array("n", low=-1)]
+
+    @classmethod
+    def between(cls, before: ChainState, after: ChainState) -> SegmentsEdit:
+        """Return what differs between a chain of one moment and another."""
+        old, new = (
+            {
+                number: primitive
+                for block in state.segments
+                for number, primitive in zip(
+                    block.number.tolist(), block.primitive.tolist(), strict=True
+                )
+            }
+            for state in (before, after)
+        )
+        rows = [(n, old[n], id) for n, id in new.items() if n in old and old[n] != id]
+        columns = np.array(rows, np.int64).reshape(len(rows), 3)
+        return cls(*(np.ascontiguousarray(columns[:, k]) for k in range(3)))
+
+    def reversed(self) -> SegmentsEdit:
+        """Return the edit that undoes this one."""
+        return SegmentsEdit(self.number, self.after, self.before)
+
+
+@dataclass(frozen=True, eq=False)
+class LearnerEdit(State):
+    """What an edit changed: in the trees, in the graph, and in what segments are.
+
+    `MotionLearner.exchange` undoes it; it can do so long after, when much was learned since.
+    """
+
+    people: PeopleEdit
+    graph: GraphEdit
+    segments: SegmentsEdit
+    frozen_before: tuple[FrozenState, ...]
+    frozen_after: tuple[FrozenState, ...]
+
+    @classmethod
+    def between(cls, before: Known, after: Known) -> LearnerEdit:
+        """Return what differs between what is known at one moment and another."""
+        return cls(
+            PeopleEdit.between(before.people, after.people),
+            GraphEdit.between(before.graph, after.graph),
+            SegmentsEdit.between(before.chain, after.chain),
+            tuple(each for each in before.frozen if each not in after.frozen),
+            tuple(each for each in after.frozen if each not in before.frozen),
+        )
+
+    def reversed(self) -> LearnerEdit:
+        """Return the edit that undoes this one."""
+        return LearnerEdit(
+            self.people.reversed(),
+            self.graph.reversed(),
+            self.segments.reversed(),
+            self.frozen_after,
+            self.frozen_before,
+        )
+
+    @property
+    def primitives(self) -> set[int]:
+        """Ids of the primitives that it is about."""
+        frozen = {each.primitive.id for each in (*self.frozen_before, *self.frozen_after)}
+        return self.people.primitives | frozen
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing changed."""
+        nodes = any(each.nodes.before or each.nodes.after for each in self.people.trees)
+        graph = len(self.graph.before.edges) + len(self.graph.after.edges)
+        return not (nodes or graph or self.frozen_before or self.frozen_after)
