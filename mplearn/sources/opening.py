@@ -8,7 +8,11 @@ from typing import Any
 from ..mocap import Hints
 from .played import play_demonstrator, play_recording
 from .protocols.lsl import open_lsl
+from .protocols.natnet import open_natnet
 from .protocols.own import open_ndjson, open_udp
+from .protocols.qtm import open_qtm
+from .protocols.vmc import open_vmc
+from .protocols.xsens import open_xsens
 from .rate import ResampledSource
 from .recognised import RecognisedSource
 from .registry import Observe, Wanted, connect, register_source
@@ -17,6 +21,10 @@ from .source import Source
 register_source("recording", play_recording)
 register_source("demonstrator", play_demonstrator)
 register_source("lsl", open_lsl)
+register_source("qtm", open_qtm)
+register_source("natnet", open_natnet)
+register_source("vmc", open_vmc)
+register_source("xsens", open_xsens)
 register_source("ndjson", open_ndjson)
 register_source("udp", open_udp)
 

@@ -168,17 +168,28 @@ class RecognisedSource(Source):
         raw = self._raw
         assert raw is not None
         known = raw.recording is not None or not self._placeable
-        if not (known or at_last or self._seen_frames >= self._next_look):
-            return []
-        try:
-            sight = self._find(raw, np.concatenate([b.frames for b in self._held]))
-        except MPLearnError as error:
-            return self._not_found(str(error), at_last=at_last)
-        doubt = any(text.startswith("warning") for text in sight.report)
-        if doubt and not known and not at_last and self._seen_frames < self._frames(DOUBT_S):
-            self._next_look += self._frames(FIRST_LOOK_S)
-            return []
-        return self._found(sight)
+        out: list[Block | Change] = []
+        while self._held and (known or at_last or self._seen_frames >= self._next_look):
+            try:
+                sight = self._find(raw, self._looked_at(all_of_it=known or at_last))
+            except MPLearnError as error:
+                out += self._not_found(str(error), at_last=at_last)
+                continue
+            doubt = any(text.startswith("warning") for text in sight.report)
+            if doubt and not (known or at_last) and self._next_look < self._frames(DOUBT_S):
+                self._next_look += self._frames(FIRST_LOOK_S)
+                continue
+            return out + self._found(sight)
+        return out
+
+    def _looked_at(self, *, all_of_it: bool) -> FloatArray:
+        """Return the frames to look at: however they came, the same ones."""
+        frames = np.concatenate([b.frames for b in self._held])
+        seen = np.isfinite(frames).any(axis=1)
+        later = self._seen_frames - self._next_look  # that came after those to look at
+        if all_of_it or later <= 0:
+            return frames
+        return frames[: len(frames) - int(np.argmax(np.cumsum(seen[::-1]) > later))]
 
     def _found(self, sight: Sight) -> list[Block | Change]:
         """Go on with a body, and hand out what was held back."""
@@ -203,7 +214,7 @@ class RecognisedSource(Source):
 
     def _not_found(self, why: str, *, at_last: bool) -> list[Block | Change]:
         """Go on without a body: keep the latest frames only, and say why."""
-        self._next_look = self._seen_frames + self._frames(FIRST_LOOK_S)
+        self._next_look += self._frames(FIRST_LOOK_S)
         dropped = 0
         limit = 0 if at_last else self._frames(PATIENCE_S)
         while self._held and self._held_frames - len(self._held[0]) >= limit:
