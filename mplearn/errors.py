@@ -67,6 +67,34 @@ class LibraryError(MPLearnError):
     """A library file is damaged, of another version, or not written by mplearn."""
 
 
+class StoreError(MPLearnError):
+    """A store cannot be opened, read or written."""
+
+
+class NotAStoreError(StoreError):
+    """A file is no store: it is missing, of something else, or was never finished."""
+
+
+class StoreVersionError(StoreError):
+    """A store was written by a newer version of mplearn."""
+
+
+class StoreInUseError(StoreError):
+    """A store has a writer already."""
+
+
+class StoreDamagedError(StoreError):
+    """What a store holds is not what was written."""
+
+
+class StoreWriteError(StoreError):
+    """A store cannot be written: the disk is full, or the file is read-only."""
+
+
+class StoreWarning(UserWarning):
+    """A store cannot be written for now, or was mended; what was learned is safe in memory."""
+
+
 class RobotError(MPLearnError):
     """A robot description is incomplete, or a motion does not fit the robot."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import TypeAlias, Unpack
 
@@ -30,6 +31,7 @@ from .novelty import AnomalyScore, MotionNovelty, novelty_of
 from .primitive import Primitive, TreeNode
 
 Key: TypeAlias = int | str
+_STORE = b"SQLite format 3\0"
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,9 +299,16 @@ class PrimitiveLibrary:
     def load(cls, path: str | Path) -> PrimitiveLibrary:
         """Read a library that `save` wrote: equal in every value, and so in `version`.
 
+        A store (`mplearn.store`) will do as well, also while it grows: it is what is known then.
+
         Raises:
             LibraryError: The file is missing, damaged, foreign, or of a newer version.
+            StoreError: It is a store that cannot be read.
         """
+        if _is_store(Path(path)):
+            store = import_module("mplearn.store")  # which stands above: loaded where needed
+            library: PrimitiveLibrary = store.library_of(path)
+            return library
         content = FILES.read(Path(path))
         try:
             return cls.from_state(from_plain(LibraryState, content))
@@ -360,3 +369,12 @@ class PrimitiveLibrary:
 
     def _known(self, sequence: Sequence[Key | None]) -> History:
         return [None if key is None else self[key].id for key in sequence]
+
+
+def _is_store(path: Path) -> bool:
+    """Whether a file is a store, by its first bytes."""
+    try:
+        with path.open("rb") as file:
+            return file.read(len(_STORE)) == _STORE
+    except OSError:
+        return False

@@ -2,8 +2,11 @@
 
 from .checkpoint import Checkpoint as Checkpoint
 from .checkpoint import checkpoint as checkpoint
+from .checkpoint import from_bytes as from_bytes
+from .checkpoint import hash_of as hash_of
 from .checkpoint import key_of as key_of
 from .checkpoint import resumed as resumed
+from .checkpoint import to_bytes as to_bytes
 from .declared import Blob as Blob
 from .declared import SharedState as SharedState
 from .declared import State as State

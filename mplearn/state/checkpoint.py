@@ -66,7 +66,7 @@ def checkpoint(state: Any, known: Container[str] = ()) -> Checkpoint:
                 new[key] = data or _packed(part)[2]
         return {_KEY: key}
 
-    document = _joined(to_plain(state, note))
+    document = to_bytes(to_plain(state, note))
     return Checkpoint(document, tuple(found), new)
 
 
@@ -95,14 +95,14 @@ def resumed(kind: type[T], document: bytes, part: Callable[[str], bytes]) -> T:
             raise StateError(f"a part must be named by its key, not {key!r:.60}")
         if key not in seen:
             data = _fetched(part, key)
-            if _hash(data) != key:
+            if hash_of(data) != key:
                 raise StateError(f"part {key} is damaged: its content has another key")
-            content = plain(_parted(data))
+            content = plain(from_bytes(data))
             seen[key] = Blob(content) if isinstance(content, np.ndarray) else content
         return seen[key]
 
     try:
-        return from_plain(kind, plain(_parted(document)))
+        return from_plain(kind, plain(from_bytes(document)))
     except RecursionError as error:
         raise StateError("its parts are nested too deep") from error
 
@@ -127,23 +127,30 @@ def _packed(part: Part) -> tuple[str, tuple[Part, ...], bytes]:
         inner.append(each)
         return {_KEY: key_of(each)}
 
-    data = _joined(part.array if isinstance(part, Blob) else fields_of(part, note))
-    key = _hash(data)
+    data = to_bytes(part.array if isinstance(part, Blob) else fields_of(part, note))
+    key = hash_of(data)
     object.__setattr__(part, "content", (key, tuple(inner)))
     return key, tuple(inner), data
 
 
-def _hash(data: bytes) -> str:
+def hash_of(data: bytes) -> str:
+    """Return the key of a content."""
     return hashlib.blake2b(data, digest_size=16).hexdigest()
 
 
-def _joined(plain: Any) -> bytes:
+def to_bytes(plain: Any) -> bytes:
+    """Return plain values and arrays as bytes: those of a document, or of a part."""
     body, blob = packed(plain)
     text = as_json(body)
     return len(text).to_bytes(8, "little") + text + blob
 
 
-def _parted(data: bytes) -> Any:
+def from_bytes(data: bytes) -> Any:
+    """Return the plain values and arrays that `to_bytes` described.
+
+    Raises:
+        StateError: The bytes are damaged.
+    """
     length = int.from_bytes(data[:8], "little")
     return unpacked(from_json(data[8 : 8 + length]), data[8 + length :])
 

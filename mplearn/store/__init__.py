@@ -16,3 +16,10 @@ from .commands import register_command as register_command
 from .journal import Entry as Entry
 from .journal import Happening as Happening
 from .life import LifelongLearner as LifelongLearner
+from .reader import StoreReader as StoreReader
+from .reader import library_of as library_of
+from .store import Store as Store
+from .store import StoreInfo as StoreInfo
+from .store import backup as backup
+from .store import check as check
+from .store import info as info

@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from ..errors import FrameError, InvalidValueError, StateError
+from ..errors import (
+    FrameError,
+    InvalidValueError,
+    NotAStoreError,
+    StateError,
+    StoreDamagedError,
+    StoreWarning,
+)
 from ..learner import Event, MotionLearner
 from ..learner.events import PrimitiveMerged
 from ..library import PrimitiveLibrary
@@ -20,6 +29,8 @@ from .journal import Entry, Happening, Journal, happenings_of
 from .labels import Labels, named
 from .life_state import LifeState, SourcesState
 from .records import Begin, Done, End, Frames, Log, Record
+from .rows import record_of
+from .store import Found, Store
 
 _CHUNK_S = 1.0  # of frames that are written together
 
@@ -61,6 +72,83 @@ class LifelongLearner:
         self._n_chunk = 0
         self._revision = 0
         self._shown: tuple[int, PrimitiveLibrary] | None = None
+
+    @classmethod
+    def open(
+        cls,
+        path: str | Path,
+        create: Callable[[], MotionLearner] | None = None,
+        *,
+        checkpoint_s: float = 30.0,
+        salvage: bool = False,
+    ) -> LifelongLearner:
+        """Open a store, and go on where it was left, however that came about.
+
+        `close` it, or use it in a ``with``; a process that ends without loses a second at most.
+
+        Args:
+            path: The file.
+            create: Makes the learner of a new store; None where there must be one.
+            checkpoint_s: Time of stream between checkpoints [s]: so much is learned again from the
+                log at opening, at most.
+            salvage: Whether to be content with what comes before damage.
+
+        Raises:
+            StoreError: It cannot be opened; the class says why.
+        """
+        if create is None and not Path(path).exists():
+            raise NotAStoreError(f"there is no store {path}")
+        store = Store(path, checkpoint_s=checkpoint_s)
+        try:
+            found = store.load(salvage=salvage)
+            if found is None:
+                if create is None:
+                    raise NotAStoreError(f"{path} holds no store: it was never finished")
+                life = cls(create())
+            else:
+                life = cls.of_found(found)
+                if found.damage:
+                    warnings.warn("; ".join(found.damage), StoreWarning, stacklevel=2)
+            store.start(found, life.state, life.learner.config.rate_hz)
+        except BaseException:
+            store.close()
+            raise
+        life.store = store
+        return life
+
+    @classmethod
+    def of_found(cls, found: Found) -> LifelongLearner:
+        """Return what a store held: its checkpoint, and what was learned since.
+
+        Raises:
+            StoreDamagedError: They do not fit each other.
+        """
+        try:
+            life = cls.from_state(found.state)
+            for row in found.rows:
+                life.replay(record_of(row))
+        except StateError as error:
+            raise StoreDamagedError(f"what the store holds cannot be: {error}") from error
+        return life
+
+    def close(self) -> None:
+        """Close what is open, and the store, in which all is kept.
+
+        Raises:
+            StoreWriteError: Not all could be written.
+        """
+        if isinstance(self.store, Store):
+            self._close_chunk()
+            store, self.store = self.store, None
+            store.close(self.state())
+
+    def __enter__(self) -> LifelongLearner:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self.close()
 
     # ---- learning
 
@@ -164,6 +252,8 @@ class LifelongLearner:
             MPLearnError: It cannot be done; nothing has changed then.
         """
         when = time.time() if when is None else float(when)
+        if not np.isfinite(when):
+            raise InvalidValueError(f"when must be finite, not {when}")
         self._close_chunk()
         number, frame = self._journal.next_number, self.learner.n_frames
         entry = Entry(number, command, str(by), when, frame)

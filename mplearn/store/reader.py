@@ -1,0 +1,82 @@
+"""A store as others read it, while it grows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..errors import NotAStoreError, StoreDamagedError
+from ..library import PrimitiveLibrary
+from .database import errors_of, open_reading
+from .life import LifelongLearner
+from .rows import checkpoints, read_rows, record_of
+from .store import read_all
+
+
+class StoreReader:
+    """What a store holds now; the store is neither changed, nor held up.
+
+    Args:
+        path: The file.
+
+    Attributes:
+        life: What is known, as of the last `refresh`: to look at.
+
+    Raises:
+        StoreError: It cannot be read; the class says why.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self._seq = -1
+        self.life = self._read()
+
+    def refresh(self) -> bool:
+        """Take note of what came since; say whether anything did.
+
+        Raises:
+            StoreError: The store cannot be read any more.
+        """
+        connection = open_reading(self.path)
+        try:
+            with errors_of(self.path):
+                connection.execute("BEGIN")
+                newest = (checkpoints(connection) or [0])[0]
+                try:
+                    rows = list(read_rows(connection, self._seq))
+                except StoreDamagedError:  # the log no longer reaches back so far
+                    rows = []
+                    newest = max(newest, self._seq + 1)
+                finally:
+                    connection.execute("ROLLBACK")
+        finally:
+            connection.close()
+        if not rows and newest <= self._seq:
+            return False
+        if rows and rows[-1].seq >= newest:
+            for row in rows:
+                self.life.replay(record_of(row))
+            self._seq = rows[-1].seq
+        else:
+            self.life = self._read()
+        return True
+
+    def _read(self) -> LifelongLearner:
+        connection = open_reading(self.path)
+        try:
+            with errors_of(self.path):
+                found = read_all(connection, self.path)
+        finally:
+            connection.close()
+        if found is None:
+            raise NotAStoreError(f"{self.path} holds no store: it was never finished")
+        self._seq = found.rows[-1].seq if found.rows else found.seq
+        return LifelongLearner.of_found(found)
+
+
+def library_of(path: str | Path) -> PrimitiveLibrary:
+    """Return what a store knows now, frozen.
+
+    Raises:
+        StoreError: It cannot be read; the class says why.
+    """
+    return StoreReader(path).life.snapshot()

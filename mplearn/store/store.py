@@ -1,0 +1,346 @@
+"""The file that keeps a life of learning: a log of what came in, and checkpoints of what is known.
+
+The log is written about once a second, a checkpoint less often, both by a thread (`writer.py`).
+Opening takes the last checkpoint and learns on from the log, to the same state bit for bit as if
+nothing had happened. What no checkpoint needs any more goes.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from ..errors import InvalidValueError, StoreDamagedError, StoreError, StoreWarning, StoreWriteError
+from .database import errors_of, integrity, look_at, open_reading, open_writing
+from .journal import Entry
+from .life_state import LifeState
+from .lock import WriterLock
+from .records import Frames, Record
+from .rows import Row, checkpoints, read_checkpoint, read_rows, record_of
+from .schema import version_of
+from .writer import Figures, Writer
+
+_COMMAND_S = 5.0  # that a person waits at most for a command to be written
+_CLOSE_S = 60.0
+
+
+class Found(NamedTuple):
+    """What a store holds.
+
+    Attributes:
+        seq: Number of the last record in the checkpoint.
+        state: What was known then.
+        rows: The log since then.
+        parts: Keys of the parts of each checkpoint that is there.
+        damage: What is wrong, where an older checkpoint, or a part of the log, had to do.
+    """
+
+    seq: int
+    state: LifeState
+    rows: list[Row]
+    parts: dict[int, frozenset[str]]
+    damage: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class StoreInfo:
+    """A store at a glance.
+
+    Attributes:
+        path: The file.
+        version: Of its tables.
+        file_bytes: Size of the file and of what SQLite keeps beside it [byte].
+        records: Records in the log.
+        checkpoint: Number of the last record in the newest checkpoint; None before the first.
+        checkpoint_at: When that was written [s since 1970].
+        parts: Number of parts that checkpoints are made of.
+        free_bytes: Room in the file that is not used [byte].
+    """
+
+    path: Path
+    version: int
+    file_bytes: int
+    records: int
+    checkpoint: int | None
+    checkpoint_at: float | None
+    parts: int
+    free_bytes: int
+
+
+class Store:
+    """A store, opened to be written to, by this process alone.
+
+    It is used through `LifelongLearner`; others may read it meanwhile (`StoreReader`).
+
+    Args:
+        path: The file; made where there is none.
+        checkpoint_s: Time of stream between checkpoints [s].
+
+    Attributes:
+        path: The file.
+
+    Raises:
+        StoreError: It cannot be opened; the class says why.
+        InvalidValueError: ``checkpoint_s`` is not positive.
+    """
+
+    def __init__(self, path: str | Path, *, checkpoint_s: float = 30.0) -> None:
+        if not checkpoint_s > 0:
+            raise InvalidValueError(f"checkpoint_s must be positive, not {checkpoint_s}")
+        self.path = Path(path).resolve()
+        self._checkpoint_s = checkpoint_s
+        look_at(self.path)
+        self._lock = WriterLock(self.path)
+        try:
+            self._connection = open_writing(self.path)
+        except BaseException:
+            self._lock.release()
+            raise
+        self._writer: Writer | None = None
+        self._seq = 0
+        self._frames_since, self._rate_hz = 0, 100.0
+        self._warned = False
+
+    # ---- opening
+
+    def load(self, *, salvage: bool = False) -> Found | None:
+        """Return what the store holds; None where it is new.
+
+        Args:
+            salvage: Whether to be content with what comes before damage.
+
+        Raises:
+            StoreDamagedError: It is not what was written.
+        """
+        with errors_of(self.path):
+            return read_all(self._connection, self.path, salvage=salvage)
+
+    def start(self, found: Found | None, state: Callable[[], LifeState], rate_hz: float) -> None:
+        """Begin to write, now that what the store holds is known.
+
+        Args:
+            found: What `load` returned.
+            state: Returns what is known, the log included.
+            rate_hz: Frames per second of the stream [1/s].
+        """
+        with errors_of(self.path):
+            keys = {str(key) for (key,) in self._connection.execute("SELECT key FROM part")}
+            last = self._connection.execute("SELECT max(seq) FROM log").fetchone()[0]
+        kept = {} if found is None else found.parts
+        self._rate_hz = rate_hz
+        self._writer = Writer(self._connection, self.path, keys, kept)
+        self._seq = max(last or 0, 0 if found is None else found.seq)
+        if found is None or found.damage:
+            self._seq += 1
+            self._writer.put_checkpoint(self._seq, state())
+            if found is None:
+                self.flush()
+        else:
+            self._frames_since = sum(row.kind == "frames" for row in found.rows) * round(rate_hz)
+
+    # ---- writing
+
+    def append(self, record: Record, state: Callable[[], LifeState]) -> None:
+        """Keep a record; see `Log`. Nobody waits for the disk, but for a person's commands."""
+        writer = self._running()
+        self._seq += 1
+        writer.put(self._seq, record)
+        if isinstance(record, Frames):
+            self._frames_since += len(record.frames)
+        if self._frames_since >= self._checkpoint_s * self._rate_hz:
+            self._frames_since = 0
+            writer.put_checkpoint(self._seq, state())
+        if isinstance(record, Entry):
+            self.flush(_COMMAND_S)
+        self._warn()
+
+    def checkpoint(self, state: LifeState) -> None:
+        """Let all that is known be written now, as `close` does."""
+        self._frames_since = 0
+        self._running().put_checkpoint(self._seq, state)
+
+    def flush(self, timeout_s: float = _CLOSE_S) -> bool:
+        """Wait until all is on the disk; say whether it is."""
+        return self._running().flush(timeout_s)
+
+    @property
+    def problem(self) -> StoreError | None:
+        """Why nothing can be written at the moment; None where all is well."""
+        return None if self._writer is None else self._writer.problem
+
+    @property
+    def figures(self) -> Figures:
+        """What writing took."""
+        return self._running().figures
+
+    def close(self, state: LifeState | None = None) -> None:
+        """Write all that is known, and let others write.
+
+        Raises:
+            StoreWriteError: Not all could be written; what was written before is still there.
+        """
+        writer, self._writer = self._writer, None
+        problem: StoreError | None = None
+        if writer is not None:
+            if state is not None:
+                writer.put_checkpoint(self._seq, state)
+            done = writer.flush(_CLOSE_S)
+            writer.close(_CLOSE_S)
+            problem = None if done else writer.problem
+        try:
+            if problem is None:
+                self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+        except sqlite3.Error:  # a reader holds it: what is beside the file is read as well
+            pass
+        finally:
+            self._connection.close()
+            self._lock.release()
+        if problem is not None:
+            raise StoreWriteError(f"not all that was learned is in the store: {problem}")
+
+    def _running(self) -> Writer:
+        if self._writer is None:
+            raise StoreError(f"store {self.path} is closed, or was not started")
+        return self._writer
+
+    def _warn(self) -> None:
+        """Say once that writing fails, and once that it goes on."""
+        problem = self.problem
+        if problem is not None and not self._warned:
+            warnings.warn(
+                f"{problem}; learning goes on in memory, and writing is tried again",
+                StoreWarning,
+                stacklevel=4,
+            )
+        self._warned = problem is not None
+
+
+def read_all(connection: sqlite3.Connection, path: Path, *, salvage: bool = False) -> Found | None:
+    """Return the newest checkpoint that is sound, and the log since; None where there is none.
+
+    Raises:
+        StoreDamagedError: There are checkpoints, and none is sound; or the log is damaged.
+    """
+    connection.execute("BEGIN")
+    try:
+        damage: list[str] = []
+        parts: dict[int, frozenset[str]] = {}
+        for seq in checkpoints(connection):
+            try:
+                loaded = read_checkpoint(connection, seq)
+            except StoreDamagedError as error:
+                damage.append(str(error))
+                continue
+            parts[seq] = loaded.parts
+            rows = _rows(connection, seq, damage, salvage=salvage)
+            _others(connection, seq, parts, damage)
+            return Found(seq, loaded.state, rows, parts, tuple(damage))
+        if damage:
+            raise StoreDamagedError(
+                f"{path} is damaged: {damage[0]}; a backup of it can be opened instead"
+            )
+        return None
+    finally:
+        connection.execute("ROLLBACK")
+
+
+def _rows(
+    connection: sqlite3.Connection, seq: int, damage: list[str], *, salvage: bool
+) -> list[Row]:
+    rows: list[Row] = []
+    try:
+        for row in read_rows(connection, seq):
+            record_of(row)
+            rows.append(row)
+    except StoreDamagedError as error:
+        if not salvage:
+            raise StoreDamagedError(
+                f"{error}; what was learned before it can be had with salvage "
+                "(`mplearn store check --salvage`), or from a backup"
+            ) from error
+        damage.append(str(error))
+    return rows
+
+
+def _others(
+    connection: sqlite3.Connection, seq: int, parts: dict[int, frozenset[str]], damage: list[str]
+) -> None:
+    """Find the parts of older checkpoints, which are to be kept."""
+    for older in checkpoints(connection):
+        if older < seq:
+            try:
+                parts[older] = read_checkpoint(connection, older).parts
+            except StoreDamagedError as error:
+                damage.append(str(error))
+
+
+def backup(path: str | Path, to: str | Path) -> Path:
+    """Write a copy of a store as it is now, whoever writes to it; return its path.
+
+    Raises:
+        StoreError: It cannot be read, or the copy cannot be written.
+        InvalidValueError: There is a file already.
+    """
+    path, to = Path(path), Path(to)
+    if to.exists():
+        raise InvalidValueError(f"{to} exists already; a backup is a new file")
+    connection = open_reading(path)
+    try:
+        with errors_of(to):
+            connection.execute("VACUUM INTO ?", (str(to),))
+    except BaseException:
+        to.unlink(missing_ok=True)
+        raise
+    finally:
+        connection.close()
+    return to
+
+
+def check(path: str | Path) -> tuple[str, ...]:
+    """Return all that is wrong with a store; nothing where it is sound.
+
+    Raises:
+        StoreError: It cannot be opened at all.
+    """
+    connection = open_reading(Path(path))
+    try:
+        wrong = integrity(connection)
+        if not wrong:
+            try:
+                found = read_all(connection, Path(path), salvage=True)
+                wrong = [*(found.damage if found else ("it holds no checkpoint",))]
+            except StoreDamagedError as error:
+                wrong = [str(error)]
+        return tuple(wrong)
+    finally:
+        connection.close()
+
+
+def info(path: str | Path) -> StoreInfo:
+    """Return a store at a glance.
+
+    Raises:
+        StoreError: It cannot be opened.
+    """
+    path = Path(path)
+    connection = open_reading(path)
+    try:
+        with errors_of(path):
+            records = connection.execute("SELECT count(*) FROM log").fetchone()[0]
+            parts = connection.execute("SELECT count(*) FROM part").fetchone()[0]
+            newest = connection.execute(
+                "SELECT seq, at FROM checkpoint ORDER BY seq DESC LIMIT 1"
+            ).fetchone()
+            free = connection.execute("PRAGMA freelist_count").fetchone()[0]
+            page = connection.execute("PRAGMA page_size").fetchone()[0]
+            seq, at = newest or (None, None)
+            beside = [path.with_name(path.name + end) for end in ("-wal", "-shm")]
+            size = sum(each.stat().st_size for each in (path, *beside) if each.exists())
+            version = version_of(connection)
+            return StoreInfo(path, version, size, records, seq, at, parts, free * page)
+    finally:
+        connection.close()
