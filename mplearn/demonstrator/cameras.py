@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mplearn.body import KinematicTree, MarkerSet
-from mplearn.body.kinematics.linkage import Linkage, points_of_postures
+from mplearn.body.kinematics.kernels import points_of_postures
 from mplearn.recording import FloatArray
 
 from .variability import Variability
@@ -33,7 +33,7 @@ class Cameras:
         variability: Variability,
         rng: np.random.Generator,
     ) -> None:
-        self._linkage, self._rate_hz, self._variability = Linkage.of(tree), rate_hz, variability
+        self._linkage, self._rate_hz, self._variability = tree.linkage, rate_hz, variability
         self._bodies, self._offsets = markers.attach(tree)
         self._noise, self._hiding = rng.spawn(2)
         self._n_frames = 0

@@ -8,10 +8,17 @@ from scipy.spatial.transform import Rotation
 from mplearn.body import IKConfig, InverseKinematics, human_body, marker_set, robot_body
 from mplearn.body.inverse_kinematics.calibration import Calibration
 from mplearn.body.inverse_kinematics.follower import follower
-from mplearn.body.inverse_kinematics.gauss_newton import normal_equations, solve_frame
+from mplearn.body.inverse_kinematics.gauss_newton import (
+    Markers,
+    Moves,
+    Search,
+    empty_equations,
+    normal_equations,
+    solve_frame,
+)
 from mplearn.body.inverse_kinematics.inverse_kinematics import FollowedState
-from mplearn.body.kinematics.kernels import integrate
-from mplearn.body.kinematics.linkage import Linkage, locate
+from mplearn.body.kinematics.kernels import integrate, locate
+from mplearn.body.kinematics.linkage import empty_configuration
 from mplearn.errors import BodyError, FrameError, InvalidValueError
 from mplearn.mocap import GapTracker
 
@@ -96,9 +103,15 @@ def test_a_frame_is_solved_to_scipys_optimum(body, outlier_m):
     weights = rng.uniform(0.5, 2.0, 39) * 1e4
     q, after, residuals = before.copy(), variance.copy(), np.empty(39)
     n = solve_frame(
-        q, after, markers, bodies, offsets, weights, Linkage.of(tree), limits[:, 0], limits[:, 1],
-        free, np.zeros(dofs - 6), outlier_m, 1.0, 0.5, 200, 1e-9, residuals,
-    )  # fmt: skip
+        q,
+        after,
+        markers,
+        Markers(bodies, offsets, weights),
+        tree.linkage,
+        Moves(limits[:, 0], limits[:, 1], free, np.zeros(dofs - 6)),
+        Search(outlier_m, 200, 1e-9),
+        residuals,
+    )
     assert n < 200
     seen = np.isfinite(markers[:, 0])
 
@@ -132,7 +145,7 @@ def test_a_frame_is_solved_to_scipys_optimum(body, outlier_m):
 def test_the_normal_equations_are_those_of_the_jacobian(body):
     rng = np.random.default_rng(8)
     tree = follower(body).tree
-    linkage, n = Linkage.of(tree), len(tree.joint_names)
+    linkage, n = tree.linkage, len(tree.joint_names)
     bodies, offsets = marker_set("plug_in_gait39").attach(tree)
     q = tree.rest
     q[:3] += rng.normal(size=3)
@@ -143,14 +156,12 @@ def test_the_normal_equations_are_those_of_the_jacobian(body):
     markers = points + rng.normal(0, 0.05, points.shape)
     markers[5] = np.nan
     residuals, weights = np.linalg.norm(markers - points, axis=1), rng.uniform(0, 2, 39)
-    mat, axes, anchors = (np.empty(s) for s in ((len(tree.parent), 3, 3), (n, 3), (n, 3)))
-    pos, at = np.empty((len(tree.parent), 3)), np.empty((39, 3))
-    locate(q, linkage, bodies, offsets, pos, mat, axes, anchors, at)
-    normal, gradient = np.full((6 + n, 6 + n), np.nan), np.full(6 + n, np.nan)
-    normal_equations(
-        q, markers, points, residuals, bodies, weights, 0.06, linkage, mat, axes, anchors,
-        np.empty((len(tree.parent), 16)), np.empty((6 + n, 6)), normal, gradient,
-    )  # fmt: skip
+    at, equations = empty_configuration(linkage), empty_equations(linkage)
+    locate(q, linkage, bodies, offsets, at, np.empty((39, 3)))
+    normal, gradient = equations.normal, equations.gradient
+    normal[:], gradient[:] = np.nan, np.nan
+    placed = Markers(bodies, offsets, weights)
+    normal_equations(q, markers, points, residuals, placed, 0.06, linkage, at, equations)
     seen = np.isfinite(residuals)
     jacobian = tree.jacobian(q, bodies[seen], offsets[seen]).reshape(-1, 6 + n)
     weight = np.repeat(weights[seen] / (1 + (residuals[seen] / 0.06) ** 2), 3)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mplearn.body import human_body, marker_set
-from mplearn.body.kinematics.linkage import Linkage, points_of_postures
+from mplearn.body.kinematics.kernels import points_of_postures
 from mplearn.demonstrator import PRIMITIVES, Person, Variability, demonstrate, followers
 from mplearn.demonstrator.channels import CHANNELS, INDEX, UPPER_JOINTS, as_vector, mirrored
 from mplearn.demonstrator.postures import POSTURES, STAND
@@ -26,9 +26,7 @@ def soles(body, postures):
         ]
         assert len(rows) == 4
         corners.append(
-            points_of_postures(
-                postures, Linkage.of(tree), tree.site_body[rows], tree.site_offset[rows]
-            )
+            points_of_postures(postures, tree.linkage, tree.site_body[rows], tree.site_offset[rows])
         )
     return corners
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mplearn.body import human_body, marker_set
-from mplearn.body.kinematics.linkage import Linkage, points_of_postures
+from mplearn.body.kinematics.kernels import points_of_postures
 from mplearn.demonstrator import (
     PAPER_PRIMITIVES,
     PRIMITIVES,
@@ -36,7 +36,7 @@ def marker_speed(shown):
     """Root mean square speed of the noiseless markers, (T - 1,) [m/s]."""
     body = human_body()
     bodies, offsets = marker_set("paper34").attach(body.tree)
-    markers = points_of_postures(shown.posture.frames, Linkage.of(body.tree), bodies, offsets)
+    markers = points_of_postures(shown.posture.frames, body.tree.linkage, bodies, offsets)
     velocity = np.diff(markers, axis=0) * shown.posture.rate_hz
     return np.sqrt((velocity**2).sum(axis=2).mean(axis=1))
 

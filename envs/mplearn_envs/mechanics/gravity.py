@@ -45,12 +45,12 @@ def holding_torques(
         Torques, shape (T, n) [N m].
     """
     tree, stance = robot.tree, robot.stance
-    n_times, n_hinges = q.shape[0], tree.axis.shape[0]
+    n_times, n_hinges = q.shape[0], len(tree.linkage.axis)
     out = np.empty((n_times, n_hinges))
     for t in range(n_times):
         pose = forward(tree, q[t])
         for j in range(n_hinges):
-            body, axis, anchor = tree.joint_body[j], pose.axis[j], pose.anchor[j]
+            body, axis, anchor = tree.linkage.joint_body[j], pose.axis[j], pose.anchor[j]
             x = pose.moment[body, 0] - pose.carried[body] * anchor[0]
             y = pose.moment[body, 1] - pose.carried[body] * anchor[1]
             out[t, j] = GRAVITY * (axis[0] * y - axis[1] * x)

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numba import njit
 
-from mplearn.body.kinematics.tree import KinematicTree, forward_kinematics
+from mplearn.body.kinematics.kernels import forward_kinematics
+from mplearn.body.kinematics.linkage import Linkage, empty_configuration
+from mplearn.body.kinematics.tree import KinematicTree
 from mplearn.maths.quaternions import quaternion_product, vector_quaternion
 from mplearn.recording import FloatArray, IntArray
 
@@ -23,22 +25,12 @@ class MassTree(NamedTuple):
     """A floating-base tree of B bodies and J hinges; body 0 is the base, parents come first.
 
     Attributes:
-        parent: Index of each body's parent, shape (B,); -1 for the base.
-        offset: Position in the parent's frame, shape (B, 3) [m].
-        rotation: Orientation in the parent's frame, shape (B, 3, 3).
-        joint_body: Body that each hinge moves, shape (J,).
-        axis: Unit axis of each hinge in the frame of its body, shape (J, 3).
-        anchor: A point of each axis in the frame of its body, shape (J, 3) [m].
+        linkage: How the bodies hang on each other.
         centre: Centre of mass of each body in its own frame, shape (B, 3) [m].
         mass: Mass of each body, shape (B,) [kg].
     """
 
-    parent: IntArray
-    offset: FloatArray
-    rotation: FloatArray
-    joint_body: IntArray
-    axis: FloatArray
-    anchor: FloatArray
+    linkage: Linkage
     centre: FloatArray
     mass: FloatArray
 
@@ -72,12 +64,7 @@ def mass_tree(model: mujoco.MjModel) -> MassTree:
     """
     tree = KinematicTree.from_model(model)
     return MassTree(
-        tree.parent,
-        tree.offset,
-        tree.rotation,
-        tree.joint_body,
-        tree.axis,
-        tree.anchor,
+        tree.linkage,
         np.array(model.body_ipos[1:]),
         np.array(model.body_mass[1:]),
     )
@@ -105,29 +92,17 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
 @njit(cache=True)
 def forward(tree: MassTree, q: FloatArray) -> Pose:
     """Return where bodies and hinges are, for ``q`` in the layout of qpos, shape (7 + J,)."""
-    n_bodies, n_hinges = tree.parent.shape[0], tree.axis.shape[0]
-    position, rotation = np.empty((n_bodies, 3)), np.empty((n_bodies, 3, 3))
-    anchor, axis = np.empty((n_hinges, 3)), np.empty((n_hinges, 3))
-    forward_kinematics(
-        q,
-        tree.parent,
-        tree.offset,
-        tree.rotation,
-        tree.joint_body,
-        tree.axis,
-        tree.anchor,
-        position,
-        rotation,
-        axis,
-        anchor,
-    )
+    at, parent = empty_configuration(tree.linkage), tree.linkage.parent
+    forward_kinematics(q, tree.linkage, at)
+    position, rotation = at.position, at.rotation
+    n_bodies = len(parent)
     moment, carried = np.empty((n_bodies, 3)), tree.mass.copy()
     for b in range(n_bodies):
         moment[b] = tree.mass[b] * (position[b] + turned(rotation[b], tree.centre[b]))
     for b in range(n_bodies - 1, 0, -1):
-        moment[tree.parent[b]] += moment[b]
-        carried[tree.parent[b]] += carried[b]
-    return Pose(position, rotation, anchor, axis, moment, carried)
+        moment[parent[b]] += moment[b]
+        carried[parent[b]] += carried[b]
+    return Pose(position, rotation, at.anchor, at.axis, moment, carried)
 
 
 @njit(cache=True, nogil=True)

@@ -36,7 +36,8 @@ def momenta(
         The COGs [m], the momenta [N s] and the angular momenta about the COGs [N m s], each of
         shape (T, 3); and where the points are, shape (T, N, P, 3) [m].
     """
-    n_times, n_bodies, n_hinges = q.shape[0], tree.parent.shape[0], tree.axis.shape[0]
+    n_times, linkage = q.shape[0], tree.linkage
+    n_bodies, n_hinges = len(linkage.parent), len(linkage.axis)
     cog, linear, angular = np.empty((n_times, 3)), np.zeros((n_times, 3)), np.zeros((n_times, 3))
     turning, moving = np.empty((n_bodies, 3)), np.empty((n_bodies, 3))
     there = np.empty((n_times, *points.shape))
@@ -49,12 +50,12 @@ def momenta(
         for b in range(n_bodies):
             position, turn = pose.position[b], pose.rotation[b]
             if b > 0:
-                parent = tree.parent[b]
+                parent = linkage.parent[b]
                 for i in range(3):
                     turning[b, i] = turning[parent, i]
                     moving[b, i] = moving[parent, i]
                 _add_cross(turning[parent], position, pose.position[parent], 1.0, moving[b])
-            while hinge < n_hinges and tree.joint_body[hinge] == b:
+            while hinge < n_hinges and linkage.joint_body[hinge] == b:
                 rate = v[t, 6 + hinge]
                 for i in range(3):
                     turning[b, i] += rate * pose.axis[hinge, i]

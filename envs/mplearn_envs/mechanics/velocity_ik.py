@@ -94,7 +94,7 @@ def add_leg_columns(tree: MassTree, stance: Stance, pose: Pose, out: FloatArray)
     """Write the columns of the leg joints into a Jacobian of `jacobian_rows`."""
     for k in range(stance.leg_joints.shape[0]):
         joint = stance.leg_joints[k]
-        body = tree.joint_body[joint]
+        body = tree.linkage.joint_body[joint]
         axis = pose.axis[joint]
         row = 6 * stance.leg_side[k]
         foot = pose.position[stance.feet[stance.leg_side[k]]]

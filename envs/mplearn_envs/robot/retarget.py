@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mplearn.body import human_body, posture_of, robot_body
-from mplearn.body.inverse_kinematics.gauss_newton import solve_frame
-from mplearn.body.kinematics.linkage import Linkage
+from mplearn.body.inverse_kinematics.gauss_newton import Markers, Moves, Search, solve_frame
 from mplearn.body.kinematics.tree import KinematicTree
 from mplearn.errors import RobotError
 from mplearn.recording import FloatArray, IntArray
@@ -107,10 +106,11 @@ class Retargeting:
         postures = posture_of(features, body=self._source)
         postures[:, 3:7] = (1.0, 0.0, 0.0, 0.0)  # both bases upright
         rest = _turns(self._source.tree)[self._from]
-        linkage, limits = Linkage.of(self._point), self._point.limits
+        linkage, limits = self._point.linkage, self._point.limits
         n, n_markers = len(limits), len(self._markers)
         q = np.concatenate(([0.0, 0.0, 0.0, 1.0], np.zeros(3 + n)))
-        weights, rest_weight, residuals = np.ones(n_markers), np.full(n, _REST), np.empty(n_markers)
+        rest_weight, residuals = np.full(n, _REST), np.empty(n_markers)
+        markers = Markers(self._markers, self._offsets, np.ones(n_markers))
         out = np.empty((len(postures), n))
         for t, posture in enumerate(postures):
             turned = self._source.tree.forward(posture)[1][self._from] @ rest.transpose(0, 2, 1)
@@ -120,19 +120,10 @@ class Retargeting:
                 q,
                 np.full(6 + n, 1.0 / _HOLD),
                 np.ascontiguousarray(turned.transpose(0, 2, 1)).reshape(-1, 3),  # the columns
-                self._markers,
-                self._offsets,
-                weights,
+                markers,
                 linkage,
-                low,
-                high,
-                self._free,
-                rest_weight,
-                np.inf,
-                1.0,
-                0.5,
-                _ITERATIONS if t else 10 * _ITERATIONS,
-                _TOLERANCE_RAD,
+                Moves(low, high, self._free, rest_weight),
+                Search(np.inf, _ITERATIONS if t else 10 * _ITERATIONS, _TOLERANCE_RAD),
                 residuals,
             )
             out[t] = q[7:]

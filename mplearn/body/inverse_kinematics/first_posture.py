@@ -10,10 +10,9 @@ from mplearn.maths.rotations import matrix_to_quaternion
 from mplearn.mocap.options import option
 from mplearn.recording import FloatArray, IntArray
 
-from ..kinematics.linkage import Linkage
 from ..kinematics.tree import KinematicTree
 from .follower import Follower
-from .gauss_newton import solve_frame
+from .gauss_newton import Markers, Moves, Search, solve_frame
 
 
 class TooFewMarkersError(BodyError):
@@ -23,7 +22,8 @@ class TooFewMarkersError(BodyError):
 TRUNK = ("pelvis", "abdomen", "chest", "clavicle_l", "clavicle_r", "head")
 LEAST_UPRIGHT = 0.35  # cosine of the trunk's lean
 SMALLEST, LARGEST = 0.35, 1.6  # size relative to the body
-MARKER_SIGMA_M, OUTLIER_M = 0.01, 0.15
+MARKER_SIGMA_M = 0.01
+SEARCH = Search(outlier_m=0.15, max_iterations=40, tolerance=1e-4, widening=10.0)
 
 # where limbs may be in the first frame [deg], for the left; about x and z the right is mirrored
 ARM_STARTS: tuple[dict[str, float], ...] = (
@@ -165,26 +165,18 @@ def settle(
     """
     residuals = np.full(frames.shape[:2], np.nan)
     limits = np.concatenate((np.tile((-np.inf, np.inf), (6, 1)), tree.limits))
-    linkage = Linkage.of(tree)
+    markers = Markers(bodies, offsets, np.full(len(bodies), MARKER_SIGMA_M**-2))
     for q, frame, residual in zip(postures, frames, residuals, strict=True):
         angles = np.concatenate((np.zeros(6), q[7:]))
+        low, high = limits[:, 0] - angles, limits[:, 1] - angles
         solve_frame(
             q,
             np.full(tree.n_dofs, 1.0),
             np.ascontiguousarray(frame),
-            bodies,
-            offsets,
-            np.full(len(bodies), MARKER_SIGMA_M**-2),
-            linkage,
-            limits[:, 0] - angles,
-            limits[:, 1] - angles,
-            follower.free,
-            follower.rest_weight,
-            OUTLIER_M,
-            10.0,
-            0.5,
-            40,
-            1e-4,
+            markers,
+            tree.linkage,
+            Moves(low, high, follower.free, follower.rest_weight),
+            SEARCH,
             residual,
         )
     return residuals

@@ -7,14 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mplearn.recording import BoolArray, FloatArray, IntArray
+from mplearn.recording import BoolArray, FloatArray
 
 from ..kinematics.linkage import Linkage
-from .gauss_newton import solve_frame
+from .gauss_newton import Markers, Moves, Search, solve_frame
 
 FEWEST_MARKERS = 3  # fewer do not say where a body is: the posture is held
 LARGEST_M = 3.5  # no person's markers span more along an axis
-WIDENING, LARGEST_STEP = 3.0, 0.5  # see `solve_frame`
+WIDENING = 3.0  # see `Search`
 
 
 class FollowRules(NamedTuple):
@@ -24,32 +24,50 @@ class FollowRules(NamedTuple):
         reach: How far each degree of freedom moves in a frame at most, shape (6 + n,).
         drift: How much its variance grows in a frame, shape (6 + n,).
         most_uncertain: Bound on the variances.
-        outlier_m: Scale of the markers' loss [m].
-        max_iterations: Gauss-Newton steps a frame.
-        tolerance: Change below which a frame is solved [rad, m].
+        search: How a frame is solved.
     """
 
     reach: FloatArray
     drift: FloatArray
     most_uncertain: float
-    outlier_m: float
-    max_iterations: int
-    tolerance: float
+    search: Search
+
+
+class Joints(NamedTuple):
+    """What the degrees of freedom of the body may do.
+
+    Attributes:
+        limits: Of each, shape (6 + n, 2).
+        free: Which of them may move, shape (6 + n,).
+        rest_weight: Weight of each joint's distance from zero, shape (n,).
+    """
+
+    limits: FloatArray
+    free: BoolArray
+    rest_weight: FloatArray
+
+
+class Followed(NamedTuple):
+    """Who is followed; changed in place.
+
+    Attributes:
+        posture: Before the next frame, shape (7 + n,).
+        variance: Of each degree of freedom, shape (6 + n,).
+        fresh: Whether no frame was solved yet, so that the first may move it anywhere, shape (1,).
+    """
+
+    posture: FloatArray
+    variance: FloatArray
+    fresh: BoolArray
 
 
 @njit(cache=True)
 def follow_frames(
     frames: FloatArray,
-    posture: FloatArray,
-    variance: FloatArray,
-    fresh: BoolArray,
-    bodies: IntArray,
-    offsets: FloatArray,
-    weights: FloatArray,
+    followed: Followed,
+    markers: Markers,
     linkage: Linkage,
-    limits: FloatArray,
-    free: BoolArray,
-    rest_weight: FloatArray,
+    joints: Joints,
     rules: FollowRules,
     residuals: FloatArray,
 ) -> tuple[FloatArray, int]:
@@ -57,16 +75,10 @@ def follow_frames(
 
     Args:
         frames: Measured positions, shape (T, M, 3) [m]; NaN where missing.
-        posture: Before the first frame, shape (7 + n,); changed in place, like what follows.
-        variance: Of each degree of freedom, shape (6 + n,).
-        fresh: Whether no frame was solved yet, so that the first may move it anywhere, shape (1,).
-        bodies: Body that carries each marker, shape (M,).
-        offsets: Markers in their body's frame, shape (M, 3) [m].
-        weights: 1 / sigma^2 of each marker, shape (M,) [1/m^2].
+        followed: Who is followed.
+        markers: Where they sit on the body.
         linkage: The body's kinematics.
-        limits: Of each degree of freedom, shape (6 + n, 2).
-        free: Which of them may move, shape (6 + n,).
-        rest_weight: Weight of each joint's distance from zero, shape (n,).
+        joints: What its degrees of freedom may do.
         rules: What is assumed of frames.
         residuals: Distance of each marker from its place in the last frame, shape (M,) [m], filled;
             NaN where missing.
@@ -74,6 +86,8 @@ def follow_frames(
     Returns:
         The postures, shape (T, 7 + n), and the iterations of the last frame.
     """
+    posture, variance, fresh = followed
+    limits = joints.limits
     dofs = len(variance)
     out = np.empty((len(frames), len(posture)))
     low, high = np.empty(dofs), np.empty(dofs)
@@ -91,24 +105,9 @@ def follow_frames(
                 low[i] = max(-reach, limits[i, 0] - at)
                 high[i] = min(reach, limits[i, 1] - at)
             fresh[0] = False
+            moves = Moves(low, high, joints.free, joints.rest_weight)
             iterations = solve_frame(
-                posture,
-                variance,
-                frame,
-                bodies,
-                offsets,
-                weights,
-                linkage,
-                low,
-                high,
-                free,
-                rest_weight,
-                rules.outlier_m,
-                WIDENING,
-                LARGEST_STEP,
-                rules.max_iterations,
-                rules.tolerance,
-                residuals,
+                posture, variance, frame, markers, linkage, moves, rules.search, residuals
             )
         out[t] = posture
     return out, iterations

@@ -14,34 +14,112 @@ the last normal matrix is what is known after.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
 from mplearn.maths.tree_solvers import bounded_solve, inverse_diagonal
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
-from ..kinematics.kernels import integrate
-from ..kinematics.linkage import Linkage, locate
+from ..kinematics.kernels import integrate, locate
+from ..kinematics.linkage import Configuration, Linkage, empty_configuration
+
+
+class Markers(NamedTuple):
+    """Where M markers sit on a body, and how exactly they are measured.
+
+    Attributes:
+        bodies: Body that carries each marker, shape (M,).
+        offsets: Markers in their body's frame, shape (M, 3) [m].
+        weights: 1 / sigma^2 of each marker, shape (M,) [1/m^2].
+    """
+
+    bodies: IntArray
+    offsets: FloatArray
+    weights: FloatArray
+
+
+class Moves(NamedTuple):
+    """What the degrees of freedom may do in a frame.
+
+    Attributes:
+        low: Lower bounds of the step of each, shape (6 + n,).
+        high: Upper bounds, shape (6 + n,).
+        free: Which of them may move, shape (6 + n,).
+        rest_weight: Weight w of each joint's distance from zero, shape (n,).
+    """
+
+    low: FloatArray
+    high: FloatArray
+    free: BoolArray
+    rest_weight: FloatArray
+
+
+class Search(NamedTuple):
+    """How the optimum is searched for.
+
+    Attributes:
+        outlier_m: The scale c of the Cauchy loss [m]; infinite for least squares.
+        max_iterations: When to stop at the latest.
+        tolerance: Stop when no degree of freedom moved further [m, rad].
+        widening: Factor on c in the first iteration, when the posture is still the last frame's.
+        largest_step: Longest step of one iteration in any degree of freedom [m, rad].
+    """
+
+    outlier_m: float
+    max_iterations: int
+    tolerance: float
+    widening: float = 1.0
+    largest_step: float = 0.5
+
+
+# the sums over the markers that a body carries, each weighted, about the base's place
+WEIGHT, X, Y, Z = range(4)  # weights and first moments
+XX, YY, ZZ, XY, XZ, YZ = range(4, 10)  # second moments, as of inertia
+FX, FY, FZ, NX, NY, NZ = range(10, 16)  # errors and their moments
+N_SUMS = 16
+
+
+class Equations(NamedTuple):
+    """Memory of the normal equations.
+
+    Attributes:
+        carried: Sums over the markers of each body with all that it carries, by the names above,
+            shape (B, 16).
+        motions: Each unknown's motion, (wx, wy, wz, vx, vy, vz), v that of the point at the base's
+            place, shape (6 + n, 6).
+        normal: J'WJ where one unknown is above the other (lower triangle), shape (6 + n, 6 + n).
+        gradient: J'W(error), shape (6 + n,).
+    """
+
+    carried: FloatArray
+    motions: FloatArray
+    normal: FloatArray
+    gradient: FloatArray
+
+
+@njit(cache=True)
+def empty_equations(linkage: Linkage) -> Equations:
+    """Return memory for `normal_equations` to fill."""
+    dofs = len(linkage.above)
+    return Equations(
+        np.empty((len(linkage.parent), N_SUMS)),
+        np.empty((dofs, 6)),
+        np.empty((dofs, dofs)),
+        np.empty(dofs),
+    )
 
 
 @njit(cache=True)
 def solve_frame(
     q: FloatArray,
     variance: FloatArray,
-    markers: FloatArray,
-    bodies: IntArray,
-    offsets: FloatArray,
-    weights: FloatArray,
+    frame: FloatArray,
+    markers: Markers,
     linkage: Linkage,
-    low: FloatArray,
-    high: FloatArray,
-    free: BoolArray,
-    rest_weight: FloatArray,
-    outlier_m: float,
-    widening: float,
-    largest_step: float,
-    max_iterations: int,
-    tolerance: float,
+    moves: Moves,
+    search: Search,
     residuals: FloatArray,
 ) -> int:
     """Move a posture, in place, to the optimum of one frame's cost.
@@ -49,63 +127,36 @@ def solve_frame(
     Args:
         q: Posture before the frame, shape (7 + n,); holds the solution afterwards.
         variance: Of each degree of freedom before the frame, shape (6 + n,); after it afterwards.
-        markers: Measured positions, shape (M, 3) [m]; NaN where missing.
-        bodies: Body that carries each marker, shape (M,).
-        offsets: Markers in their body's frame, shape (M, 3) [m].
-        weights: 1 / sigma^2 of each marker, shape (M,) [1/m^2].
+        frame: Measured positions, shape (M, 3) [m]; NaN where missing.
+        markers: Where they sit on the body.
         linkage: The body's kinematics.
-        low: Lower bounds of the step of each degree of freedom, shape (6 + n,).
-        high: Upper bounds, shape (6 + n,).
-        free: Which degrees of freedom may move, shape (6 + n,).
-        rest_weight: Weight w of each joint's distance from zero, shape (n,).
-        outlier_m: The scale c of the Cauchy loss [m]; infinite for least squares.
-        widening: Factor on c in the first iteration, when the posture is still the last frame's.
-        largest_step: Longest step of one iteration in any degree of freedom [m, rad].
-        max_iterations: When to stop at the latest.
-        tolerance: Stop when no degree of freedom moved further [m, rad].
+        moves: What its degrees of freedom may do.
+        search: How the optimum is searched for.
         residuals: Distance of each marker from its place, shape (M,) [m], filled; NaN where
             missing.
 
     Returns:
         The number of iterations.
     """
-    n_bodies, n = len(linkage.parent), len(linkage.axis)
-    dofs = 6 + n
-    pos, mat = np.empty((n_bodies, 3)), np.empty((n_bodies, 3, 3))
-    axes, anchors = np.empty((n, 3)), np.empty((n, 3))
-    points = np.empty_like(markers)
-    moments, motions = np.empty((n_bodies, 16)), np.empty((dofs, 6))
-    normal, gradient = np.empty((dofs, dofs)), np.empty(dofs)
+    dofs = len(variance)
+    configuration, equations = empty_configuration(linkage), empty_equations(linkage)
+    normal, gradient = equations.normal, equations.gradient
+    rest_weight = moves.rest_weight
+    points = np.empty_like(frame)
     moved, step = np.zeros(dofs), np.empty(dofs)  # since the last frame; in this iteration
     iteration = 0
     while True:
-        locate(q, linkage, bodies, offsets, pos, mat, axes, anchors, points)
-        for m in range(len(markers)):
+        locate(q, linkage, markers.bodies, markers.offsets, configuration, points)
+        for m in range(len(frame)):
             residuals[m] = np.sqrt(
-                (markers[m, 0] - points[m, 0]) ** 2
-                + (markers[m, 1] - points[m, 1]) ** 2
-                + (markers[m, 2] - points[m, 2]) ** 2
+                (frame[m, 0] - points[m, 0]) ** 2
+                + (frame[m, 1] - points[m, 1]) ** 2
+                + (frame[m, 2] - points[m, 2]) ** 2
             )
-        if iteration == max_iterations:
+        if iteration == search.max_iterations:
             break
-        c = outlier_m * widening if iteration == 0 else outlier_m
-        normal_equations(
-            q,
-            markers,
-            points,
-            residuals,
-            bodies,
-            weights,
-            c,
-            linkage,
-            mat,
-            axes,
-            anchors,
-            moments,
-            motions,
-            normal,
-            gradient,
-        )
+        c = search.outlier_m * search.widening if iteration == 0 else search.outlier_m
+        normal_equations(q, frame, points, residuals, markers, c, linkage, configuration, equations)
         for i in range(dofs):
             if i >= 6 and normal[i, i] > 0.0:
                 pull = rest_weight[i - 6] * normal[i, i] / (rest_weight[i - 6] + normal[i, i])
@@ -113,118 +164,126 @@ def solve_frame(
                 gradient[i] -= pull * q[i + 1]
             normal[i, i] += 1.0 / variance[i]
             gradient[i] -= moved[i] / variance[i]
-        bounded_solve(normal, gradient, low - moved, high - moved, free, linkage.above, step)
+        low, high = moves.low - moved, moves.high - moved
+        bounded_solve(normal, gradient, low, high, moves.free, linkage.above, step)
         longest = np.max(np.abs(step))
-        if longest > largest_step:
-            step *= largest_step / longest
+        if longest > search.largest_step:
+            step *= search.largest_step / longest
         integrate(q, step)
         moved += step
         iteration += 1
-        if longest < tolerance:
+        if longest < search.tolerance:
             break
-    inverse_diagonal(normal, free, linkage.above, variance)
+    inverse_diagonal(normal, moves.free, linkage.above, variance)
     return iteration
 
 
 @njit(cache=True)
 def normal_equations(
     q: FloatArray,
-    markers: FloatArray,
+    frame: FloatArray,
     points: FloatArray,
     residuals: FloatArray,
-    bodies: IntArray,
-    weights: FloatArray,
+    markers: Markers,
     c: float,
     linkage: Linkage,
-    mat: FloatArray,
-    axes: FloatArray,
-    anchors: FloatArray,
-    moments: FloatArray,
-    motions: FloatArray,
-    normal: FloatArray,
-    gradient: FloatArray,
+    configuration: Configuration,
+    equations: Equations,
 ) -> None:
-    """Fill J'WJ, where one unknown is above the other (lower triangle), and J'W(error).
+    """Fill the equations, of markers at points that were measured in a frame.
 
     No Jacobian is formed: a marker at p moves by v + w x p with an unknown, so that all markers
     that it carries come in by their weight, its first and second moments, and the sums of the
     weighted errors and their moments. These are added up from the leaves to the base, as composite
     rigid bodies are [Featherstone2008, 6.2].
+
+    Args:
+        q: Posture, shape (7 + n,).
+        frame: Measured positions, shape (M, 3) [m].
+        points: Where the body has the markers, shape (M, 3) [m].
+        residuals: Distances between both, shape (M,) [m]; NaN where a marker is missing.
+        markers: Where they sit on the body.
+        c: Scale of the Cauchy loss [m].
+        linkage: The body's kinematics.
+        configuration: Where it is.
+        equations: Filled.
     """
+    carried, motions, normal, gradient = equations
     parent, above = linkage.parent, linkage.above
-    moments[:] = 0.0
+    axes, anchors = configuration.axis, configuration.anchor
+    bodies, weights = markers.bodies, markers.weights
+    joint_body, slides = linkage.joint_body, linkage.slides
+    carried[:] = 0.0
     x0, y0, z0 = q[0], q[1], q[2]
-    for m in range(len(markers)):
+    for m in range(len(frame)):
         if np.isnan(residuals[m]) or weights[m] == 0.0:
             continue
         w = weights[m] / (1.0 + (residuals[m] / c) ** 2)
         x, y, z = points[m, 0] - x0, points[m, 1] - y0, points[m, 2] - z0
-        ex = w * (markers[m, 0] - points[m, 0])
-        ey = w * (markers[m, 1] - points[m, 1])
-        ez = w * (markers[m, 2] - points[m, 2])
-        s = moments[bodies[m]]
-        s[0] += w
-        s[1] += w * x
-        s[2] += w * y
-        s[3] += w * z
-        s[4] += w * (y * y + z * z)
-        s[5] += w * (x * x + z * z)
-        s[6] += w * (x * x + y * y)
-        s[7] -= w * x * y
-        s[8] -= w * x * z
-        s[9] -= w * y * z
-        s[10] += ex
-        s[11] += ey
-        s[12] += ez
-        s[13] += y * ez - z * ey
-        s[14] += z * ex - x * ez
-        s[15] += x * ey - y * ex
-    for b in range(len(parent) - 1, 0, -1):
-        for k in range(16):
-            moments[parent[b], k] += moments[b, k]
-    # each unknown's motion: (wx, wy, wz, vx, vy, vz), v that of the point at the base's place
+        ex = w * (frame[m, 0] - points[m, 0])
+        ey = w * (frame[m, 1] - points[m, 1])
+        ez = w * (frame[m, 2] - points[m, 2])
+        s = carried[bodies[m]]
+        s[WEIGHT] += w
+        s[X] += w * x
+        s[Y] += w * y
+        s[Z] += w * z
+        s[XX] += w * (y * y + z * z)
+        s[YY] += w * (x * x + z * z)
+        s[ZZ] += w * (x * x + y * y)
+        s[XY] -= w * x * y
+        s[XZ] -= w * x * z
+        s[YZ] -= w * y * z
+        s[FX] += ex
+        s[FY] += ey
+        s[FZ] += ez
+        s[NX] += y * ez - z * ey
+        s[NY] += z * ex - x * ez
+        s[NZ] += x * ey - y * ex
+    for b in range(len(carried) - 1, 0, -1):
+        for k in range(N_SUMS):
+            carried[parent[b], k] += carried[b, k]
     motions[:6] = 0.0
     for k in range(3):
         motions[k, 3 + k] = 1.0
         for i in range(3):
-            motions[3 + k, i] = mat[0, i, k]
+            motions[3 + k, i] = configuration.rotation[0, i, k]
     for j in range(len(axes)):
         ax, ay, az = axes[j, 0], axes[j, 1], axes[j, 2]
         t = motions[6 + j]
-        if linkage.slides[j]:
+        if slides[j]:
             t[0], t[1], t[2], t[3], t[4], t[5] = 0.0, 0.0, 0.0, ax, ay, az
             continue
         x, y, z = anchors[j, 0] - x0, anchors[j, 1] - y0, anchors[j, 2] - z0
         t[0], t[1], t[2] = ax, ay, az
         t[3], t[4], t[5] = y * az - z * ay, z * ax - x * az, x * ay - y * ax
     for j in range(len(axes)):
-        b = linkage.joint_body[j]
-        _row(6 + j, motions[6 + j], moments[b], motions, above, normal, gradient)
+        _row(6 + j, carried[joint_body[j]], motions, above, normal, gradient)
     for k in range(6):
-        _row(k, motions[k], moments[0], motions, above, normal, gradient)
+        _row(k, carried[0], motions, above, normal, gradient)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _row(
     k: int,
-    t: FloatArray,
     s: FloatArray,
     motions: FloatArray,
     above: IntArray,
     normal: FloatArray,
     gradient: FloatArray,
 ) -> None:
-    """Fill a row of the normal equations from an unknown's motion and the moments it carries."""
+    """Fill a row of the equations from an unknown's motion and the sums that it carries."""
+    t = motions[k]
     wx, wy, wz, vx, vy, vz = t[0], t[1], t[2], t[3], t[4], t[5]
-    fx = s[0] * vx + wy * s[3] - wz * s[2]
-    fy = s[0] * vy + wz * s[1] - wx * s[3]
-    fz = s[0] * vz + wx * s[2] - wy * s[1]
-    nx = s[2] * vz - s[3] * vy + s[4] * wx + s[7] * wy + s[8] * wz
-    ny = s[3] * vx - s[1] * vz + s[7] * wx + s[5] * wy + s[9] * wz
-    nz = s[1] * vy - s[2] * vx + s[8] * wx + s[9] * wy + s[6] * wz
+    fx = s[WEIGHT] * vx + wy * s[Z] - wz * s[Y]
+    fy = s[WEIGHT] * vy + wz * s[X] - wx * s[Z]
+    fz = s[WEIGHT] * vz + wx * s[Y] - wy * s[X]
+    nx = s[Y] * vz - s[Z] * vy + s[XX] * wx + s[XY] * wy + s[XZ] * wz
+    ny = s[Z] * vx - s[X] * vz + s[XY] * wx + s[YY] * wy + s[YZ] * wz
+    nz = s[X] * vy - s[Y] * vx + s[XZ] * wx + s[YZ] * wy + s[ZZ] * wz
     i = k
     while i >= 0:
         r = motions[i]
         normal[k, i] = r[0] * nx + r[1] * ny + r[2] * nz + r[3] * fx + r[4] * fy + r[5] * fz
         i = above[i]
-    gradient[k] = wx * s[13] + wy * s[14] + wz * s[15] + vx * s[10] + vy * s[11] + vz * s[12]
+    gradient[k] = wx * s[NX] + wy * s[NY] + wz * s[NZ] + vx * s[FX] + vy * s[FY] + vz * s[FZ]

@@ -21,14 +21,14 @@ from mplearn.maths.rotations import matrix_to_quaternion
 from mplearn.recording import FloatArray
 from mplearn.state import Array, SharedState, require, validated
 
-from ..kinematics.linkage import Linkage
 from ..marker_sets.marker_set import MarkerSet, find_marker_set
 from ..models.body import Body
 from .calibration import Calibration, fit
 from .first_posture import first_posture, place_trunk, settle
 from .follower import follower
 from .following import FEWEST_MARKERS as FEWEST_MARKERS
-from .following import FollowRules, follow_frames
+from .following import WIDENING, Followed, FollowRules, Joints, follow_frames
+from .gauss_newton import Markers, Search
 
 NEAR_M = 0.03  # root mean square distance of the markers at which a posture is right
 
@@ -144,9 +144,9 @@ class InverseKinematics:
             reach=reach / self.rate_hz,
             drift=self._drift**2 / self.rate_hz,
             most_uncertain=self.config.most_uncertain**2,
-            outlier_m=self.config.outlier_m,
-            max_iterations=self.config.max_iterations,
-            tolerance=self.config.tolerance,
+            search=Search(
+                self.config.outlier_m, self.config.max_iterations, self.config.tolerance, WIDENING
+            ),
         )
         self._weights = np.full(len(self._used), self.config.marker_sigma_m**-2)
         self.calibration: Calibration | None = None
@@ -176,7 +176,6 @@ class InverseKinematics:
         """Take over a fit, and begin at its posture without knowing it well."""
         self.calibration = calibration
         self._tree = self._follower.tree.scaled(calibration.factors)
-        self._linkage = Linkage.of(self._tree)
         self._posture = calibration.posture.copy()
         self._variance = np.full(self._tree.n_dofs, self.config.most_uncertain**2)
         self._fresh = np.ones(1, dtype=np.bool_)
@@ -223,16 +222,10 @@ class InverseKinematics:
         residuals = np.empty(len(self._used))
         postures, self.iterations = follow_frames(
             np.ascontiguousarray(frames[:, self._used]),
-            self._posture,
-            self._variance,
-            self._fresh,
-            self._bodies,
-            self.calibration.offsets,
-            self._weights,
-            self._linkage,
-            self._limits,
-            self._follower.free,
-            self._follower.rest_weight,
+            Followed(self._posture, self._variance, self._fresh),
+            Markers(self._bodies, self.calibration.offsets, self._weights),
+            self._tree.linkage,
+            Joints(self._limits, self._follower.free, self._follower.rest_weight),
             self._rules,
             residuals,
         )

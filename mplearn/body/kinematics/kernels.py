@@ -10,33 +10,18 @@ from numba import njit
 
 from mplearn.maths.quaternions import quaternion_product, vector_quaternion
 from mplearn.maths.rotation_kernels import quaternion_matrix, turn_in_place
-from mplearn.recording import BoolArray, FloatArray, IntArray
+from mplearn.recording import FloatArray, IntArray
 
-
-def first_joints(joint_body: IntArray, n_bodies: int) -> IntArray:
-    """Return, for each body, its first joint; body b has joints [first[b], first[b + 1])."""
-    return np.searchsorted(joint_body, np.arange(n_bodies + 1)).astype(np.int64)
+from .linkage import Configuration, Linkage, empty_configuration
 
 
 @njit(cache=True)
-def forward_kinematics(
-    q: FloatArray,
-    parent: IntArray,
-    offset: FloatArray,
-    rotation: FloatArray,
-    joint_body: IntArray,
-    axis: FloatArray,
-    anchor: FloatArray,
-    pos: FloatArray,
-    mat: FloatArray,
-    axes: FloatArray,
-    anchors: FloatArray,
-    slides: BoolArray | None = None,
-) -> None:
-    """Fill body positions and orientations, and each joint's axis and anchor in the world.
-
-    All joints are hinges where `slides` is not given.
-    """
+def forward_kinematics(q: FloatArray, linkage: Linkage, configuration: Configuration) -> None:
+    """Fill a configuration by a posture, shape (7 + n,)."""
+    parent, offset, rotation = linkage.parent, linkage.offset, linkage.rotation
+    joint_body, axis, anchor = linkage.joint_body, linkage.axis, linkage.anchor
+    pos, mat = configuration.position, configuration.rotation
+    axes, anchors = configuration.axis, configuration.anchor
     pos[0] = q[:3]
     mat[0] = quaternion_matrix(q[3:7])
     j = 0
@@ -61,7 +46,7 @@ def forward_kinematics(
                     along += mat[b, i, k] * axis[j, k]
                 anchors[j, i] = at
                 axes[j, i] = along
-            if slides is not None and slides[j]:
+            if linkage.slides[j]:
                 for i in range(3):
                     pos[b, i] += axes[j, i] * q[7 + j]
                 j += 1
@@ -76,19 +61,52 @@ def forward_kinematics(
 
 
 @njit(cache=True)
+def locate(
+    q: FloatArray,
+    linkage: Linkage,
+    bodies: IntArray,
+    offsets: FloatArray,
+    configuration: Configuration,
+    points: FloatArray,
+) -> None:
+    """Fill a configuration, and the world positions of body-fixed points (M, 3) [m]."""
+    forward_kinematics(q, linkage, configuration)
+    pos, mat = configuration.position, configuration.rotation
+    for m in range(len(bodies)):
+        b = bodies[m]
+        for i in range(3):
+            points[m, i] = (
+                pos[b, i]
+                + mat[b, i, 0] * offsets[m, 0]
+                + mat[b, i, 1] * offsets[m, 1]
+                + mat[b, i, 2] * offsets[m, 2]
+            )
+
+
+@njit(cache=True)
+def points_of_postures(
+    postures: FloatArray, linkage: Linkage, bodies: IntArray, offsets: FloatArray
+) -> FloatArray:
+    """Return the world positions (T, M, 3) [m] of body-fixed points at each posture (T, nq)."""
+    out = np.empty((len(postures), len(bodies), 3))
+    configuration = empty_configuration(linkage)
+    for t in range(len(postures)):
+        locate(postures[t], linkage, bodies, offsets, configuration, out[t])
+    return out
+
+
+@njit(cache=True)
 def point_jacobian(
     points: FloatArray,
     bodies: IntArray,
-    base_pos: FloatArray,
-    base_mat: FloatArray,
-    axes: FloatArray,
-    anchors: FloatArray,
-    slides: BoolArray,
-    parent: IntArray,
-    first: IntArray,
+    linkage: Linkage,
+    configuration: Configuration,
     out: FloatArray,
 ) -> None:
     """Fill the Jacobian (M, 3, 6 + n) of world points; `out` is zero where a joint has no part."""
+    base_pos, base_mat = configuration.position[0], configuration.rotation[0]
+    axes, anchors = configuration.axis, configuration.anchor
+    slides, parent, first = linkage.slides, linkage.parent, linkage.first
     for m in range(len(points)):
         x, y, z = points[m, 0], points[m, 1], points[m, 2]
         for k in range(3):

@@ -9,6 +9,7 @@ joint rates.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,8 +18,8 @@ from mplearn.errors import BodyError
 from mplearn.maths.rotations import quaternion_to_matrix
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
-from .kernels import first_joints, point_jacobian
-from .kernels import forward_kinematics as forward_kinematics
+from .kernels import forward_kinematics, point_jacobian
+from .linkage import Configuration, Linkage, empty_configuration
 
 if TYPE_CHECKING:
     import mujoco
@@ -104,6 +105,22 @@ class KinematicTree:
         """Degrees of freedom: 6 of the base and one a joint."""
         return 6 + len(self.joint_names)
 
+    @cached_property
+    def linkage(self) -> Linkage:
+        """The tree's arrays, as kernels take them."""
+        first = np.searchsorted(self.joint_body, np.arange(len(self.parent) + 1)).astype(np.int64)
+        return Linkage(
+            self.parent,
+            self.offset,
+            self.rotation,
+            self.joint_body,
+            self.slides,
+            self.axis,
+            self.anchor,
+            first,
+            _above(self.parent, self.joint_body),
+        )
+
     def body(self, name: str) -> int:
         """Return the index of a body.
 
@@ -144,8 +161,8 @@ class KinematicTree:
 
     def forward(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return where the bodies are: positions (B, 3) [m] and orientations (B, 3, 3)."""
-        pos, mat, _, _ = self._forward(q)
-        return pos, mat
+        at = self._configuration(q)
+        return at.position, at.rotation
 
     def site_positions(self, q: FloatArray) -> FloatArray:
         """Return the sites' positions in the world, shape (S, 3) [m]."""
@@ -165,33 +182,30 @@ class KinematicTree:
 
     def jacobian(self, q: FloatArray, bodies: IntArray, offsets: FloatArray) -> FloatArray:
         """Return the Jacobian of points, shape (M, 3, 6 + n); arguments as in `points`."""
-        pos, mat, axes, anchors = self._forward(q)
-        points = pos[bodies] + np.einsum("mij,mj->mi", mat[bodies], offsets)
+        at = self._configuration(q)
+        points = at.position[bodies] + np.einsum("mij,mj->mi", at.rotation[bodies], offsets)
         out = np.zeros((len(bodies), 3, self.n_dofs))
-        first = first_joints(self.joint_body, len(self.parent))
-        point_jacobian(
-            points, bodies, pos[0], mat[0], axes, anchors, self.slides, self.parent, first, out
-        )
+        point_jacobian(points, bodies, self.linkage, at, out)
         return out
 
-    def _forward(self, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def _configuration(self, q: FloatArray) -> Configuration:
         if q.shape != (7 + len(self.axis),):
             raise BodyError(f"a posture has shape ({7 + len(self.axis)},), not {q.shape}")
-        n_bodies, n = len(self.parent), len(self.axis)
-        pos, mat = np.empty((n_bodies, 3)), np.empty((n_bodies, 3, 3))
-        axes, anchors = np.empty((n, 3)), np.empty((n, 3))
-        forward_kinematics(
-            np.ascontiguousarray(q, dtype=np.float64),
-            self.parent,
-            self.offset,
-            self.rotation,
-            self.joint_body,
-            self.axis,
-            self.anchor,
-            pos,
-            mat,
-            axes,
-            anchors,
-            self.slides,
-        )
-        return pos, mat, axes, anchors
+        at: Configuration = empty_configuration(self.linkage)
+        forward_kinematics(np.ascontiguousarray(q, dtype=np.float64), self.linkage, at)
+        return at
+
+
+def _above(parent: IntArray, joint_body: IntArray) -> IntArray:
+    """Return the next degree of freedom above each, shape (6 + n,); -1 for the first of the base.
+
+    Above a joint are those that carry it: others of its body, its parents', and the base's.
+    """
+    last = np.full(len(parent), 5)  # degree of freedom nearest to each body
+    above = np.arange(-1, 5 + len(joint_body))
+    for b, up in enumerate(parent):
+        if up >= 0:
+            last[b] = last[up]
+        for j in np.flatnonzero(joint_body == b):
+            above[6 + j], last[b] = last[b], 6 + j
+    return above

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 from numba import njit
 
 from mplearn.maths.yaw_roll_pitch import yaw_roll_pitch_quaternion
 from mplearn.recording import FloatArray, IntArray
 
-from ..kinematics.linkage import Linkage, points_of_postures
+from ..kinematics.kernels import points_of_postures
 from ..models.body import Body
 
 
@@ -27,12 +25,7 @@ def points_of(features: FloatArray, body: Body, parts: IntArray, places: FloatAr
         Shape (T, P, 3) [m].
     """
     postures = _postures(features, body.driven, len(body.tree.axis))
-    return np.asarray(points_of_postures(postures, _linkage(body), parts, places))
-
-
-@cache
-def _linkage(body: Body) -> Linkage:
-    return Linkage.of(body.tree)
+    return np.asarray(points_of_postures(postures, body.tree.linkage, parts, places))
 
 
 @njit(cache=True)
