@@ -62,6 +62,31 @@ def transition_table(library: PrimitiveLibrary) -> Table:
     return table
 
 
+def chain_table(library: PrimitiveLibrary) -> Table:
+    """Return a row for each chain of primitives that only ever follow each other: nodes merged."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    merged = library.graph.merged()
+    table = Table(title="chains, each as one node of the graph", title_justify="left")
+    table.add_column("primitives that only follow each other")
+    table.add_column("comes")
+    graph = merged.graph.to_networkx()
+    names = {
+        head: " > ".join(escape(library[id].name) for id in chain)
+        for head, chain in merged.chains.items()
+    }
+    for head, chain in merged.chains.items():
+        if len(chain) > 1:
+            after = sorted(graph.out_edges(head, data=True), key=lambda e: -e[2]["probability"])
+            following = "; ".join(
+                f"{names[next_head]} {100 * edge['probability']:.0f} %"
+                for _, next_head, edge in after
+            )
+            table.add_row(names[head], following or "[dim]nothing was seen to follow[/dim]")
+    return table
+
+
 def primitive_tree(library: PrimitiveLibrary) -> Tree:
     """Return the tree that the primitives were learned in."""
     from rich.markup import escape

@@ -36,6 +36,9 @@ def checked_gaussians(model: Any) -> None:
         raise ModelError(f"variances must be positive, not {variances.min()}")
 
 
+SHORTEST_STAY = 1.05  # frames: a state is never left for certain, or staying were impossible
+
+
 @dataclass(frozen=True)
 class LeftRightHMM:
     """A left-right HMM with diagonal Gaussian emissions and no skips.

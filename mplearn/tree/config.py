@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 from ..errors import InvalidValueError
 from ..state import newer, saved_as
@@ -54,6 +55,8 @@ class TreeConfig:
         n_states: States of the models.
         max_chains: Most chains of a primitive's model: one is added while it cannot be told apart
             from its neighbour [Kulic2008b]; 1 for none.
+        durations: How long a state of a primitive's model lasts: ``"geometric"``, as in a Markov
+            chain, or ``"explicit"``, normally distributed: a hidden semi-Markov model [Yu2010].
         variance_floor: Smallest standard deviation of a model, as a share of that of all motion
             ever seen (of the channel's group).
         distance: How far two segments are apart: ``"likelihood"``, eq. 5 on the segments;
@@ -114,6 +117,7 @@ class TreeConfig:
     normalisation: NormalisationConfig = field(default_factory=NormalisationConfig)
     n_states: int = 8
     max_chains: int = 1
+    durations: Literal["geometric", "explicit"] = newer("geometric", absent="geometric")
     variance_floor: float = 0.6
     distance: str = newer("likelihood", absent="likelihood")
     power: float = 0.5
@@ -216,6 +220,15 @@ class TreeConfig:
         if self.false_acceptance is not None and not 0 < self.false_acceptance < 1:
             raise InvalidValueError(
                 f"false_acceptance must lie in (0, 1) or be None, not {self.false_acceptance}"
+            )
+        if self.durations not in ("geometric", "explicit"):
+            raise InvalidValueError(
+                f"durations must be 'geometric' or 'explicit', not {self.durations!r}"
+            )
+        if self.durations == "explicit" and self.max_chains > 1:
+            raise InvalidValueError(
+                f"models of explicit durations have one chain: max_chains must be 1, "
+                f"not {self.max_chains}"
             )
         if self.normalisation.n_points < self.n_states:
             raise InvalidValueError(

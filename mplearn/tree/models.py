@@ -1,10 +1,21 @@
-"""Group models: a model of each node's motions, with more chains where one does not tell apart."""
+"""Group models: a model of each node's motions, of the kind that the rules ask for."""
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 
-from ..hmm import FactorialHMM, LeftRightHMM, add_chain, em_step, fit, needs_more_chains
+from ..hmm import (
+    FactorialHMM,
+    LeftRightHMM,
+    SemiMarkovHMM,
+    add_chain,
+    em_step,
+    fit,
+    fit_semi_markov,
+    needs_more_chains,
+)
 from ..recording import FloatArray
 from .config import TreeConfig
 from .nodes.node import Node
@@ -13,6 +24,8 @@ from .placement import ROOT
 
 _FLOOR = 0.1  # smallest standard deviation of a model, as a share of all motion's
 _EM_STEPS = 5  # after each chain that is added
+Model: TypeAlias = LeftRightHMM | FactorialHMM | SemiMarkovHMM
+_Chains: TypeAlias = LeftRightHMM | FactorialHMM
 _Members = tuple[int, ...]
 
 
@@ -27,11 +40,13 @@ class GroupModels:
     def __init__(self, config: TreeConfig, structure: Structure) -> None:
         self._config = config
         self._structure = structure
-        self._kept: dict[tuple[_Members, _Members], LeftRightHMM | FactorialHMM] = {}
+        self._kept: dict[tuple[_Members, _Members], Model] = {}
         self._variances = self._floor()
 
-    def of(self, id: int) -> LeftRightHMM | FactorialHMM:
+    def of(self, id: int) -> Model:
         """Return a node's model: of one chain, or of as many as it needs to be told apart.
+
+        With explicit durations it is a hidden semi-Markov model.
 
         A motion starts as one chain. While it cannot be told apart from the leaf whose mean
         trajectory is nearest, both get another one, fitted to what the others leave unexplained
@@ -44,7 +59,7 @@ class GroupModels:
         neighbour = self._neighbour(node) if self._config.max_chains > 1 else None
         key = tuple(node.members), tuple(neighbour.members) if neighbour else ()
         if key not in self._kept:
-            self._kept[key] = self._apart(*key) if neighbour else self._single(key[0])
+            self._kept[key] = self._apart(*key) if neighbour else self._alone(key[0])
         return self._kept[key]
 
     def of_segment(self, number: int) -> LeftRightHMM:
@@ -56,23 +71,27 @@ class GroupModels:
         held = {tuple(node.members) for node in self._structure.nodes.values()}
         self._kept = {key: model for key, model in self._kept.items() if key[0] in held}
 
+    def _alone(self, members: _Members) -> LeftRightHMM | SemiMarkovHMM:
+        if self._config.durations == "geometric":
+            return self._single(members)
+        frames = self._frames(members)
+        return fit_semi_markov(frames, self._n_states(frames), variance_floor=self._floor())
+
     def _single(self, members: _Members) -> LeftRightHMM:
         frames = self._frames(members)
         return fit(frames, self._n_states(frames), variance_floor=self._floor())
 
-    def _apart(self, members: _Members, others: _Members) -> LeftRightHMM | FactorialHMM:
+    def _apart(self, members: _Members, others: _Members) -> _Chains:
         own, other = self._frames(members), self._frames(others)
-        model: LeftRightHMM | FactorialHMM = self._single(members)
-        rival: LeftRightHMM | FactorialHMM = self._single(others)
+        model: _Chains = self._single(members)
+        rival: _Chains = self._single(others)
         for _ in range(self._config.max_chains - 1):
             if not needs_more_chains(model, own, rival, other):
                 break
             model, rival = self._grown(model, own), self._grown(rival, other)
         return model
 
-    def _grown(
-        self, model: LeftRightHMM | FactorialHMM, frames: tuple[FloatArray, ...]
-    ) -> FactorialHMM:
+    def _grown(self, model: _Chains, frames: tuple[FloatArray, ...]) -> FactorialHMM:
         grown = add_chain(model, frames, self._n_states(frames))
         for _ in range(_EM_STEPS):
             grown = em_step(grown, frames, variance_floor=self._floor())

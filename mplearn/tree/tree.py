@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 
 from ..errors import InvalidValueError, UnknownPrimitiveError
-from ..hmm import FactorialHMM, LeftRightHMM
+from ..hmm import LeftRightHMM
 from ..hmm.sequences import as_frames
 from ..recording import FloatArray
 from ..state import (
@@ -28,7 +28,7 @@ from .exemplars.bank import ExemplarBank
 from .exemplars.memory import SegmentMemory
 from .exemplars.renewal import RenewalState
 from .exemplars.spread import SampleState, SpreadState
-from .models import GroupModels
+from .models import GroupModels, Model
 from .nodes.node import Node, NodeState
 from .nodes.structure import Structure
 from .placement import ROOT, Change, Placement
@@ -207,19 +207,21 @@ class PrimitiveTree:
         """Return a node's group model: fitted to its exemplars as they came, at their rate.
 
         It has fewer states than configured where an exemplar is shorter than those; where the
-        motion has more chains than one, it goes through the combinations that they visit.
+        motion has more chains than one, it goes through the combinations that they visit, and where
+        it has explicit durations, through its states in their mean times: see `motion_model`.
 
         Raises:
             UnknownPrimitiveError: There is none of this id.
         """
-        model = self.chains(id)
-        return model.left_right() if isinstance(model, FactorialHMM) else model
+        model = self.motion_model(id)
+        return model if isinstance(model, LeftRightHMM) else model.left_right()
 
-    def chains(self, id: int) -> LeftRightHMM | FactorialHMM:
-        """Return a node's group model with all its chains.
+    def motion_model(self, id: int) -> Model:
+        """Return a node's group model with all that it has.
 
-        There are more than one where ``max_chains`` allows it and a primitive cannot be told apart
-        from its neighbour by one [Kulic2008b].
+        There are more chains than one where ``max_chains`` allows it and a primitive cannot be told
+        apart from its neighbour by one [Kulic2008b]; with ``durations="explicit"`` it is a hidden
+        semi-Markov model.
 
         Raises:
             UnknownPrimitiveError: There is none of this id.

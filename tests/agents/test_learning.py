@@ -71,6 +71,27 @@ def test_learn_show_rename_perform(table, tmp_path, capsys):
     assert "2 primitives in" in capsys.readouterr().out
 
 
+def test_settings_of_the_learner_are_options():
+    from mplearn.errors import InvalidValueError
+    from mplearn.learner import LearnerConfig
+    from mplearn_agents.commands.learn import with_settings
+
+    config = LearnerConfig(("a",))
+    assert with_settings(config, []) is config
+    found = with_settings(config, ["tree.max_chains=3", "segmenter=zero-velocity", "rate_hz=50"])
+    assert (found.tree.max_chains, found.segmenter, found.rate_hz) == (3, "zero-velocity", 50.0)
+    assert with_settings(config, ["tree.durations=explicit"]).tree.durations == "explicit"
+    for wrong, said in (
+        ("tree.max_chains", "NAME=VALUE"),
+        ("three.max_chains=3", "no settings 'three'"),
+        ("tree.maxchains=3", "maxchains"),
+        ("tree.max_chains=many", "tree.max_chains"),
+        ("tree.durations=long", "geometric"),
+    ):
+        with pytest.raises(InvalidValueError, match=said):
+            with_settings(config, [wrong])
+
+
 def test_learn_refuses_what_it_cannot_learn_from(table, tmp_path, capsys):
     out = ["--out", str(tmp_path / "x.mplearn")]
     assert main(["learn", str(table), "--person", "nobody", *out]) == 2

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from mplearn.errors import InvalidValueError, MPLearnError, RecordingError
+from mplearn.errors import InvalidValueError, MPLearnError, RecordingError, StateError
 from mplearn_agents.live_learning import add_live_arguments, learn_from_source
 from mplearn_agents.reading import (
     add_reading_arguments,
@@ -59,6 +59,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--person", action="append", help="learn from this person's takes only; may be repeated"
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="another setting of the learner, as in LearnerConfig: --set tree.max_chains=3 for "
+        "factorial models, --set tree.durations=explicit for semi-Markov ones; may be repeated",
     )
     add_reading_arguments(parser)
 
@@ -133,7 +141,43 @@ def _configured(args: argparse.Namespace, config: LearnerConfig) -> LearnerConfi
         config = replace(config, segmenter=args.segmenter)
     if args.demonstrations is not None:
         config = replace(config, tree=_shown_so_often(config.tree, args.demonstrations))
-    return config
+    return with_settings(config, args.set)
+
+
+def with_settings(config: LearnerConfig, settings: Sequence[str]) -> LearnerConfig:
+    """Return a configuration with other values for some of its settings.
+
+    Args:
+        config: The configuration.
+        settings: Each as ``"tree.max_chains=3"``; a value is JSON, or else text.
+
+    Raises:
+        InvalidValueError: A setting is not known, or has no such value.
+    """
+    import json
+
+    from mplearn.learner import LearnerConfig
+
+    plain = config.to_dict()
+    for setting in settings:
+        name, equals, text = setting.partition("=")
+        if not equals:
+            raise InvalidValueError(f"--set takes NAME=VALUE, not {setting!r}")
+        try:
+            value = json.loads(text)
+        except ValueError:
+            value = text
+        *rooms, last = name.strip().split(".")
+        inside: Any = plain
+        for room in rooms:
+            inside = inside.get(room)
+            if not isinstance(inside, dict):
+                raise InvalidValueError(f"--set {setting}: there are no settings {room!r}")
+        inside[last] = value
+    try:
+        return LearnerConfig.from_dict(plain) if settings else config
+    except StateError as error:
+        raise InvalidValueError(f"--set: {error}") from error
 
 
 def _shown_so_often(rules: TreeConfig, demonstrations: int) -> TreeConfig:

@@ -21,11 +21,19 @@ def run(args: argparse.Namespace) -> None:
     from rich.console import Console
 
     from mplearn.library import PrimitiveLibrary
-    from mplearn_agents.tables import primitive_table, primitive_tree, transition_table
+    from mplearn_agents.tables import (
+        chain_table,
+        primitive_table,
+        primitive_tree,
+        transition_table,
+    )
 
     console = Console()
     library = PrimitiveLibrary.load(args.library)
-    for table in (primitive_table(library), transition_table(library), primitive_tree(library)):
+    tables = [primitive_table(library), transition_table(library), primitive_tree(library)]
+    if any(len(chain) > 1 for chain in library.graph.chains()):
+        tables.insert(2, chain_table(library))
+    for table in tables:
         console.print(table)
     console.print(
         f"{len(library)} primitives, {len(library.channels)} channels at {library.rate_hz:g} Hz, "

@@ -13,13 +13,12 @@ import numpy as np
 
 from ...errors import ModelError
 from ...recording import FloatArray, IntArray
-from ..model import LeftRightHMM
+from ..model import SHORTEST_STAY, LeftRightHMM
 from ..sequences import as_frames, as_weights
 from .posterior import Moments, exact_moments, variational_moments
 from .product_chain import ProductChain
 
 MOST_COMBINATIONS = 1024  # up to here the E-step is exact
-_SHORTEST_STAY = 1.05  # frames: a state is never left for certain, or staying were impossible
 
 
 @dataclass(frozen=True)
@@ -146,7 +145,7 @@ class FactorialHMM:
         starts = np.flatnonzero(np.append(True, (np.diff(path, axis=1) != 0).any(axis=0)))
         means = np.sum([own[path[m, starts]] for m, own in enumerate(self.means)], axis=0)
         durations = np.diff(starts) + 0.0
-        stays = np.log1p(-1.0 / np.maximum(durations, _SHORTEST_STAY))
+        stays = np.log1p(-1.0 / np.maximum(durations, SHORTEST_STAY))
         return LeftRightHMM(means, np.tile(self.variances, (len(means), 1)), np.append(stays, 0.0))
 
     def _mean_path(self) -> IntArray:

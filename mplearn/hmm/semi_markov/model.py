@@ -17,7 +17,7 @@ from ...recording import FloatArray
 from ..em import maximise_gaussians
 from ..fit import fit
 from ..kernels import log_densities, log_norms
-from ..model import checked_gaussians
+from ..model import SHORTEST_STAY, LeftRightHMM, checked_gaussians
 from ..motion_model import held
 from ..parameters import as_floor
 from ..sequences import SequenceBatch, as_frames, as_weights
@@ -108,6 +108,16 @@ class SemiMarkovHMM:
     def mean_motion(self) -> FloatArray:
         """Return the means of the states, each held for its mean duration, shape (T, D)."""
         return self.means[held(self.durations_frames)]
+
+    def left_right(self) -> LeftRightHMM:
+        """Return the left-right HMM of the same states, which last as long on average.
+
+        Its last state has no duration of its own, see `LeftRightHMM.mean_motion`. It is kept and
+        generates as any other model; how much durations vary is not in it.
+        """
+        stays = np.log1p(-1.0 / np.maximum(self.durations_frames, SHORTEST_STAY))
+        stays[-1] = 0.0
+        return LeftRightHMM(self.means, self.variances, stays)
 
     def sample(self, rng: np.random.Generator) -> FloatArray:
         """Draw a motion, shape (T, D)."""
