@@ -11,11 +11,15 @@ from mplearn.body import PROPORTIONS
 from mplearn.errors import InvalidValueError
 
 from .channels import CHANNELS, UPPER_JOINTS, both_sides, mirrored
+from .gymnastics import CHANGES
 from .postures import POSTURES
-from .primitives import PRIMITIVES
+from .primitives import GYMNASTICS, PRIMITIVES
 
 # rest habits: standard deviation of the part that both sides share, and of the part that differs
 _HABIT_RAD, _ONE_SIDED_RAD = 0.035, 0.02
+# gymnastics are drawn apart: a person of some seed stays who they were before there were any
+_COMMON = [name for name in PRIMITIVES if name not in GYMNASTICS]
+_COMMON_POSTURES = [name for name in POSTURES if name not in CHANGES]
 
 
 @dataclass(frozen=True)
@@ -71,17 +75,22 @@ class Person:
         height_m = float(rng.uniform(1.55, 1.90))
         lengths = rng.uniform(0.96, 1.04, len(PROPORTIONS))
         pace = np.exp(rng.normal(0.0, 0.07))
-        tempo = pace * np.exp(rng.normal(0.0, 0.04, len(PRIMITIVES)))
-        reach = rng.uniform(0.9, 1.1, len(POSTURES))
+        tempo = pace * np.exp(rng.normal(0.0, 0.04, len(_COMMON)))
+        reach = rng.uniform(0.9, 1.1, len(_COMMON_POSTURES))
         joint_reach = rng.uniform(0.93, 1.07, len(UPPER_JOINTS))
         stronger_left = rng.uniform(0.96, 1.04)
         rest = _rest_habit(rng)
+        apart = np.random.default_rng(np.frombuffer(lengths.tobytes(), np.uint32))
+        gymnastic_tempo = pace * np.exp(apart.normal(0.0, 0.04, len(GYMNASTICS)))
+        gymnastic_reach = apart.uniform(0.9, 1.1, len(CHANGES))
         return cls(
             name=name or f"person-{int(rng.integers(1_000_000)):06d}",
             height_m=height_m,
             proportions=dict(zip(PROPORTIONS, lengths.tolist(), strict=True)),
-            tempo=dict(zip(PRIMITIVES, tempo.tolist(), strict=True)),
-            reach=dict(zip(POSTURES, reach.tolist(), strict=True)),
+            tempo=dict(zip(_COMMON, tempo.tolist(), strict=True))
+            | dict(zip(GYMNASTICS, gymnastic_tempo.tolist(), strict=True)),
+            reach=dict(zip(_COMMON_POSTURES, reach.tolist(), strict=True))
+            | dict(zip(CHANGES, gymnastic_reach.tolist(), strict=True)),
             joint_reach={
                 joint: float(factor * _side_factor(joint, stronger_left))
                 for joint, factor in zip(UPPER_JOINTS, joint_reach, strict=True)

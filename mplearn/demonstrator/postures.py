@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from .channels import both_sides, mirrored
+from .gymnastics import CHANGES, KNEE_L, PLACES
 
 _STAND = both_sides(
     {
@@ -25,14 +26,7 @@ _STAND = both_sides(
     }
 )
 
-_ARM_UP_L = {
-    "clavicle_elevation_l": 0.30,
-    "shoulder_pitch_l": -2.60,
-    "shoulder_roll_l": 0.14,
-    "shoulder_yaw_l": 0.0,
-    "elbow_l": -0.20,
-    "wrist_pitch_l": -0.10,
-}
+_ARM_UP_L = PLACES["up"]
 _GUARD = both_sides(
     {
         "clavicle_protraction_l": -0.15,
@@ -104,14 +98,7 @@ _KICK_L = {
     "elbow_r": -0.60,
 }
 _MARCH_L = {
-    "foot_x_l": 0.36,
-    "foot_z_l": 0.30,
-    "foot_pitch_l": 0.22,
-    "pelvis_y": -0.116,
-    "pelvis_roll": 0.03,
-    "lumbar_roll": -0.04,
-    "lumbar_yaw": 0.10,
-    "crouch": 0.008,
+    **KNEE_L,
     "shoulder_pitch_r": -0.60,
     "elbow_r": -0.95,
     "shoulder_pitch_l": 0.32,
@@ -127,7 +114,7 @@ _TWIST_L = {
     "elbow_l": -0.55,
     "elbow_r": -0.75,
 }
-_SIDES = both_sides({"clavicle_elevation_l": 0.12, "shoulder_roll_l": 1.50, "elbow_l": -0.12})
+_SIDES = both_sides(PLACES["side"])
 _WAVE_R = {
     "clavicle_elevation_r": -0.15,
     "shoulder_pitch_r": -0.35,
@@ -136,7 +123,7 @@ _WAVE_R = {
     "elbow_r": -1.75,
 }
 
-_CHANGES: Mapping[str, Mapping[str, float]] = {
+_PAPER: Mapping[str, Mapping[str, float]] = {
     "stand": {},
     "both arms up": both_sides({**_ARM_UP_L, "lumbar_pitch": -0.10, "neck_pitch": -0.10}),
     "left arm up": {**_ARM_UP_L, "lumbar_roll": -0.05, "neck_yaw": 0.06},
@@ -159,5 +146,5 @@ _CHANGES: Mapping[str, Mapping[str, float]] = {
 
 STAND: Mapping[str, float] = _STAND
 POSTURES: Mapping[str, Mapping[str, float]] = {
-    name: {**_STAND, **changes} for name, changes in _CHANGES.items()
+    name: {**_STAND, **changes} for name, changes in {**_PAPER, **CHANGES}.items()
 }

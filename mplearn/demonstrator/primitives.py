@@ -5,7 +5,7 @@ that its figure names, and the counterparts without which a person could not go 
 the kicks, the left punch itself, the right punch and its retract). A march is ``MRL`` (the right
 leg is raised), ``MLR`` (it comes down while the left is raised) and ``MMID`` (back to the middle).
 A combination of punches ends with the right one, whose retract drops both arms.
-The others are extras.
+The others are extras, and the gymnastics of `gymnastics`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from mplearn.errors import InvalidValueError
 
 from .channels import CHANNELS, mirrored, mirrored_name
+from .gymnastics import ways
 from .postures import POSTURES
 
 Window = tuple[float, float]
@@ -217,8 +218,25 @@ _EXTRAS = (
     ),
 )  # fmt: skip
 
+
+def _gymnastic(start: str, end: str, lifted: bool) -> Primitive:
+    """Return the way from one posture to another; a knee is raised or put down as in a march."""
+    name = f"{start} to {end}"
+    if not lifted:
+        return Primitive(name, name, start, end, 1.20, _ARM_LAGS)
+    knee = _MARCH_WINDOWS if "left" in start + end else _mirrored_windows(_MARCH_WINDOWS)
+    return Primitive(
+        name, name, start, end, 1.35, knee if "knee" in end else _reversed_windows(knee)
+    )
+
+
+_GYMNASTICS = tuple(_gymnastic(*way) for way in ways())
+
 PAPER_PRIMITIVES: tuple[str, ...] = tuple(primitive.name for primitive in _PAPER)
-PRIMITIVES: Mapping[str, Primitive] = {primitive.name: primitive for primitive in _PAPER + _EXTRAS}
+GYMNASTICS: tuple[str, ...] = tuple(primitive.name for primitive in _GYMNASTICS)
+PRIMITIVES: Mapping[str, Primitive] = {
+    primitive.name: primitive for primitive in _PAPER + _EXTRAS + _GYMNASTICS
+}
 
 
 def primitive(name: str) -> Primitive:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
+import networkx as nx
 import numpy as np
 
 from mplearn.errors import InvalidValueError
@@ -12,6 +13,9 @@ from mplearn.errors import InvalidValueError
 from .primitives import PRIMITIVES, followers, primitive
 
 Sequencing = Mapping[str, Mapping[str, float]]
+
+VARIED: tuple[str, ...] = tuple(name for name in PRIMITIVES if name != "ARL")
+"""All primitives between which a round is possible: from the guard one goes on by a punch."""
 
 _AFTER_ONE_ARM = {"BAD": 0.5, "SQD": 0.5}
 
@@ -45,6 +49,54 @@ SEQUENCING: Sequencing = {
 down by a squat raise, the lowering of one arm by a bow or a squat; bow up leads to any of the arm
 raises, squat raise to the left arm. What the paper leaves open (punches, kicks, march) is ours.
 """
+
+
+def drawn_sequencing(
+    order: np.random.Generator,
+    names: Sequence[str] = VARIED,
+    *,
+    person: np.random.Generator | None = None,
+    own: float = 0.1,
+) -> Sequencing:
+    """Draw an order in which every primitive leads on to one or two others, and all are reached.
+
+    One round leads through all primitives (an Eulerian circuit of the key postures); besides, each
+    has one more follower, where its posture allows, that leads elsewhere on the round. So from one
+    primitive to another it is a long way, several steps for most, and which way is a choice.
+
+    Args:
+        order: Source of what people have in common.
+        names: The primitives, as many that leave a key posture as reach it.
+        person: Source of one's own: how often each way is taken, and other ways. None: the common.
+        own: Share of the primitives whose second follower is the person's own.
+
+    Raises:
+        InvalidValueError: There is no round through these primitives.
+    """
+    postures: nx.MultiDiGraph[str] = nx.MultiDiGraph()
+    for name in order.permutation(list(names)).tolist():
+        postures.add_edge(primitive(name).start, primitive(name).end, key=name)
+    if not nx.is_eulerian(postures):
+        raise InvalidValueError(
+            "no round leads through these primitives: each key posture must be left as often as "
+            f"it is reached; given are {list(names)}"
+        )
+    circuit = [name for *_, name in nx.eulerian_circuit(postures, source="stand", keys=True)]
+    graph: dict[str, dict[str, float]] = {}
+    for name, following in itertools.pairwise([*circuit, circuit[0]]):
+        others = [n for n in followers(name) if n in set(names) and n != following]
+        graph[name] = {following: 0.6}
+        if others:
+            draw = order.random(2)
+            if person is not None and draw[0] < own:
+                draw = person.random(2)
+            graph[name][others[int(draw[1] * len(others))]] = 0.4
+    if person is not None:
+        graph = {
+            name: {other: w * float(np.exp(person.normal(0.0, 0.4))) for other, w in row.items()}
+            for name, row in graph.items()
+        }
+    return graph
 
 
 def check_script(script: tuple[str, ...]) -> None:
