@@ -78,6 +78,11 @@ class TreeConfig:
         spread: Largest scale over that quartile; inf for no such bound.
         mean_share: Largest scale over the mean distance; it holds while hardly any motion has been
             seen twice.
+        birth_cap: Largest diameter of what is born over the median of that of the leaves, once many
+            are known; inf for the scale alone.
+        extent_share: Largest distance between executions of one motion over that of each from
+            standing still, by which two unrelated motions of one size are sqrt(2) apart; inf for
+            no such bound.
         min_exemplars: Members from which on a cluster becomes a node. With 2 a motion is known as
             soon as it comes again, and a chance pair can take its place for a while; on people's
             takes 3 halves those and costs one demonstration, 4 leaves hardly any and costs two.
@@ -129,6 +134,8 @@ class TreeConfig:
     scale_floor: float = newer(0.03, absent=0.0)
     spread: float = math.inf
     mean_share: float = 0.45
+    birth_cap: float = newer(1.75, absent=math.inf)
+    extent_share: float = newer(1.4, absent=math.inf)
     min_exemplars: int = 2
     pair_share: float = newer(0.6, absent=1.0)
     confirmed: int = newer(3, absent=1)
@@ -162,6 +169,8 @@ class TreeConfig:
             tempo=math.inf,
             local=True,
             min_exemplars=4,
+            birth_cap=math.inf,
+            extent_share=math.inf,
             pair_share=1.0,
             confirmed=1,
             young_reach=0.0,
@@ -181,6 +190,8 @@ class TreeConfig:
             "scale_share",
             "spread",
             "mean_share",
+            "birth_cap",
+            "extent_share",
             "pair_share",
             "reach",
             "reach_cap",

@@ -36,6 +36,7 @@ class Exemplar(NamedTuple):
         log_next: Shape (N,).
         own: Log-likelihood of the points under the model, shape ().
         duration: How long the segment lasts [frame], shape ().
+        extent: How far it is from its mean posture held still, a length, shape ().
     """
 
     columns: FloatArray
@@ -46,6 +47,7 @@ class Exemplar(NamedTuple):
     log_next: FloatArray
     own: FloatArray
     duration: FloatArray
+    extent: FloatArray
 
 
 class Distance(ABC):
@@ -170,7 +172,7 @@ def _score(columns: FloatArray, model: Any, weights: FloatArray) -> float:
 
 @njit(cache=True)
 def _likelihood(exemplar: Any, others: Any, rows: IntArray, weights: FloatArray) -> FloatArray:
-    columns, means, variances, norms, stay, following, own, _ = others
+    columns, means, variances, norms, stay, following, own, _, _ = others
     mine = exemplar[1:6]
     mass = weights.sum()
     out = np.empty(len(rows))

@@ -11,12 +11,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..recording import FloatArray
 from .exemplars.spread import moments
 from .nodes.clustering import clusters_below, gap, separation, two_branches
 from .nodes.node import Node
 from .nodes.search import mean_nearest
 from .nodes.structure import Structure
 from .placement import ROOT, Change, Match
+
+_UNKNOWN = 3.0  # leaves that the scale of all motion counts for beside that of those
 
 
 def form_primitives(structure: Structure, node: Node, when: int) -> Change:
@@ -33,7 +36,8 @@ def form_primitives(structure: Structure, node: Node, when: int) -> Change:
         loose = [i for i, number in enumerate(node.members) if number not in node.settled]
         matrix = node.matrix[np.ix_(loose, loose)]
         limit = cutoff(structure, node)
-        groups = clusters_below(matrix, limit, structure.least, config.pair_share)
+        small = _smallness(structure, [node.members[i] for i in loose], limit)
+        groups = clusters_below(matrix / small, limit, structure.least, config.pair_share)
         if not groups:
             return change
         places = [loose[i] for i in groups[0]]
@@ -52,6 +56,16 @@ def form_primitives(structure: Structure, node: Node, when: int) -> Change:
             radius = structure.index.radius(child.id)
             inside = [n for n, distance in zip(others, row, strict=True) if distance <= radius]
             change = change.then(structure.take_in(child, inside))
+
+
+def _smallness(structure: Structure, members: Sequence[int], limit: float) -> FloatArray:
+    """Return how much nearer than the limit each two must be for what they show, shape (n, n).
+
+    Executions of one motion are nearer to each other than they are to no motion at all.
+    """
+    most = structure.config.extent_share * structure.memory.bank.extents(members)
+    shares = np.minimum(most / max(limit, 1e-12), 1e12)
+    return np.asarray(np.clip(np.sqrt(np.multiply.outer(shares, shares)), 1e-12, 1.0))
 
 
 def _leaf_of(structure: Structure, members: Sequence[int], limit: float) -> Node | None:
@@ -93,11 +107,21 @@ def forget_chances(structure: Structure, when: int) -> Change:
 
 
 def cutoff(structure: Structure, node: Node) -> float:
-    """Return the largest distance inside a cluster that becomes a node, D_cutoff."""
-    if structure.config.local:
+    """Return the largest distance inside a cluster that becomes a node, D_cutoff.
+
+    It is the scale of all motion, which is large as long as little of it has come again, and the
+    more that of what is known by now, the more that is.
+    """
+    config = structure.config
+    if config.local:
         mu, sigma = moments(node.matrix)
-        return mu - structure.config.cutoff * sigma
-    return structure.memory.scale()
+        return mu - config.cutoff * sigma
+    scale = structure.memory.scale()
+    n_leaves = int(structure.index.leaves.sum())
+    if not n_leaves or not np.isfinite(config.birth_cap):
+        return scale
+    known = min(scale, config.birth_cap * structure.index.scale())
+    return (_UNKNOWN * scale + n_leaves * known) / (_UNKNOWN + n_leaves)
 
 
 def split_mixed(structure: Structure, leaf: Node, when: int) -> Change:

@@ -66,7 +66,7 @@ class ExemplarBank:
             (n_channels, config.normalisation.n_points),
             *(per_state, per_state, per_state),
             *(per_transition, per_transition),
-            *((), ()),
+            *((), (), ()),
         )
 
     def __contains__(self, number: int) -> bool:
@@ -93,6 +93,17 @@ class ExemplarBank:
             ModelError: A channel is missing throughout.
         """
         points = points.astype(np.float32).astype(np.float64)
+        exemplar = self._modelled(points, duration)
+        if not np.isfinite(self.config.extent_share):  # nothing asks for it
+            return exemplar
+        posture = normalisation.mean_posture(points, self.config.normalisation)
+        still = self._modelled(np.broadcast_to(posture, points.shape), duration)
+        others = Exemplar(*(part[None] for part in still))
+        apart = self.distance.divergence(exemplar, others, np.zeros(1, np.int64), self._weights)
+        return exemplar._replace(extent=self.distance.length(apart)[0])
+
+    def _modelled(self, points: FloatArray, duration: float) -> Exemplar:
+        """Model points as they are; how far they are from standing still is not known yet."""
         model = fit(
             [points],
             self.config.n_states,
@@ -103,7 +114,7 @@ class ExemplarBank:
         own = np.array(model.score(points, self._weights))
         columns = np.ascontiguousarray(points.T)
         parts = model.means, model.variances, model.log_norms, model.log_stay, model.log_next
-        return Exemplar(columns, *parts, own, np.array(float(duration)))
+        return Exemplar(columns, *parts, own, np.array(float(duration)), np.array(np.inf))
 
     def add(self, number: int, exemplar: Exemplar) -> None:
         """Remember an exemplar."""
@@ -160,6 +171,10 @@ class ExemplarBank:
             matrix[i, :i] = matrix[:i, i] = row
         return matrix
 
+    def extents(self, numbers: Sequence[int]) -> FloatArray:
+        """Return how far exemplars are from standing still, shape (k,)."""
+        return self._arrays.gather(self._slots_of(numbers), _EXTENT)
+
     def fork(self) -> ExemplarBank:
         """Return a bank that holds the same, and goes on apart; what neither changes is shared."""
         twin = copy(self)
@@ -197,3 +212,4 @@ class ExemplarBank:
 
 _COLUMNS = Exemplar._fields.index("columns")
 _DURATION = Exemplar._fields.index("duration")
+_EXTENT = Exemplar._fields.index("extent")

@@ -30,6 +30,11 @@ def points_of(frames: FloatArray, config: NormalisationConfig) -> FloatArray:
 
 def centred(points: FloatArray, config: NormalisationConfig) -> FloatArray:
     """Return the points (P, D) less a share of their weighted mean."""
+    return np.asarray(points - config.centring * mean_posture(points, config))
+
+
+def mean_posture(points: FloatArray, config: NormalisationConfig) -> FloatArray:
+    """Return the weighted mean of points (P, D) where they are seen, shape (D,)."""
     weight = np.where(np.isnan(points), 0.0, weights(config)[:, None])
-    mean = (weight * np.nan_to_num(points)).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-12)
-    return np.asarray(points - config.centring * mean)
+    total = np.maximum(weight.sum(axis=0), 1e-12)
+    return np.asarray((weight * np.nan_to_num(points)).sum(axis=0) / total)

@@ -26,6 +26,7 @@ _KNOWN = np.dtype(
         ("parent", np.int64),
         ("is_leaf", np.bool_),
         ("diameter", np.float64),
+        ("extent", np.float64),
         ("slot", np.int64),
     ]
 )
@@ -116,18 +117,20 @@ class NodeIndex:
         """Take note of a node: its id, its parent's, whether it is a leaf, its diameter."""
         k = int(np.searchsorted(self.ids, facts[0]))
         if facts[0] not in self.ids[k : k + 1]:
-            new = np.array([(*facts, self._means.take())], _KNOWN)
+            new = np.array([(*facts, np.inf, self._means.take())], _KNOWN)
             self._known = np.insert(self._known, k, new)
             self.members.insert(k, [])
-        slot = int(self._known["slot"][k])
-        self._known[k] = (*facts, slot)
+        slot, extent = int(self._known["slot"][k]), float(self._known["extent"][k])
+        self._known[k] = (*facts, extent, slot)
         if self.members[k] != members:
             self.members[k] = list(members)
+            self._known["extent"][k] = bank.extents(members).mean()
             self._means.write(slot, (bank.mean_profile(members),))
 
-    def remeasured(self, diameters: Mapping[int, float]) -> None:
-        """Take note of nodes' new diameters, by id."""
+    def remeasured(self, diameters: Mapping[int, float], bank: ExemplarBank) -> None:
+        """Take note of nodes' new diameters, by id, and of the new models of their exemplars."""
         self._known["diameter"] = [diameters[id] for id in self.ids.tolist()]
+        self._known["extent"] = [bank.extents(members).mean() for members in self.members]
 
     def scale(self, but: int | None = None) -> float:
         """Return the median diameter of the leaves, but for one: how much executions vary.
@@ -159,6 +162,7 @@ class NodeIndex:
             if np.isfinite(self.limit):
                 least = np.where(sizes <= _YOUNG, config.young_reach, config.least_reach)
                 radii = np.minimum(np.maximum(radii, least * self.limit), self.limit)
+        radii = np.minimum(radii, config.extent_share * self._known["extent"])
         return np.asarray(radii if self.caps is None else np.minimum(radii, self.caps))
 
     def radius(self, id: int) -> float:
@@ -195,7 +199,7 @@ class NodeIndex:
     def _compare(self, exemplar: Exemplar, bank: ExemplarBank, places: IntArray) -> list[Match]:
         members = [self.members[k] for k in places]
         row = bank.distances(exemplar, [m for group in members for m in group])
-        radii = self.radii()
+        radii = np.minimum(self.radii(), self.config.extent_share * float(exemplar.extent))
         matches = []
         first = 0
         for k, group in zip(places, members, strict=True):

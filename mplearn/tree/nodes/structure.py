@@ -69,7 +69,8 @@ class Structure:
         """Take over distances in the nodes that were measured again."""
         for id, node in self.nodes.items():
             node.matrix = matrices[id]
-        self.index.remeasured({id: node.diameter for id, node in self.nodes.items()})
+        diameters = {id: node.diameter for id, node in self.nodes.items()}
+        self.index.remeasured(diameters, self.memory.bank)
         self.tune()
 
     def remeasure(self) -> None:
