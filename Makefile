@@ -67,9 +67,9 @@ $(VENV)/.venv:
 	@touch $@
 
 $(VENV)/.demo: $(VENV)/.venv pyproject.toml constraints.txt
-	$(PIP) --editable ".[report]"
+	$(PIP) --editable ".[report,ui]"
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.venv pyproject.toml constraints.txt
-	$(PIP) --editable ".[report,rl,docs,dev]"
+	$(PIP) --editable ".[report,rl,docs,ui,dev]"
 	@touch $@ $(VENV)/.demo

@@ -1,0 +1,55 @@
+"""``mplearn live``: learn from live motion, and look on."""
+
+from __future__ import annotations
+
+import argparse
+
+from mplearn.extras import require
+from mplearn_agents.reading import printable
+
+HELP = "Learn from live motion, and show it all on a page in the browser."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument(
+        "source",
+        nargs="?",
+        default="demonstrator",
+        help="where motion comes from: demonstrator (default), recording:FILE, lsl:NAME, ...",
+    )
+    parser.add_argument("--speed", type=float, help="times as fast, of a source that is played")
+    parser.add_argument(
+        "--observe",
+        choices=["robot", "positions", "channels"],
+        default="robot",
+        help="what is learned, see `mplearn learn`",
+    )
+    parser.add_argument(
+        "--host", default="127.0.0.1", help="address to be reached at (default: this machine only)"
+    )
+    parser.add_argument("--port", type=int, default=8765, help="port, 0 for any (default: 8765)")
+    parser.add_argument(
+        "--token", default="", help="what others must know to look on; made up where needed"
+    )
+    parser.add_argument("--no-robot", action="store_true", help="do not simulate the robot")
+
+
+def run(args: argparse.Namespace) -> None:
+    """Serve the page until it is interrupted."""
+    for module in ("starlette", "uvicorn", "websockets"):
+        require(module, "ui")
+    from mplearn_agents.page.serve import serve
+    from mplearn_agents.page.watching import Watch
+
+    def ready(url: str) -> None:
+        print(f"open {printable(url)}   (Ctrl-C ends it)", flush=True)
+
+    serve(
+        Watch(args.source, args.observe, args.speed),
+        host=args.host,
+        port=args.port,
+        token=args.token,
+        robot=not args.no_robot,
+        ready=ready,
+    )

@@ -1,0 +1,139 @@
+"""What teachers ask of the learner: requests of the page as commands, and commands in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from mplearn.errors import InvalidValueError
+from mplearn.store import (
+    Command,
+    Delete,
+    Freeze,
+    LifelongLearner,
+    Merge,
+    Note,
+    Pause,
+    Redo,
+    Rename,
+    Resume,
+    Split,
+    Undo,
+    Unfreeze,
+)
+
+from .messages import Header
+
+LONGEST_NAME, LONGEST_NOTE = 80, 1000
+
+
+def do(lifelong: LifelongLearner, asked: Mapping[str, Any], by: str) -> str:
+    """Do what a teacher asks, and return what was done, in words.
+
+    Args:
+        lifelong: Who learns.
+        asked: The request: ``do`` says what, see `COMMANDS`; or undo and redo.
+        by: Who asks.
+
+    Raises:
+        MPLearnError: It cannot be done; nothing has changed then.
+    """
+    what = asked["do"]
+    if what in ("undo", "redo"):
+        entry = lifelong.undo(by=by) if what == "undo" else lifelong.redo(by=by)
+        return in_words(entry.command, lifelong)
+    if what not in COMMANDS:
+        raise InvalidValueError(f"a request is one of {', '.join(COMMANDS)}, not {what[:40]!r}")
+    command = COMMANDS[what](asked)
+    text = in_words(command, lifelong)  # before names change
+    lifelong.execute(command, by=by)
+    return text
+
+
+def in_words(command: Command, lifelong: LifelongLearner) -> str:
+    """Return what a command does, in a few words."""
+    library = lifelong.snapshot()
+
+    def name(id: int) -> str:
+        return library[id].name if id in library else f"P{id}"
+
+    match command:
+        case Rename(id, new):
+            return f"{name(id)} is called {new} now"
+        case Merge(first, second):
+            return f"{name(first)} and {name(second)} are one"
+        case Split(id):
+            return f"{name(id)} is two"
+        case Delete(id):
+            return f"{name(id)} is forgotten"
+        case Freeze(id):
+            return f"{name(id)} stays as it is"
+        case Unfreeze(id):
+            return f"{name(id)} may change again"
+        case Note(text, None):
+            return f"note: {text}"
+        case Note(text, int(id)):
+            return f"note on {name(id)}: {text}"
+        case Pause():
+            return "learning is paused"
+        case Resume():
+            return "learning goes on"
+        case Undo(number) | Redo(number):
+            done = {entry.number: entry.command for entry in lifelong.entries(number - 1)}
+            what = "undone" if isinstance(command, Undo) else "done again"
+            return f"{what}: {in_words(done[number], lifelong)}" if number in done else what
+        case _:
+            return command.kind
+
+
+def history(lifelong: LifelongLearner, asked: Mapping[str, Any]) -> list[Header]:
+    """Return what happened to a primitive: when [s since 1970], and what, the oldest first."""
+    entries = {entry.number: entry for entry in lifelong.entries()}
+    lines: list[Header] = []
+    for each in lifelong.history(_id(asked)):
+        entry = None if each.entry is None else entries.get(each.entry)
+        others = " and ".join(f"{{{id}}}" for id in each.others)
+        match each.what:
+            case "command" if entry is not None:
+                undone = " (undone)" if entry.undone else ""
+                text = f"{entry.by}: {in_words(entry.command, lifelong)}{undone}"
+            case "born":
+                text = f"formed from {each.exemplars} demonstrations"
+            case "confirmed":
+                text = f"learned, after {each.exemplars} demonstrations"
+            case "merged":
+                text = f"one with {others}"
+            case "split":
+                text = f"parted into {others}"
+            case other:
+                text = other
+        lines.append({"when": each.when, "text": text})
+    return lines
+
+
+def _id(asked: Mapping[str, Any], key: str = "id") -> int:
+    value = asked.get(key)
+    if type(value) is not int or not 0 <= value < 2**53:
+        raise InvalidValueError(f"{key} must be the number of a primitive, not {value!r:.40}")
+    return value
+
+
+def _text(asked: Mapping[str, Any], key: str, longest: int) -> str:
+    value = asked.get(key)
+    if not isinstance(value, str) or len(value) > longest:
+        raise InvalidValueError(f"{key} must be a text of at most {longest} characters")
+    return value.strip()
+
+
+#: The commands by the names that requests give them.
+COMMANDS: dict[str, Callable[[Mapping[str, Any]], Command]] = {
+    "rename": lambda asked: Rename(_id(asked), _text(asked, "name", LONGEST_NAME)),
+    "merge": lambda asked: Merge(_id(asked), _id(asked, "other")),
+    "split": lambda asked: Split(_id(asked)),
+    "forget": lambda asked: Delete(_id(asked)),
+    "freeze": lambda asked: Freeze(_id(asked)),
+    "unfreeze": lambda asked: Unfreeze(_id(asked)),
+    "note": lambda asked: Note(_text(asked, "text", LONGEST_NOTE), _id(asked)),
+    "pause": lambda asked: Pause(),
+    "resume": lambda asked: Resume(),
+}

@@ -1,0 +1,363 @@
+"""The process that watches and learns: a live source in, what is known and what happens out."""
+
+from __future__ import annotations
+
+import math
+import os
+import queue
+import signal
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import Any
+
+import numpy as np
+
+from mplearn.demonstrator import demonstrate
+from mplearn.errors import InvalidValueError, MPLearnError
+from mplearn.learner import LearnerConfig, MotionLearner, learnable_rate
+from mplearn.sources import Block, Change, Observe, Source, open_source
+from mplearn.store import LifelongLearner
+
+from .happenings import happening, tell
+from .knowledge import knowledge
+from .messages import Header, unpack
+from .outbox import Message, Outbox
+from .shelf import Sender
+from .teaching import do, history
+from .watched_figure import WatchedFigure
+
+MOST_WAITING = 3_000  # blocks of the stream that may wait for the learner
+STATUS_S, KNOWLEDGE_S = 0.25, 0.2
+_WARM_UP = ("BAR", "BAL") * 4
+_DELAYS = 500  # frames over which the delay is measured
+
+
+@dataclass(frozen=True)
+class Watch:
+    """What is watched.
+
+    Attributes:
+        source: See `mplearn.sources.open_source`.
+        observe: What is learned: see `mplearn.sources.open_source`.
+        speed: Times as fast as it was recorded; None for what the source does.
+    """
+
+    source: str
+    observe: Observe = "robot"
+    speed: float | None = None
+
+
+def watch(settings: Watch, connection: Connection) -> None:
+    """Watch and learn until the other end of the connection is closed: what a process runs."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    outbox = Outbox(connection)
+    try:
+        Watcher(settings, connection, outbox).run()
+    except MPLearnError as error:
+        outbox.post({"kind": "failed", "text": str(error)})
+    finally:
+        outbox.close()
+
+
+class Watcher:
+    """Learns from a source, does what teachers ask, and says what is known.
+
+    Args:
+        settings: What is watched.
+        connection: Where requests come from.
+        outbox: Where messages go.
+    """
+
+    def __init__(self, settings: Watch, connection: Connection, outbox: Outbox) -> None:
+        self._settings, self._connection, self._outbox = settings, connection, outbox
+        self._inbox: queue.Queue[tuple[str, Any]] = queue.Queue(MOST_WAITING)
+        self._lifelong: LifelongLearner | None = None
+        self._figure: WatchedFigure | None = None
+        self._source: Source | None = None
+        self._channels: tuple[str, ...] = ()
+        self._rate_hz = 0.0
+        self._sender = Sender()
+        self._told_revision = -1
+        self._told_at = self._status_at = 0.0
+        self._delays: deque[float] = deque(maxlen=_DELAYS)
+        self._arrivals: deque[tuple[float, int]] = deque(maxlen=_DELAYS)
+        self._doubled = self._late = 0
+        self._state = "waiting for frames"
+        self._last_motion = -1  # frame at which the last motion began
+        self._rows: list[np.ndarray[Any, Any]] = []
+        self._n_rows = 0
+        self._lock = threading.Lock()
+
+    def run(self) -> None:
+        """Watch until nobody listens any more.
+
+        Raises:
+            MPLearnError: The source cannot be opened.
+        """
+        settings = self._settings
+        options: dict[str, Any] = {} if settings.speed is None else {"speed": settings.speed}
+        source = open_source(
+            settings.source, observe=settings.observe, at_hz=learnable_rate, **options
+        )
+        with source:
+            self._source = source
+            self._state = "compiling, which takes a while the first time"
+            self._outbox.post(self._status(), key="status")
+            _warm_up()
+            self._state = "waiting for frames"
+            for target in (self._read_source, self._read_requests):
+                threading.Thread(target=target, args=(source,), daemon=True).start()
+            while self._step():
+                pass
+
+    # ---- threads that read
+
+    def _read_source(self, source: Source) -> None:
+        try:
+            for item in source:
+                self._inbox.put(("stream", item))
+            self._inbox.put(("ended", None))
+        except Exception as error:  # of a source of somebody else
+            self._inbox.put(("broken", error))
+
+    def _read_requests(self, _: Source) -> None:
+        try:
+            while True:
+                self._inbox.put(("request", unpack(self._connection.recv_bytes())[0]))
+        except (EOFError, OSError):
+            self._inbox.put(("closed", None))
+
+    # ---- one thing after the other
+
+    def _step(self) -> bool:
+        """Do the next thing; say whether to go on."""
+        try:
+            what, item = self._inbox.get(timeout=STATUS_S)
+        except queue.Empty:
+            what, item = "", None
+        match what:
+            case "closed":
+                return False
+            case "request":
+                self._answer(item)
+            case "stream" if isinstance(item, Block):
+                self._learn(item)
+            case "stream":
+                self._changed(item)
+            case "ended":
+                self._end()
+            case "broken":
+                self._state = "broken"
+                self._happened("source", f"the source broke: {item}")
+        now = time.monotonic()
+        if now - self._told_at > KNOWLEDGE_S:
+            self._told_at = now
+            self._tell_knowledge()
+        if now - self._status_at > STATUS_S:
+            self._status_at = now
+            self._outbox.post(self._status(), key="status")
+        return not self._outbox.broken
+
+    def _learn(self, block: Block) -> None:
+        if self._lifelong is None or block.channels != self._channels:
+            self._begin(block)
+        lifelong, figure = self._lifelong, self._figure
+        assert lifelong is not None and figure is not None
+        self._state = "live"
+        if not block.joins and self._arrivals:
+            self._tell(lifelong.end_stream())
+            figure.end_stream()
+        self._tell(lifelong.learn_many(block.frames, block.times_s))
+        came = block.arrived_s[np.isfinite(block.arrived_s)]
+        now = time.monotonic()
+        self._delays.extend((now - came).tolist())
+        self._arrivals.append((now, len(block)))
+        self._doubled += block.doubled
+        self._late += block.late
+        rows = figure.take(block.frames).astype(np.float32)
+        if len(rows):
+            with self._lock:
+                self._rows.append(rows)
+            self._outbox.post_later(self._live, key="live")
+
+    def _begin(self, block: Block) -> None:
+        """Begin to learn, now that it is known what comes."""
+        self._channels, self._rate_hz = block.channels, block.rate_hz
+        if self._lifelong is None:
+            self._lifelong = LifelongLearner(
+                MotionLearner(LearnerConfig(block.channels, block.rate_hz))
+            )
+        self._figure = WatchedFigure(block.channels, block.rate_hz)
+        self._outbox.post(
+            {
+                "kind": "stream",
+                "source": self._settings.source,
+                "channels": list(self._figure.channels),
+                "rate_hz": self._rate_hz,
+                "stride": self._figure.stride,
+                "frame": self._lifelong.learner.n_frames,
+            }
+        )
+        self._told_revision = -1
+
+    def _changed(self, change: Change) -> None:
+        if change.kind in ("connected", "disconnected"):
+            self._state = "live" if change.kind == "connected" else "disconnected"
+        self._happened("source", change.text)
+
+    def _end(self) -> None:
+        self._state = "ended"
+        if self._lifelong is not None:
+            self._tell(self._lifelong.end_stream())
+        self._happened("source", "the stream has ended")
+
+    # ---- what is said
+
+    def _tell(self, events: list[Any]) -> None:
+        if not events:
+            return
+        for message in tell(events, self._rate_hz):
+            if message["kind"] == "segment" and message["state"] not in ("still", "refused"):
+                self._last_motion = message["start"]
+            self._outbox.post(message)
+        self._tell_forecast()
+
+    def _tell_forecast(self) -> None:
+        """Say what comes next, and when."""
+        assert self._lifelong is not None
+        learner, coming = self._lifelong.learner, []
+        for each in learner.predict_next(3):
+            at = self._last_motion + each.duration_s * self._rate_hz
+            coming.append(
+                {
+                    "id": each.id,
+                    "p": round(each.probability, 3),
+                    "frame": round(at) if math.isfinite(at) and self._last_motion >= 0 else None,
+                }
+            )
+        self._outbox.post({"kind": "forecast", "next": coming}, key="forecast")
+
+    def _tell_knowledge(self) -> None:
+        """Say what is known, if that has changed."""
+        lifelong = self._lifelong
+        if lifelong is None or lifelong.revision == self._told_revision:
+            return
+        self._told_revision = lifelong.revision
+        library, tree = lifelong.snapshot(), lifelong.learner.tree
+        waiting = tree.most_repeated()
+        self._outbox.post(
+            knowledge(library, tree)
+            | {
+                "revision": self._told_revision,
+                "waiting": {
+                    "n": waiting.n_waiting,
+                    "times": waiting.times,
+                    "of": tree.config.min_exemplars,
+                },
+            }
+        )
+        content, blob = self._sender.send(library)
+        self._outbox.post({"kind": "library", "content": content}, blob)
+
+    def _status(self) -> Header:
+        delays = sorted(self._delays)
+        now, waiting = time.monotonic(), self._inbox.qsize()
+        recent = [(at, n) for at, n in self._arrivals if now - at < 2.0]
+        span = now - recent[0][0] if len(recent) > 1 else 0.0
+        tally = vars(self._source.tally) if self._source is not None else {}
+        lifelong = self._lifelong
+        return {
+            "kind": "status",
+            "source": self._settings.source,
+            "state": self._state,
+            "rate_hz": round(sum(n for _, n in recent[1:]) / span, 1) if span > 0 else 0.0,
+            "delay_ms": round(1e3 * delays[len(delays) // 2], 1) if delays else None,
+            "delay_99_ms": round(1e3 * delays[int(0.99 * len(delays))], 1) if delays else None,
+            "waiting": waiting,
+            "lost": tally.get("lost", 0),
+            "faults": {name: n for name, n in tally.items() if n and name != "frames"},
+            "frames": tally.get("frames", 0),
+            "person": None if lifelong is None else lifelong.learner.person + 1,
+            "people": 0 if lifelong is None else len(lifelong.learner.tree.people),
+            "paused": False if lifelong is None else lifelong.learner.paused,
+            "memory_mb": _memory_mb(),
+        }
+
+    def _live(self) -> Message | None:
+        """Return the rows that were not sent yet, with the latest pose."""
+        with self._lock:
+            rows, self._rows = self._rows, []
+        if not rows or self._figure is None:
+            return None
+        joined, pose = np.concatenate(rows), self._figure.pose
+        first, self._n_rows = self._n_rows, self._n_rows + len(joined)
+        header = {"kind": "live", "first": first, "n": len(joined), "bodies": len(pose)}
+        return header, pose.tobytes() + joined.tobytes()
+
+    def _happened(self, what: str, text: str, primitive: int | None = None) -> None:
+        n = 0 if self._lifelong is None else self._lifelong.learner.n_frames
+        time_s = n / self._rate_hz if self._rate_hz else 0.0
+        self._outbox.post(happening(what, text, time_s, primitive))
+
+    # ---- what teachers ask
+
+    def _answer(self, asked: Header) -> None:
+        if asked["do"] == "end":
+            self._inbox.put(("closed", None))
+            return
+        if asked["do"] == "forget-deliveries":  # who performs begins anew
+            self._sender.forget()
+            self._told_revision = -1
+            return
+        reply = {"kind": "reply", "client": asked.get("client"), "ref": asked.get("ref")}
+        try:
+            if asked["do"] == "history":
+                reply["lines"] = history(self._known(), asked)
+            else:
+                reply["text"] = self._do(asked)
+            self._outbox.post(reply | {"ok": True})
+        except MPLearnError as error:
+            self._outbox.post(reply | {"ok": False, "text": str(error)})
+        self._told_at = 0.0
+
+    def _do(self, asked: Header) -> str:
+        """Do what a teacher asks, and return what was done.
+
+        Raises:
+            MPLearnError: It cannot be done.
+        """
+        lifelong = self._known()
+        by = asked["by"]
+        text = do(lifelong, asked, by)
+        self._happened("command", f"{by}: {text}")
+        self._tell_forecast()
+        return text
+
+    def _known(self) -> LifelongLearner:
+        if self._lifelong is None:
+            raise InvalidValueError("nothing has been seen yet: there is nothing to change")
+        return self._lifelong
+
+
+def _warm_up() -> None:
+    """Learn from a demonstrator for a moment, so that all is compiled before the stream begins."""
+    demonstration = demonstrate(_WARM_UP, seed=0)
+    recording = demonstration.recording
+    learner = MotionLearner(LearnerConfig(recording.channels, recording.rate_hz))
+    learner.learn_many(recording.frames)
+    learner.predict_next(1)
+    knowledge(learner.snapshot(), learner.tree)
+    WatchedFigure(recording.channels, recording.rate_hz).take(recording.frames)
+
+
+def _memory_mb() -> float:
+    """Return the memory of this process [MB]; 0 where the system does not say."""
+    try:
+        with open("/proc/self/statm", encoding="ascii") as file:  # noqa: PTH123
+            pages = int(file.read().split()[1])
+    except OSError:
+        return 0.0
+    return round(pages * os.sysconf("SC_PAGE_SIZE") / 1e6, 1)

@@ -1,0 +1,255 @@
+"""Experiment 4.1 of [Kulic2012] on the page, with a synthetic demonstrator and a real browser.
+
+Four primitives are taught (both arms raise and lower, bend down and return); the teacher goes on
+when the page says that they are learned. Then their sequencing is taught. At the end tree and
+graph are those of figures 6 and 7. ``python -m benchmarks.teaching_session --out FOLDER`` writes
+pictures.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mplearn.demonstrator import Demonstrator
+from mplearn.recording import LabelledSegment
+from mplearn.sources import Block, Stream
+from mplearn.sources.sending import open_sender
+
+NAMES = {
+    "BAR": "both arms raise",
+    "BAL": "both arms lower",
+    "BAD": "bend down",
+    "BAU": "bend return",
+}
+MOST_REPEATS = 20
+ARMS, BENDS = ("BAR", "BAL"), ("BAD", "BAU")
+SEQUENCE = (*ARMS, *BENDS, *BENDS, *ARMS, *ARMS, *BENDS, *ARMS, *BENDS, *BENDS, *ARMS)
+
+
+def chromium() -> str | None:
+    """Return where Chromium is; None where there is none."""
+    return shutil.which("chromium") or shutil.which("chromium-browser")
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """Open a headless browser."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        opened = playwright.chromium.launch(
+            executable_path=chromium(), args=["--no-sandbox", "--disable-dev-shm-usage"]
+        )
+        try:
+            yield opened
+        finally:
+            opened.close()
+
+
+@contextmanager
+def live(*options: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """Run ``mplearn live`` and yield the page's address, and the process."""
+    command = [sys.executable, "-m", "mplearn_agents.cli", "live", *options, "--port", "0"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)
+    try:
+        assert process.stdout is not None
+        words = process.stdout.readline().split()
+        if not words:
+            raise RuntimeError(f"{' '.join(command)} did not start")
+        yield words[1], process
+    finally:
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(20)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+        assert process.stdout is not None
+        process.stdout.close()
+
+
+def until(check: Callable[[], Any], timeout_s: float = 60.0, what: str = "") -> Any:
+    """Return what ``check`` returns as soon as that is something."""
+    end = time.monotonic() + timeout_s
+    while True:
+        found = check()
+        if found:
+            return found
+        if time.monotonic() > end:
+            raise TimeoutError(f"{what or check} within {timeout_s} s")
+        time.sleep(0.03)
+
+
+def free_port() -> int:
+    """Return a port that nobody uses."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Teacher:
+    """Stands before the cameras and looks at the page.
+
+    Args:
+        page: The page.
+        port: Where the frames go.
+        speed: Times as fast as a person.
+        seed: Of everything random.
+    """
+
+    def __init__(self, page: Any, port: int, speed: float, seed: int = 0) -> None:
+        self.page, self.port, self.speed = page, port, speed
+        self.demonstrator = Demonstrator(seed=seed)
+        self.shown: list[str] = []
+        self.truth: list[LabelledSegment] = []
+        self.segments: list[dict[str, Any]] = []
+        self.moments: dict[str, float] = {}
+        page.on("websocket", lambda socket: socket.on("framereceived", self._hear))
+
+    def _hear(self, message: str | bytes) -> None:
+        if isinstance(message, str) and message.startswith('{"kind":"segment"'):
+            self.segments.append(json.loads(message))
+
+    def learned(self) -> tuple[int, int]:
+        """Return how many primitives the page says are learned, and how many are not sure."""
+        words = self.page.locator("#progress .sum").inner_text().split()
+        numbers = [int(word) for word in words if word.isdigit()]
+        sure, young = (*numbers, 0, 0)[:2]
+        return sure, young
+
+    def teach(self, script: Iterator[str]) -> None:
+        """Perform a script, which may look at the page between its motions."""
+        demonstrator = self.demonstrator
+        stream = Stream(demonstrator.channels, demonstrator.rate_hz, unit_m=1.0, up="z")
+        n = 0
+        with open_sender(f"ndjson:127.0.0.1:{self.port}") as sender:
+            due = time.monotonic()
+            for block in demonstrator.blocks(script):
+                frames = block.markers.reshape(len(block.markers), -1)
+                self.truth += block.truth
+                for first in range(0, len(frames), 10):
+                    part = frames[first : first + 10]
+                    times = (n + np.arange(len(part))) / demonstrator.rate_hz
+                    sender.send(Block(stream, part, times, np.zeros(len(part))))
+                    n += len(part)
+                    due = max(due + len(part) / demonstrator.rate_hz / self.speed, time.monotonic())
+                    self.page.wait_for_timeout(max(0.0, 1000 * (due - time.monotonic())))
+
+    def script(self, picture: Callable[[str], None]) -> Iterator[str]:
+        """Yield what is shown: each pair until the page says that it is learned, then sequences."""
+        for k, (there, back) in enumerate((ARMS, BENDS)):
+            for repeat in range(MOST_REPEATS):
+                if self.learned() == (2 * k + 2, 0):
+                    break
+                if (k, repeat) == (0, 3):
+                    picture("teaching")
+                for name in (there, back):
+                    self.shown.append(name)
+                    yield name
+            picture(("arms", "bends")[k])
+        for name in SEQUENCE:
+            self.shown.append(name)
+            yield name
+
+    def meanings(self) -> dict[int, str]:
+        """Return what each primitive is, by what was performed while it was recognised."""
+        votes: dict[int, Counter[str]] = {}
+        for segment in self.segments:
+            if segment["primitive"] is None:
+                continue
+            for true in self.truth:
+                shared = min(true.end, segment["end"]) - max(true.start, segment["start"])
+                if shared > 0.6 * (true.end - true.start):
+                    votes.setdefault(segment["primitive"], Counter())[true.label] += 1
+        return {id: found.most_common(1)[0][0] for id, found in votes.items()}
+
+    def name(self, id: int, name: str) -> None:
+        """Give a primitive a name, by keyboard."""
+        self.page.locator(f'#tree [data-id="{id}"]').click()
+        self.page.keyboard.press("n")
+        self.page.keyboard.insert_text(name)
+        self.page.keyboard.press("Enter")
+        row = self.page.locator(f'#tree [data-id="{id}"] text.name', has_text=name)
+        row.wait_for(timeout=10_000)
+        self.page.keyboard.press("Escape")
+
+
+def session(
+    opened: Any,
+    *,
+    speed: float,
+    picture: Callable[[Any, str], None] = lambda page, name: None,
+    size: tuple[int, int] = (1280, 720),
+) -> dict[str, Any]:
+    """Replay the experiment; return what the page shows at its end."""
+    port = free_port()
+    with live(f"ndjson:{port}") as (url, _):
+        page = opened.new_page(viewport={"width": size[0], "height": size[1]})
+        teacher = Teacher(page, port, speed)
+        page.goto(url)
+        state = page.locator("#state")
+        until(lambda: "waiting" in state.inner_text(), 120, "the learner waits for frames")
+        teacher.teach(teacher.script(lambda name: picture(page, name)))
+        until(lambda: len(teacher.meanings()) >= 4 or teacher.learned()[0] >= 4, 20)
+        page.wait_for_timeout(1500)
+        meanings = teacher.meanings()
+        for id, label in meanings.items():
+            teacher.name(id, NAMES[label])
+        page.wait_for_timeout(1500)
+        picture(page, "learned")
+        page.keyboard.press("w")
+        root = page.locator("html")
+        until(lambda: root.get_attribute("data-robot"), 30, "the robot walks")
+        page.wait_for_timeout(1500)
+        picture(page, "walk")
+        found = {
+            "tree": page.locator("#tree text.name").all_text_contents(),
+            "graph": page.locator("#graph .node text").all_text_contents(),
+            "edges": page.evaluate(
+                "[...document.querySelectorAll('#graph .edge title')].map((e) => e.textContent)"
+            ),
+            "learned": teacher.learned(),
+            "meanings": {id: NAMES[label] for id, label in meanings.items()},
+            "shown": Counter(teacher.shown),
+        }
+        page.close()
+        return found
+
+
+def main() -> None:
+    """Replay the experiment and write pictures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--speed", type=float, default=4.0)
+    parser.add_argument("--width", type=int, default=1280)
+    parser.add_argument("--height", type=int, default=720)
+    args = parser.parse_args()
+    args.out.mkdir(parents=True, exist_ok=True)
+    numbers = iter(range(1, 100))
+
+    def picture(page: Any, name: str) -> None:
+        page.screenshot(path=args.out / f"{next(numbers)}-{name}.png")
+
+    with browser() as opened:
+        found = session(opened, speed=args.speed, picture=picture, size=(args.width, args.height))
+    for key, value in found.items():
+        print(f"{key}: {value}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,192 @@
+"""``mplearn live`` as a user runs it: its processes, and a real browser."""
+
+import os
+import signal
+import subprocess
+
+import pytest
+
+pytest.importorskip("uvicorn", reason="needs the extra 'ui'")
+from benchmarks.teaching_session import NAMES, live, session, until
+from mplearn_agents.cli import main
+
+STARTED_S = 120  # compiling, the first time
+
+
+@pytest.fixture(scope="module")
+def address():
+    """A page on which the demonstrator is learned from, faster than a person moves."""
+    with live("demonstrator:3", "--speed", "8") as (url, _):
+        yield url
+
+
+def rows(page):
+    return page.locator("#tree .row")
+
+
+def known(page, n=4):
+    until(lambda: rows(page).count() >= n, STARTED_S, f"{n} primitives")
+    return page
+
+
+def note(page, text):
+    """Wait for a note, and let go of it."""
+    until(lambda: text in page.locator("#notes").inner_text(), 20, text)
+
+
+def test_what_is_known_grows_and_everything_moves(address, new_page):
+    page = known(new_page(address))
+    before = rows(page).count()
+    until(lambda: page.locator("#state").get_attribute("data-live") == "yes", 10)
+    until(lambda: rows(page).count() > before, 60, "more primitives")
+    until(lambda: page.locator("#graph .edge").count() > 2, 20)
+    until(lambda: page.locator(".present[data-lit=yes]").count() == 1, 20)
+    until(lambda: page.locator("#log li").count() > 2, 20)
+    figures = page.locator("#figures").inner_text()
+    assert "person 1" in figures and "Hz" in figures and "ms" in figures
+    until(lambda: float(page.get_attribute("html", "data-fps") or 0) > 0, 5)
+
+
+def test_a_click_shows_figure_and_robot(address, new_page):
+    page = known(new_page(address))
+    rows(page).nth(1).click()
+    until(lambda: page.get_attribute("html", "data-shown"), 20, "the figure")
+    until(lambda: page.get_attribute("html", "data-robot"), 30, "the robot")
+
+
+def test_two_teachers_see_the_same_and_undo_each_other(address, new_page):
+    anna, bob = known(new_page(address)), known(new_page(address))
+    id = rows(anna).first.get_attribute("data-id")
+    name = f'[data-id="{id}"] text.name'
+    rows(anna).first.click()
+    anna.keyboard.press("n")
+    anna.keyboard.insert_text("<i>raise</i> both")
+    anna.keyboard.press("Enter")
+    until(lambda: bob.locator(f"#tree {name}").text_content() == "<i>raise</i> both", 20)
+    assert "teacher" in bob.locator("#log li").first.inner_text()
+    bob.keyboard.press("u")
+    note(bob, "undone")
+    until(lambda: anna.locator(f"#tree {name}").text_content() == f"P{id}", 20)
+    anna.keyboard.press("Escape")
+    anna.keyboard.press("r")
+    until(lambda: bob.locator(f"#tree {name}").text_content() == "<i>raise</i> both", 20)
+    bob.reload()
+    known(bob)
+    assert bob.locator(f"#tree {name}").text_content() == "<i>raise</i> both"
+
+
+def test_learning_is_paused_and_goes_on(address, new_page):
+    page = known(new_page(address))
+    page.click("#pause")
+    until(lambda: "paused" in page.locator("#state").inner_text(), 20)
+    assert page.locator("#pause").inner_text() == "Resume"
+    page.click("#pause")
+    until(lambda: "paused" not in page.locator("#state").inner_text(), 20)
+
+
+def test_two_are_one_and_that_is_undone(address, new_page):
+    page = known(new_page(address))
+    page.click("#pause")  # so that nothing else changes
+    until(lambda: "paused" in page.locator("#state").inner_text(), 20)
+    page.wait_for_timeout(500)
+    ids = [rows(page).nth(k).get_attribute("data-id") for k in (2, 3)]
+    rows(page).nth(2).click()
+    page.keyboard.press("m")
+    page.locator(f'#tree [data-id="{ids[1]}"]').click()
+    note(page, "are one")
+    until(lambda: page.locator(f'#tree [data-id="{ids[1]}"]').count() == 0, 20)
+    page.keyboard.press("u")
+    until(lambda: page.locator(f'#tree [data-id="{ids[1]}"]').count() == 1, 20)
+    page.click("#pause")
+
+
+def test_one_is_two_and_one_is_forgotten(address, new_page):
+    page = known(new_page(address), 6)
+    page.click("#pause")
+    until(lambda: "paused" in page.locator("#state").inner_text(), 20)
+    page.wait_for_timeout(500)
+    before = rows(page).count()
+    many = page.locator("#tree .row.sure").first
+    many.click()
+    page.keyboard.press("d")
+    until(lambda: rows(page).count() == before + 1, 20, "two of one")
+    page.keyboard.press("u")
+    until(lambda: rows(page).count() == before, 20)
+    gone = rows(page).nth(1).get_attribute("data-id")
+    rows(page).nth(1).click()
+    page.keyboard.press("Delete")
+    until(lambda: page.locator(f'#tree [data-id="{gone}"]').count() == 0, 20)
+    assert not page.locator("#card").is_visible()
+    page.keyboard.press("u")
+    until(lambda: page.locator(f'#tree [data-id="{gone}"]').count() == 1, 20)
+    page.click("#pause")
+
+
+def test_the_robot_walks_goes_and_stops(address, new_page):
+    page = known(new_page(address), 6)
+    page.fill("#length", "12")
+    page.click("#walk")
+    until(lambda: page.get_attribute("html", "data-robot"), 30, "the robot walks")
+    page.click("#stop")
+    until(lambda: not page.get_attribute("html", "data-robot"), 30, "the robot stops")
+    rows(page).nth(2).click()
+    page.keyboard.press("o")
+    until(lambda: page.locator("#notes div").count() > 0, 20)
+
+
+def test_experiment_4_1_of_the_paper(chromium):
+    """Four primitives are taught, then their order: figures 6 and 7 of [Kulic2012]."""
+    found = session(chromium, speed=10)
+    assert found["learned"] == (4, 0)
+    assert sorted(found["meanings"].values()) == sorted(NAMES.values())
+    assert sorted(found["tree"]) == sorted(NAMES.values())
+    assert sorted(found["graph"]) == sorted(NAMES.values())
+    sure = [text for text in found["edges"] if text.startswith("1.00")]
+    assert len(found["edges"]) == 6 and len(sure) == 2  # raise, lower; bend, return: then any
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (["--port", "99999"], "65535"),
+        (["--host", "203.0.113.7", "--port", "0"], "cannot listen"),
+        (["recording:/no/such/file.bvh", "--port", "0"], "file.bvh"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_line(options, why, capsys):
+    assert main(["live", *options]) == 2
+    said = capsys.readouterr().err
+    assert why in said and len(said.splitlines()) == 1
+
+
+def test_a_learner_that_was_killed_is_started_again_and_all_end_together(new_page):
+    with live("demonstrator", "--no-robot") as (url, process):
+        page = new_page(url)
+        state = page.locator("#state")
+        until(lambda: state.get_attribute("data-live") == "yes", STARTED_S)
+        learner = until(lambda: [p for p in _children(process.pid) if "spawn_main" in _line(p)], 9)
+        os.kill(learner[0], signal.SIGKILL)
+        until(lambda: "SIGKILL" in page.locator("#log").inner_text(), 20)
+        until(lambda: state.get_attribute("data-live") == "no", 10)
+        until(lambda: state.get_attribute("data-live") == "yes", STARTED_S)
+        children = _children(process.pid)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30) == 0
+        until(lambda: not any(_runs(pid) for pid in children), 10)
+
+
+def _children(pid):
+    """Return the processes that a process started, and those that they did."""
+    done = subprocess.run(["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True)
+    own = [int(word) for word in done.stdout.split()]
+    return own + [each for child in own for each in _children(child)]
+
+
+def _line(pid):
+    done = subprocess.run(["ps", "-o", "args=", "-p", str(pid)], capture_output=True, text=True)
+    return done.stdout
+
+
+def _runs(pid):
+    done = subprocess.run(["ps", "-o", "stat=", "-p", str(pid)], capture_output=True, text=True)
+    return done.stdout.strip() not in ("", "Z")

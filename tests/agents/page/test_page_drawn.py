@@ -1,0 +1,234 @@
+"""The page in a real browser, shown a world that is made up."""
+
+import itertools
+import json
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip("uvicorn", reason="needs the extra 'ui'")
+import page_world as world
+from page_server import served
+
+from benchmarks.teaching_session import until
+from mplearn_agents.page import messages
+
+
+@pytest.fixture(scope="module")
+def server():
+    with served() as found:
+        yield found
+
+
+@pytest.fixture
+def shown(server, new_page):
+    """A page on which 300 primitives are known."""
+    server.hear(world.bodies())
+    server.hear(world.stream())
+    server.hear(world.knowledge(300))
+    page = new_page(server.url)
+    until(lambda: page.locator("#tree .row").count() == 300, 10)
+    return page
+
+
+def rows(page):
+    return page.locator("#tree .row")
+
+
+def test_300_primitives_are_legible(server, shown):
+    """Each has a line of its own in the tree; the graph shows what is around one."""
+    boxes = shown.evaluate(
+        "[...document.querySelectorAll('#tree .row text.name')]"
+        ".map((e) => { const b = e.getBoundingClientRect(); return [b.top, b.bottom]; })"
+    )
+    boxes = sorted(boxes)
+    assert all(b[0] >= a[1] - 4 for a, b in itertools.pairwise(boxes))
+    assert shown.get_attribute("#around", "aria-pressed") == "true"
+    rows(shown).nth(5).click()
+    until(lambda: 2 <= shown.locator("#graph .node").count() <= 20, 5)
+    labels = shown.evaluate(
+        "[...document.querySelectorAll('#graph .node text')]"
+        ".map((e) => e.getBoundingClientRect()).map((b) => [b.x, b.y, b.width, b.height])"
+    )
+    for i, (x, y, w, h) in enumerate(labels):
+        for x2, y2, w2, h2 in labels[:i]:
+            apart = x + w <= x2 or x2 + w2 <= x or y + 0.7 * h <= y2 or y2 + 0.7 * h2 <= y
+            assert apart, "names must not cover each other"
+
+
+def test_the_tree_folds_and_is_searched(shown):
+    inner = shown.locator("#tree [data-fold]")
+    n, before = inner.count(), rows(shown).count()
+    inner.first.click()
+    until(lambda: rows(shown).count() < before, 5)
+    shown.click("#fold")
+    until(lambda: rows(shown).count() == 0, 5)
+    assert inner.count() == n
+    shown.click("#fold")
+    until(lambda: rows(shown).count() == before, 5)
+    shown.keyboard.press("/")
+    shown.keyboard.type("P29")
+    until(lambda: rows(shown).count() == 11, 5)  # P29 and P290 to P299
+    shown.keyboard.press("Enter")
+    assert shown.locator("#card").is_visible()
+    assert shown.locator("#card input").input_value() == "P29"
+
+
+def test_it_is_used_by_keyboard(shown):
+    shown.keyboard.press("l")
+    shown.keyboard.press("ArrowDown")
+    shown.keyboard.press("ArrowDown")
+    focused = "document.activeElement.dataset.id"
+    assert shown.evaluate(focused) or shown.evaluate("document.activeElement.dataset.fold")
+    shown.keyboard.press("End")
+    id = shown.evaluate(focused)
+    shown.keyboard.press("Enter")
+    assert shown.locator("#card input").input_value() == f"P{id}"
+    shown.keyboard.press("Escape")
+    assert not shown.locator("#card").is_visible()
+    shown.keyboard.press("?")
+    assert shown.locator("#keys").is_visible()
+    shown.keyboard.press("Escape")
+    before = shown.get_attribute("html", "data-theme")
+    shown.keyboard.press("t")
+    assert shown.get_attribute("html", "data-theme") != before
+    shown.keyboard.press("f")
+    size = "parseFloat(getComputedStyle(document.querySelector('.present')).fontSize)"
+    assert shown.evaluate(size) >= 40  # to be read from three metres
+    shown.keyboard.press("f")
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (1920, 1080)])
+@pytest.mark.parametrize("screen", [False, True])
+def test_all_fits_without_scrolling(server, new_page, size, screen):
+    server.hear(world.bodies())
+    server.hear(world.stream())
+    server.hear(world.knowledge(20, world.HOSTILE))
+    page = new_page(server.url, *size)
+    if screen:
+        page.keyboard.press("f")
+    until(lambda: rows(page).count() == 20, 10)
+    overflow = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
+    assert page.evaluate(overflow) == list(size)
+    for id in ("stage", "stream", "graph", "tree", "now", "progress"):
+        box = page.locator(f"#{id}").bounding_box()
+        assert box["width"] > 100 and box["height"] > 25
+        assert box["x"] >= 0 and box["x"] + box["width"] <= size[0]
+        assert box["y"] >= 0 and box["y"] + box["height"] <= size[1]
+
+
+def test_names_are_text_never_markup(server, new_page):
+    server.hear(world.stream())
+    server.hear(world.knowledge(len(world.HOSTILE), world.HOSTILE))
+    page = new_page(server.url)
+    page.on("dialog", lambda dialog: pytest.fail("a name was run"))
+    until(lambda: rows(page).count() == len(world.HOSTILE), 10)
+    titles = page.locator("#tree .row title").all_text_contents()
+    assert {t.rsplit(", ", 1)[0] for t in titles} == set(world.HOSTILE)
+    for id, name in enumerate(world.HOSTILE, start=1):
+        server.hear({"kind": "event", "what": "born", "text": f"new: {{{id}}}", "time_s": 1.0})
+        server.hear(world.segment(100 * id, 100 * id + 90, id))
+        until(lambda name=name: page.locator(".present").text_content() == name, 5)
+        first = page.locator("#log li").first
+        until(lambda name=name, first=first: name in first.text_content(), 5)
+    assert page.locator("img, script:not([src]), main b, iframe").count() == 0
+
+
+def test_it_says_what_is_present_next_and_rejected(server, new_page):
+    server.hear(world.stream())
+    server.hear(world.knowledge(5, ["bow down", "bow up", "squat", "kick", "wave"]))
+    page = new_page(server.url)
+    server.hear(world.segment(0, 90, 1))
+    coming = [{"id": 2, "p": 0.82, "frame": 60}, {"id": None, "p": 0.1, "frame": None}]
+    server.hear({"kind": "forecast", "next": coming})
+    until(lambda: page.locator(".present").text_content() == "bow down", 5)
+    assert page.locator('#tree .row.lit[data-id="1"]').count() == 1
+    assert page.locator('#graph .node.lit[data-id="1"]').count() == 1
+    first = page.locator(".next li").first
+    until(lambda: "bow up" in first.inner_text() and "0.82" in first.inner_text(), 5)
+    header, blob = world.live(0, 5)
+    server.hear(header, blob)
+    until(lambda: "in 0." in first.inner_text(), 5)
+    server.hear(world.segment(90, 200, None, "unlike", "nearest is {3}, 1.6 times as far"))
+    until(lambda: page.locator(".present").text_content() == "not recognised", 5)
+    assert "nearest is squat, 1.6 times" in page.locator(".why").text_content()
+    assert page.locator("#graph .node.lit").count() == 0
+
+
+def test_progress_of_what_is_not_sure_yet(server, new_page):
+    server.hear(world.stream())
+    known = world.knowledge(7)
+    known["waiting"] = {"n": 4, "times": 2, "of": 4}
+    server.hear(known)
+    page = new_page(server.url)
+    progress = page.locator("#progress")
+    until(lambda: "6 learned, 1 to be confirmed" in progress.inner_text(), 5)
+    assert "P7" in progress.inner_text() and "2 of 3" in progress.inner_text()
+    assert "a new motion" in progress.inner_text() and "2 of 4" in progress.inner_text()
+
+
+def test_a_lost_connection_is_said_and_made_again(new_page):
+    with served() as first:
+        port = first.port
+        first.hear(world.knowledge(4))
+        page = new_page(first.url)
+        until(lambda: rows(page).count() == 4, 10)
+    until(lambda: page.locator("#lost").is_visible(), 5)
+    with served(port=port) as second:
+        second.hear(world.knowledge(6))
+        until(lambda: rows(page).count() == 6, 15)
+        assert not page.locator("#lost").is_visible()
+
+
+def test_a_figure_is_shown_with_its_demonstrations(server, new_page):
+    server.hear(world.bodies())
+    server.hear(world.stream())
+    server.hear(world.knowledge(3))
+    page = new_page(server.url)
+    sent = []
+    page.on("websocket", lambda socket: socket.on("framesent", lambda text: sent.append(text)))
+    page.reload()
+    until(lambda: rows(page).count() == 3, 10)
+    rows(page).first.click()
+    until(lambda: any('"show"' in text for text in sent), 5)
+    asked = next(json.loads(text) for text in sent if '"show"' in text)
+    pose = np.repeat(world.standing()[None], 30, axis=0)
+    clip = messages.clip(asked["ref"], 30.0, [pose, pose[:20], pose[:25]])
+    number = max(client.number for client in server.hub.clients)
+    server.hear({"kind": "clip", "client": number}, clip)
+    until(lambda: page.get_attribute("html", "data-shown") == str(asked["ref"]), 5)
+
+
+def test_what_is_not_allowed_is_said(server, new_page):
+    """A reply that refuses is shown, as text."""
+    server.hear(world.knowledge(3))
+    page = new_page(server.url)
+    until(lambda: rows(page).count() == 3, 10)
+    page.evaluate("document.querySelector('#walk').disabled = false")
+    number = max(client.number for client in server.hub.clients)
+    sent = []
+    server.hub._robot.send = lambda header, blob=b"": sent.append(header)
+    page.keyboard.press("w")
+    until(lambda: sent, 5)
+    reply = {"kind": "reply", "client": number, "ref": sent[0]["ref"], "ok": False}
+    server.hear(reply | {"text": "the robot cannot {1} <b>"})
+    until(lambda: "the robot cannot P1 <b>" in page.locator("#notes").inner_text(), 5)
+
+
+def test_it_draws_on_while_much_comes(server, new_page):
+    """Nothing grows on the page when an hour of happenings has come."""
+    server.hear(world.bodies())
+    server.hear(world.stream())
+    page = new_page(server.url)
+    for k in range(30):
+        server.hear(world.knowledge(40, revision=k))
+        for n in range(20):
+            text = f"{k} {n}"
+            server.hear({"kind": "event", "what": "rejected", "text": text, "time_s": 1.0})
+            server.hear(world.segment(100 * n, 100 * n + 90, 1 + n))
+    until(lambda: page.locator("#log li").first.inner_text().endswith("29 19"), 10)
+    assert page.locator("#log li").count() <= 200
+    frames = page.evaluate("new Promise((r) => requestAnimationFrame(() => r(1)))")
+    assert frames == 1
+    time.sleep(0.1)
