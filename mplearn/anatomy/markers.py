@@ -167,7 +167,8 @@ def _warn_of_others(found: Mapping[str, str], labels: tuple[str, ...], warnings:
     if people:
         warnings.append(
             f"there is more than one person; {one.most_common(1)[0][0]!r} is used, and not "
-            f"{', '.join(map(repr, people[:5]))} (write each to a file of its own)"
+            f"{', '.join(map(repr, people[:5]))} (`mplearn.mocap.each_person` makes a recording of "
+            "each)"
         )
 
 

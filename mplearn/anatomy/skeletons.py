@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import BodyError
 from ..mocap.options import option
+from ..mocap.people import each_person
 from ..mocap.skeletons.kinematics import AXIS_MARK
 from ..recording import Recording, Skeleton
 from .body_map import BodyMap
@@ -65,6 +66,12 @@ def recognise_skeleton(recording: Recording, names: Mapping[str, str] | None = N
     unit_m = (report.unit_m if report else None) or 1.0
     chosen = likelier(recording.name, tree, plan, half, sure=bool(names))
     person = Person(recording.name, tree, chosen, names or {}, unit_m=unit_m, up_in_doubt=doubt)
+    people = [each.person for each in each_person(recording)]
+    if len(people) > 1:
+        person.warnings.append(
+            f"there is more than one person ({', '.join(people)}), and one is used "
+            "(`mplearn.mocap.each_person` makes a recording of each)"
+        )
     return Placing(person, skeleton, some, axes).map(names or {})
 
 

@@ -9,6 +9,7 @@ from .open import open_recordings as open_recordings
 from .open import open_takes as open_takes
 from .open import take_names as take_names
 from .options import command_line as command_line
+from .people import each_person as each_person
 from .placing.size import UNITS_M as UNITS_M
 from .placing.size import named_unit as named_unit
 from .reader import DIRECTIONS as DIRECTIONS

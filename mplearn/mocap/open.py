@@ -23,6 +23,7 @@ from .markers.qualisys import QualisysReader
 from .markers.trc import TRCReader
 from .markers.ui_prmd import UIPRMDReader
 from .markers.xdf import XDFReader
+from .people import each_person
 from .reader import Hints, Reader, joined
 from .registry import reader_for, reader_of, register_reader, suffixes
 from .resample import resample
@@ -71,7 +72,8 @@ def open_recording(
         hints: What the file does not say about itself.
 
     Returns:
-        Markers [m] (z up, NaN where occluded) or angles [rad], with the labels that are known. Its
+        Markers [m] (z up, NaN where occluded) or angles [rad], with the labels that are known, of
+        all people who are in it (`each_person` tells them apart). Its
         ``report`` tells how the file was read; what contradicts itself or is in doubt is also
         issued as a `RecordingWarning`.
 
@@ -100,6 +102,8 @@ def open_recordings(
     strict: bool = False,
 ) -> tuple[Recording, ...]:
     """Read all takes of a folder, in order of their names, or one file.
+
+    A take of several people becomes one for each (`each_person`).
 
     Args:
         path: As for `open_recording`, as the others.
@@ -144,7 +148,7 @@ def open_takes(
     takes = _takes(Path(path))
     for name, take in takes.items():
         try:
-            found.append(_read(name, take, rate_hz, positions, hints))
+            found.extend(each_person(_read(name, take, rate_hz, positions, hints)))
         except RecordingError as error:
             if strict or len(takes) == 1:
                 raise

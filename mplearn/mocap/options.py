@@ -12,8 +12,9 @@ _COMMAND_LINE = {
     "rate_hz": "--rate",
     "skeleton": "--skeleton",
     "names": "--map",
+    "person": "--person",
 }
-_PYTHON = {"names": "names={...}"}  # what is no hint
+_PYTHON = {"names": "names={...}", "person": "Recording.person"}  # what is no hint
 _on_command_line: ContextVar[bool] = ContextVar("_on_command_line", default=False)
 
 

@@ -481,7 +481,7 @@ def test_c3d_labels(tmp_path: Path, labels: list[str], expected: str) -> None:
     ("text", "scale"),
     [
         *(("Millimeters", 1e3), ("mill", 1e3), ("mete", 1.0), ("centimeters", 100.0), ("", 1e3)),
-        ("inch", 1 / 0.0254),
+        *(("inch", 1 / 0.0254), ("um", 1e6), ("micr", 1e6)),
     ],
 )
 def test_c3d_units_in_words(tmp_path: Path, standing: Recording, text: str, scale: float) -> None:

@@ -203,3 +203,18 @@ def test_units_as_files_write_them(text: str, unit_m: float | None) -> None:
 def test_what_names_tell(name: str, part: str, side: str) -> None:
     place = place_of(name)
     assert (place.part, place.side) == (part, side)
+
+
+def test_who_lies_with_the_feet_at_a_wall_is_believed_to_lie(
+    standing: tuple[np.ndarray, tuple[str, ...]],
+) -> None:
+    points, names = standing
+    still = points[:1] + np.random.default_rng(0).normal(0.0, 0.002, (100, *points.shape[1:]))
+    for turn in (upright("x").T, upright("y").T):
+        lying = still @ turn
+        lying = lying - [0, 0, np.nanmin(lying[..., 2]) - 0.02]
+        found = find_vertical(lying, names, RATE_HZ, "z", says_so=True)
+        assert (found.up, found.doubtful) == ("z", True)
+    for up in ("y", "z"):  # and who stands, is not
+        found = find_vertical(still @ upright(up), names, RATE_HZ, "z", says_so=True)
+        assert found.up == up

@@ -587,3 +587,18 @@ def test_amc_says_what_it_left_out(tmp_path: Path) -> None:
     path = write_amc(tmp_path / "take.amc", radians)
     path.write_text(path.read_text().replace(":DEGREES", ":RADIANS"))
     assert open_recording(path, positions=True).markers == pytest.approx(usual.markers, abs=1e-9)
+
+
+@pytest.mark.parametrize("before", ["time", "frame", "both"])
+def test_g1_without_header_behind_a_frame_number_or_time(tmp_path, before):
+    values = g1_values(30)
+    path = write_g1_csv(tmp_path / "a.csv", values)
+    plain = open_recording(path)
+    rows = np.loadtxt(path, delimiter=",")
+    n, times = np.arange(len(rows)), 3.0 + np.arange(len(rows)) / 50.0
+    first = {"time": [times], "frame": [n], "both": [n, times]}[before]
+    np.savetxt(path, np.column_stack([*first, rows]), delimiter=",", fmt="%.9f")
+    found = open_recording(path)
+    assert found.rate_hz == pytest.approx(30.0 if before == "frame" else 50.0)
+    assert found.channels == plain.channels
+    assert np.allclose(found.frames, plain.frames, atol=1e-6)

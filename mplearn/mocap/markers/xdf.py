@@ -55,7 +55,8 @@ class XDFReader(Reader):
         if len(found) > 1:
             findings.warn(f"{len(found)} streams hold markers; {stream.name!r} is read")
         columns = [i for axes in markers.values() for i in axes]
-        values = stream.values()[:, columns]
+        values = stream.values(columns)
+        stream.raw.clear()
         values[~np.isfinite(values)] = np.nan
         rate_hz, values = _even(path, stream, values, hints, findings)
         points = values.reshape(len(values), -1, 3)
@@ -63,7 +64,8 @@ class XDFReader(Reader):
         kept, names = chosen_names(path, list(markers), seen, findings)
         unit = described_unit(stream.info, stream.n_channels, columns)
         space = Space(unit or 1.0, says_unit=unit is not None)
-        at = placed(path, points[:, kept], names, rate_hz, space, hints, findings)
+        points = points if len(kept) == points.shape[1] else points[:, kept]
+        at = placed(path, points, names, rate_hz, space, hints, findings)
         return Recording(
             at.points.reshape(len(points), -1),
             rate_hz,

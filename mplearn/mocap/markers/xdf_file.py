@@ -7,6 +7,8 @@ process down nor its memory. Streams of text are passed over.
 from __future__ import annotations
 
 import struct
+from array import array
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
@@ -37,7 +39,7 @@ class Stream:
         dtype: Type of its values.
         n_channels: How many values a sample has.
         rate_hz: Its nominal rate [1/s]; 0 for none.
-        times: Time stamp of each sample [s]; where the file leaves it out, one step on.
+        times: Time stamp of each sample [s]; where the file leaves it out, one step on. Doubles.
         raw: The samples' values, as bytes.
     """
 
@@ -45,7 +47,7 @@ class Stream:
     dtype: np.dtype[np.generic]
     n_channels: int
     rate_hz: float
-    times: list[float] = field(default_factory=list)
+    times: array[float] = field(default_factory=lambda: array("d"))
     raw: bytearray = field(default_factory=bytearray)
 
     @property
@@ -53,10 +55,10 @@ class Stream:
         """Name of the stream."""
         return self.info.findtext("name", "").strip()
 
-    def values(self) -> FloatArray:
-        """Return the samples, shape (T, n_channels)."""
+    def values(self, channels: Sequence[int]) -> FloatArray:
+        """Return some channels of the samples, shape (T, len(channels))."""
         flat = np.frombuffer(self.raw, self.dtype)
-        return flat.reshape(-1, self.n_channels).astype(np.float64)
+        return flat.reshape(-1, self.n_channels)[:, channels].astype(np.float64)
 
 
 def parse_xdf(path: Path, data: bytes) -> tuple[list[Stream], bool]:

@@ -107,6 +107,7 @@ def named_unit(text: str) -> float | None:
 
 
 _WORDS = (
+    (("um", "µm", "μm", "micrometers", "micrometres", "microns"), 1e-6),
     (("millimeters", "millimetres", "mms", "milimeters", "milimetres"), 0.001),
     (("centimeters", "centimetres", "cms"), 0.01),
     (("decimeters", "decimetres"), 0.1),

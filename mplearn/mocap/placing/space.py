@@ -182,13 +182,13 @@ def checked_markers(path: Path, points: FloatArray, names: tuple[str, ...]) -> F
         RecordingError: Nothing was measured, in most frames a marker lies 100 m away, or all lie
             within 2 cm.
     """
-    size = np.abs(points)
-    if np.isnan(size).all():
+    measured = np.isfinite(points).any(axis=(1, 2))
+    if not measured.any():
         raise bad_file(path, "no marker was ever seen", "measured positions")
-    frame, marker, _ = np.unravel_index(np.nanargmax(size), size.shape)
-    measured = np.isfinite(size).any(axis=(1, 2))
-    far = (size > _FARTHEST_M).any(axis=(1, 2))
+    far = ((points > _FARTHEST_M) | (points < -_FARTHEST_M)).any(axis=(1, 2))
     if 2 * np.count_nonzero(far) > np.count_nonzero(measured):  # a few frames are the learner's
+        size = np.abs(points)
+        frame, marker, _ = np.unravel_index(np.nanargmax(size), size.shape)
         raise bad_file(
             path,
             f"marker {names[marker]!r} is {np.nanmax(size):.3g} m away in frame {frame}",

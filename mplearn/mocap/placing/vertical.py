@@ -4,7 +4,8 @@ Each of the six directions of the axes earns evidence [nat]; the names of the po
 it, and hints only:
 
 * names: the parts that sit higher on a body (`part_names.HEIGHTS`) lie farther along it;
-* floor: the lowest points stay at one level, and most laboratories put zero there;
+* floor: the lowest points stay at one level, and most laboratories put zero there; where the file
+  says which way is up, and most of the body lies on that floor, it is believed;
 * contact: what is lowest stands still more often than what is highest;
 * stature: a person is mostly taller than wide.
 """
@@ -30,6 +31,7 @@ _MOST = 0.8  # of the points: so many names tell what there is
 _STANDS = frozenset(("toe", "heel", "ankle"))
 _FLOOR = 3.0  # a wall through the origin looks like one as well
 _FLOOR_M = (-0.06, 0.13)  # height of the lowest points of a standing foot
+_FLAT_M, _STEADY_M = 0.3, 0.04  # how high who lies is, and how steady the level
 _FLOOR_LIFT_M = 0.25  # jumps are rare and low
 _STEADY, _CONTACT, _TALL = 2.0, 1.0, 1.5  # nat, at most
 _ROUGH_M = 0.01  # as level as the lowest points of a foot are
@@ -92,6 +94,9 @@ def find_vertical(
         floor = _by_floor(first, seen)
         evidence += floor + _by_motion(first, after, seen, rate_hz) + _by_stature(first, seen)
     best = int(np.argmax(evidence))
+    if says_so and best != start and floor[start] > 0 and _rests_on(first, seen)[start]:
+        # someone who lies, with the feet at a wall, or stands with the back to one
+        return Vertical(declared, False, True, tuple(map(float, evidence)))
     margin = float(np.min(evidence[best] - np.delete(evidence, best)))
     # lying down, or standing on the hands, names say one thing and the floor another
     floor_elsewhere = floor.max() > 0 and floor[best] == 0
@@ -143,6 +148,16 @@ def _by_floor(points: FloatArray, seen: BoolArray) -> FloatArray:
     floor, lifted = np.percentile(lowest, [5, 90], axis=0)
     there = (floor >= _FLOOR_M[0]) & (floor <= _FLOOR_M[1]) & (lifted <= floor + _FLOOR_LIFT_M)
     return np.where(there, _FLOOR, 0.0)
+
+
+def _rests_on(points: FloatArray, seen: BoolArray) -> BoolArray:
+    """Return for each direction whether most points stay close above one level, shape (6,)."""
+    lowest = _lowest(points, seen)
+    low, high = np.percentile(lowest, [5, 90], axis=0)
+    along = np.stack([points, -points], axis=-1).reshape(*points.shape[:2], 6)
+    above = np.where(seen[..., None], along - lowest[:, None], np.inf) < _FLAT_M
+    share = above.sum(axis=(0, 1)) / max(int(seen.sum()), 1)
+    return np.asarray((high - low < _STEADY_M) & (share > 0.5))
 
 
 def _by_motion(

@@ -1,7 +1,8 @@
 """Motions of the Unitree G1 as tables: the kind that LAFAN1 was retargeted to, and SEED's.
 
 * 36 numbers a row, with a header or without: the pelvis' place [m], its orientation as a quaternion
-  (x, y, z, w), and the 29 joints in order [rad], 30 Hz;
+  (x, y, z, w), and the 29 joints in order [rad], 30 Hz; without a header there may be a frame's
+  number or time before them;
 * a header ``Frame, root_translateX, ..., root_rotateX, ..., left_hip_pitch_joint_dof, ...``:
   centimetres, degrees, the pelvis' rotations about the fixed axes x, y, z in turn, 120 Hz.
 """
@@ -34,6 +35,7 @@ _QUATERNION = re.compile(rf"{_ROOT}(?:q|quat|quaternion|rot|orientation)_?([xyzw
 _ROTATION = re.compile(rf"{_ROOT}(?:rotate|rotation|euler)_?([xyz])")
 _TIMES = ("time", "time_s", "timestamp", "t")
 _RETARGETED_HZ, _SEED_HZ = 30.0, 120.0
+_MOST_BEFORE = 2  # columns before a pose: a frame's number, and its time
 _HEIGHT_M = (0.05, 3.0)  # of the pelvis, lying to leaping
 _EXPECTED = "the pelvis' place and orientation, and the G1's 29 joints"
 
@@ -62,25 +64,25 @@ class G1CSVReader(Reader):
         if sum(_joint(cell) is not None for cell in cells) >= len(G1_JOINTS) // 2:
             return True
         row = _plain_numbers(cells)
-        return (
-            row is not None
-            and len(row) == _WIDTH
-            and abs(float(np.linalg.norm(row[3:7])) - 1.0) < 0.01
-            and bool(np.abs(row[7:]).max() < 2 * np.pi)
-        )
+        if row is None or not _WIDTH <= len(row) <= _WIDTH + _MOST_BEFORE:
+            return False
+        pose = row[-_WIDTH:]
+        turned = abs(float(np.linalg.norm(pose[3:7])) - 1.0) < 0.01
+        return turned and bool(np.abs(pose[7:]).max() < 2 * np.pi)
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read angles, or where the robot's joints are; see `Reader.read`."""
         findings = Findings(self.format)
         rows = [(i, s) for i, s in enumerate(read_text(path).splitlines(), 1) if s.strip()]
         header = _cells(rows[0][1]) if rows else []
-        if _plain_numbers(header) is None:
-            rows = rows[1:]
-        else:
-            header = list(_HEADERLESS)
+        named = _plain_numbers(header) is None
+        rows = rows[1:] if named else rows
         if not rows:
             raise bad_file(path, "no frames", "a row for each")
         table = numbers(path, [_cells(s) for _, s in rows], len(header), [i for i, _ in rows])
+        if not named:
+            before = table[:, : max(len(header) - _WIDTH, 0)]
+            header = [*map(_counts, before.T), *_HEADERLESS]
         at = _columns(path, header, findings)
         seed = "qw" not in at
         unit_m = _unit(path, table[:, at["z"]], 0.01 if seed else 1.0, hints, findings)
@@ -123,6 +125,11 @@ def _plain_numbers(cells: list[str]) -> FloatArray | None:
     except ValueError:
         return None
     return values if np.isfinite(values).all() else None
+
+
+def _counts(column: FloatArray) -> str:
+    """Return whether a column without a name numbers frames, or is their time."""
+    return "frame" if len(column) > 1 and (np.diff(column) == 1.0).all() else "time"
 
 
 def _joint(name: str) -> str | None:
