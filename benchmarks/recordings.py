@@ -23,11 +23,10 @@ from rich.table import Table
 from mplearn.errors import MPLearnError
 from mplearn.library import PrimitiveLibrary
 from mplearn.mocap import Hints, open_recordings
-from mplearn.mocap.registry import suffixes
+from mplearn.mocap.registry import reader_of
 from mplearn_agents.cli import main as mplearn
 from mplearn_agents.inspection import inspect
 
-ENDS = tuple(f"{suffix}{end}" for suffix in suffixes() for end in ("", ".gz"))
 STEPS = 5  # primitives that are performed of each
 
 
@@ -71,7 +70,7 @@ def _files(folders: list[Path]) -> Iterator[Path]:
     """Go through the files of folders; a folder in one is a recording of several takes."""
     for folder in folders:
         for path in [folder] if folder.is_file() else sorted(folder.iterdir()):
-            if path.is_dir() or any(str(path).lower().endswith(end) for end in ENDS):
+            if path.is_dir() or reader_of(path) is not None:
                 yield path
 
 

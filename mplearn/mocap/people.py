@@ -34,10 +34,10 @@ def each_person(recording: Recording) -> tuple[Recording, ...]:
 
     Example:
         >>> import numpy as np
-        >>> names = tuple(f"{who}:M{k}" for who in ("Anna", "Ben") for k in range(8))
-        >>> both = Recording(np.zeros((5, 48)), 50.0, marker_channels(names), "duet")
+        >>> names = tuple(f"{who}:M{k}" for who in ("Anna", "Ben") for k in range(12))
+        >>> both = Recording(np.zeros((5, 72)), 50.0, marker_channels(names), "duet")
         >>> [(each.name, each.person, len(each.marker_names)) for each in each_person(both)]
-        [('duet (Anna)', 'Anna', 8), ('duet (Ben)', 'Ben', 8)]
+        [('duet (Anna)', 'Anna', 12), ('duet (Ben)', 'Ben', 12)]
     """
     if not recording.is_markers:
         return (recording,)

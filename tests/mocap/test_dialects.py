@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -524,3 +525,33 @@ def test_csv_of_another_kind_is_said_to_be_flat(tmp_path: Path) -> None:
     text = path.read_text().replace(".z", ".w")
     path.write_text(text)
     assert not open_recording(path).is_markers
+
+
+@pytest.mark.parametrize("between", [",", "  "])
+@pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")  # whose body it is
+def test_trc_without_tabs(tmp_path: Path, between: str) -> None:
+    path = write_trc(tmp_path / "a.trc")
+    plain = open_recording(path)
+    path.write_text(re.sub("\t+" if between.isspace() else "\t", between, path.read_text()))
+    found = open_recording(path)
+    assert found.channels == plain.channels and found.rate_hz == plain.rate_hz
+    assert np.allclose(found.frames, plain.frames, equal_nan=True)
+
+
+@pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")
+def test_motive_whose_only_free_markers_are_not_identified(tmp_path: Path) -> None:
+    path = write_motive(tmp_path / "a.csv")
+    plain = open_recording(path)
+    lines = path.read_text().splitlines()
+    kinds = next(i for i, line in enumerate(lines) if "Marker" in line)
+    bones = [re.sub(r"\bMarker\b", "Bone Marker", lines[kinds]) + ",Marker" * 3]
+    rows = [lines[kinds + 1] + ",Unlabeled 1001" * 3]
+    for line in lines[kinds + 2 :]:
+        last = line == lines[-1] or line[:1].isdigit()
+        first = line.split(",")[0]
+        axes = ",X,Y,Z" if first == "Frame" else ",Position" * 3 if "Position" in line else ",1,1,1"
+        rows.append(line + (",0.1,0.2,0.3" if last and first.isdigit() else axes))
+    path.write_text("\n".join([*lines[:kinds], *bones, *rows]) + "\n")
+    found = open_recording(path)
+    assert found.channels == plain.channels
+    assert np.allclose(found.frames, plain.frames, equal_nan=True)

@@ -76,7 +76,7 @@ def _block(sheet: Sheet, findings: Findings) -> Block:
             kind[i] in wanted and what[i] in ("position", "") and bool(name[i])
             for i in range(width)
         ]
-        if any(kept):
+        if any(keep and _plain(name[i]) for i, keep in enumerate(kept)):
             break
     else:
         raise bad_file(path, "no markers and no bones", "an export of Motive with markers")

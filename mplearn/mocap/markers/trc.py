@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +24,7 @@ _EXPECTED = (
     "a TRC file: two header lines of names and values, then 'Frame#', 'Time' and the markers"
 )
 _SAME_RATE = 0.01  # how far the rates of header and times may differ, as a share
+_TABLE = re.compile(r"\s*frame\s*#?[\s,]", re.IGNORECASE)  # how the line of names begins
 
 
 class TRCReader(Reader):
@@ -34,7 +36,7 @@ class TRCReader(Reader):
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read the markers; see `Reader.read`."""
         findings = Findings(self.format)
-        sheet = Sheet.of(path, read_text(path), separators="\t")
+        sheet = Sheet.of(path, _tabbed(read_text(path)), separators="\t")
         header = _Header.parse(path, sheet.lines)
         values, labels = _table(sheet, header, findings)
         measured = values[:, 2:].reshape(len(values), -1, 3)
@@ -53,6 +55,17 @@ class TRCReader(Reader):
             person=cmu_subject(stem(path)),
             report=findings.report(rate_hz, at.unit_m, at.up),
         )
+
+
+def _tabbed(text: str) -> str:
+    """Return a file with tabs between its cells, where it has commas or blanks."""
+    if "\t" in text:
+        return text
+    lines = text.splitlines()
+    table = next((line for line in lines[:12] if _TABLE.match(line)), "")
+    if "," in table:
+        return text.replace(",", "\t")
+    return "\n".join(re.sub(" +", "\t", line.strip()) for line in lines) if table else text
 
 
 @dataclass(frozen=True)
