@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from mplearn.errors import MPLearnError, RecordingError
 from mplearn.learner import (
@@ -23,6 +23,8 @@ from mplearn.learner import (
 )
 from mplearn.recording import Recording, Segment
 from mplearn.tree import Placement
+
+from .interrupts import asked_to_stop
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -44,6 +46,8 @@ class LearningLog:
         watched_s: Length of the streams so far [s].
         learning_s: How long learning took [s], reading and drawing left out.
         refused: Recordings that could not be learned, or not to their end, by name: why.
+        already: How many had been learned before.
+        stopped: Whether somebody ended it.
     """
 
     segments: list[Segment] = field(default_factory=list)
@@ -54,6 +58,8 @@ class LearningLog:
     watched_s: float = 0.0
     learning_s: float = 0.0
     refused: dict[str, MPLearnError] = field(default_factory=dict)
+    already: int = 0
+    stopped: bool = False
     _alive: set[int] = field(default_factory=set)
 
     @property
@@ -109,23 +115,35 @@ class LearningLog:
                 pass
 
 
+class Learner(Protocol):
+    """What learns recordings: a `MotionLearner`, or a `LifelongLearner`."""
+
+    def learn_recording(self, recording: Recording, at_once: int = ...) -> Iterator[list[Event]]:
+        """Learn a recording as a stream of its own; yield the events of each part."""
+
+    def end_stream(self) -> list[Event]:
+        """Close what is open."""
+
+
 def learn(
-    learner: MotionLearner,
+    learner: Learner,
     recordings: Sequence[Recording],
     console: Console,
     *,
     strict: bool = False,
+    taken: Callable[[Recording], int] = lambda _: 0,
 ) -> LearningLog:
     """Show recordings to a learner, frame by frame, with a bar on the console.
 
     A stream ends with each recording. One that cannot be learned costs neither what was learned
-    before nor what comes after it.
+    before nor what comes after it. Ctrl-C and SIGTERM end learning: `LearningLog.stopped`.
 
     Args:
         learner: Who looks on.
         recordings: What is shown, in order.
         console: Where the bar is drawn.
         strict: Whether a recording that cannot be learned is an error.
+        taken: Returns how many frames of a recording were learned before, and are not shown again.
 
     Raises:
         MPLearnError: No recording can be learned, or one cannot and ``strict`` is set.
@@ -143,12 +161,12 @@ def learn(
         TimeElapsedColumn(),
     )
     total_s = sum(recording.duration_s for recording in recordings)
-    with Progress(*columns, console=console) as progress:
+    with asked_to_stop() as stop, Progress(*columns, console=console) as progress:
         bar = progress.add_task("learn", total=total_s, speed=0.0, primitives=0, segments=0)
         for recording in recordings:
             before_s = log.watched_s
             begin = time.perf_counter()
-            n = 0
+            n = first = taken(recording)
             try:
                 lost = log.n_lost
                 for events in learner.learn_recording(recording, _AT_ONCE):
@@ -160,7 +178,10 @@ def learn(
                     begin = now
                     log.watched_s = before_s + n / recording.rate_hz
                     _show(progress, bar, log)
-                if log.n_lost - lost == len(recording):
+                    if stop.is_set() and n < len(recording):
+                        log.stopped = True
+                        return log
+                if log.n_lost - lost == len(recording) - first > 0:
                     raise RecordingError(f"{recording.name}: {log.lost[-1].reason}")
             except MPLearnError as error:
                 if strict or len(log.refused) + 1 == len(recordings):
@@ -171,6 +192,10 @@ def learn(
             log.learning_s += time.perf_counter() - begin
             log.watched_s = before_s + n / recording.rate_hz
             _show(progress, bar, log)
+            log.already += first == len(recording) > 0
+            if stop.is_set():
+                log.stopped = True
+                break
     return log
 
 

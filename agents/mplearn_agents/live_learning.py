@@ -6,6 +6,7 @@ import argparse
 import json
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event as Flag
@@ -21,6 +22,7 @@ from .reading import hints_of, printable
 if TYPE_CHECKING:
     from mplearn.learner import Event, LearnerConfig, MotionLearner
     from mplearn.sources import Block, Source
+    from mplearn.store import LifelongLearner
 
 _WAIT_S = 0.2  # a wish to stop is heard so soon
 
@@ -51,18 +53,23 @@ class LiveLog:
     """What came of a stream: numbers only, for it may be endless.
 
     Attributes:
-        learner: Who learned; None where no frame could be learned.
+        life: Who learned; None where no frame could be learned.
         watched_s: Length of what was learned from [s].
         segments: Motions, pauses left out.
         lost_s: Length of what nothing could be learned from, though it came or was filled in [s].
         delay_s: From a frame's arrival to the event that it caused: the longest [s].
     """
 
-    learner: MotionLearner | None = None
+    life: LifelongLearner | None = None
     watched_s: float = 0.0
     segments: int = 0
     lost_s: float = 0.0
     delay_s: float = 0.0
+
+    @property
+    def learner(self) -> MotionLearner | None:
+        """What it learned with; None where no frame could be learned."""
+        return None if self.life is None else self.life.learner
 
 
 def learn_from_source(
@@ -80,29 +87,42 @@ def learn_from_source(
     from mplearn.learner import learnable_rate
     from mplearn.mocap import command_line
     from mplearn.sources import open_source
+    from mplearn.store import LifelongLearner, is_begun
 
     if args.seconds is not None and not args.seconds > 0:
         raise InvalidValueError(f"--seconds must be positive, not {args.seconds}")
     console = Console(stderr=args.json)
-    with command_line(), asked_to_stop() as stop:
+    has_begun = args.store is not None and is_begun(args.store)
+    kept = " and ".join(str(path) for path in (args.out, args.store) if path is not None)
+    with command_line(), asked_to_stop() as stop, ExitStack() as stack:
+        life = stack.enter_context(LifelongLearner.open(args.store)) if has_begun else None
         source = open_source(
             args.live,
             observe=args.observe,
             hints=hints_of(args),
             names=None if args.map is None else read_map(args.map),
-            at_hz=args.rate_hz or learnable_rate,
+            at_hz=args.rate_hz or (learnable_rate if life is None else _rate_of(life)),
             **({} if args.speed is None else {"speed": args.speed}),
         )
         with source:
             console.print(
                 f"learning from {printable(source.name)}; Ctrl-C ends it, and writes "
-                f"{printable(str(args.out))}",
+                f"{printable(kept)}",
                 markup=False,
                 highlight=False,
             )
             log = learn_live(
-                source, stop, _say(), config=configure, as_json=args.json, seconds=args.seconds
+                source,
+                stop,
+                _say(),
+                config=configure,
+                as_json=args.json,
+                seconds=args.seconds,
+                life=life,
+                store=args.store,
             )
+            if log.life is not None:
+                stack.push(log.life)
         _report(console, args, source, log, stopped=stop.is_set())
 
 
@@ -114,6 +134,8 @@ def learn_live(
     config: Callable[[LearnerConfig], LearnerConfig] = lambda config: config,
     as_json: bool = False,
     seconds: float | None = None,
+    life: LifelongLearner | None = None,
+    store: Path | None = None,
 ) -> LiveLog:
     """Learn from a source until it ends, or until it is asked to stop.
 
@@ -124,9 +146,12 @@ def learn_live(
         config: Changes the learner's configuration.
         as_json: Whether lines are JSON.
         seconds: How much of the stream to learn [s]; all of it where None.
+        life: Who has learned before, and goes on.
+        store: Where one who is new keeps what it learns; None for nowhere.
     """
     from mplearn.learner import FramesLost, LearnerConfig, MotionLearner, SegmentClosed
     from mplearn.sources import Change
+    from mplearn.store import LifelongLearner
 
     log = LiveLog()
 
@@ -142,12 +167,20 @@ def learn_live(
         if events:
             log.delay_s = max(log.delay_s, time.monotonic() - arrived_s)
 
+    def new_life(config: LearnerConfig) -> LifelongLearner:
+        if store is None:
+            return LifelongLearner(MotionLearner(config))
+        store.parent.mkdir(parents=True, exist_ok=True)
+        return LifelongLearner.open(store, lambda: MotionLearner(config))
+
     def take(block: Block) -> None:
-        if log.learner is None:
-            log.learner = MotionLearner(config(LearnerConfig(block.channels, block.rate_hz)))
+        if log.life is None:
+            log.life = life or new_life(config(LearnerConfig(block.channels, block.rate_hz)))
+            if life is not None:
+                tell(life.begin_stream(block.channels), _newest(block), block.rate_hz)
         elif not block.joins:
-            tell(log.learner.end_stream(), _newest(block), block.rate_hz)
-        tell(log.learner.learn_many(block.frames), _newest(block), block.rate_hz)
+            tell(log.life.end_stream(), _newest(block), block.rate_hz)
+        tell(log.life.learn_many(block.frames), _newest(block), block.rate_hz)
         log.watched_s += len(block) / block.rate_hz
 
     while not (source.ended or stop.is_set() or (seconds and log.watched_s >= seconds)):
@@ -156,9 +189,13 @@ def learn_live(
                 say(change_json(item) if as_json else change_text(item))
             else:
                 take(item)
-    if log.learner is not None:
-        tell(log.learner.end_stream(), time.monotonic(), log.learner.config.rate_hz)
+    if log.life is not None:
+        tell(log.life.end_stream(), time.monotonic(), log.life.learner.config.rate_hz)
     return log
+
+
+def _rate_of(life: LifelongLearner) -> float:
+    return life.learner.config.rate_hz
 
 
 def _newest(block: Block) -> float:
@@ -181,13 +218,14 @@ def _report(
     from .tables import primitive_table
 
     faults = source.tally.faults()
-    if log.learner is None:
+    if log.life is None or log.learner is None:
         told = ", ".join(f"{n} {name}" for name, n in faults.items()) or "nothing came"
         raise RecordingError(f"nothing could be learned from {source.name}: {told}")
-    library = log.learner.snapshot()
-    path = Path(args.out)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    library.save(path)
+    library = log.life.snapshot()
+    if args.out is not None:
+        args.out.parent.mkdir(parents=True, exist_ok=True)
+        library.save(args.out)
+    paths = [str(path) for path in (args.out, args.store) if path is not None]
     if args.json:
         summary = {
             "event": "Summary",
@@ -197,7 +235,8 @@ def _report(
             "lost_s": log.lost_s,
             "longest_delay_s": log.delay_s,
             "stopped": stopped,
-            "library": str(path),
+            "library": None if args.out is None else str(args.out),
+            "store": None if args.store is None else str(args.store),
             **vars(source.tally),
         }
         print(json.dumps(summary), flush=True)
@@ -206,7 +245,7 @@ def _report(
     console.print(
         f"{len(library)} primitives from {log.watched_s / 60:.1f} minutes of motion in "
         f"{log.segments} segments; "
-        f"{'stopped, ' if stopped else ''}written to {printable(str(path))}",
+        f"{'stopped, ' if stopped else ''}written to {printable(' and '.join(paths))}",
         markup=False,
     )
     if not len(library):

@@ -23,3 +23,4 @@ from .store import StoreInfo as StoreInfo
 from .store import backup as backup
 from .store import check as check
 from .store import info as info
+from .store import is_begun as is_begun

@@ -318,13 +318,19 @@ class LifelongLearner:
         """Return what happened to a primitive, the oldest first."""
         return self._journal.history(primitive)
 
-    def snapshot(self) -> PrimitiveLibrary:
+    def snapshot(self, *, shown_once: bool = False) -> PrimitiveLibrary:
         """Return what is known now, frozen, with the names that people gave.
 
         It is the same object as long as `revision` is the same.
+
+        Args:
+            shown_once: Whether motions that were shown once are in it; see
+                `MotionLearner.snapshot`.
         """
+        if shown_once:
+            return self._named(self.learner.snapshot(shown_once=True))
         if self._shown is None or self._shown[0] != self._revision:
-            self._shown = self._revision, self._named_library()
+            self._shown = self._revision, self._named(self.learner.snapshot())
         return self._shown[1]
 
     # ---- keeping
@@ -458,13 +464,11 @@ class LifelongLearner:
             for id in sorted(ids)
         )
 
-    def _named_library(self) -> PrimitiveLibrary:
-        library = self.learner.snapshot()
+    def _named(self, library: PrimitiveLibrary) -> PrimitiveLibrary:
         self.labels.tidy(library.ids)
-        names = self.labels.shown(library.ids)
-        return replace(
-            library, primitives=tuple(named(each, names[each.id]) for each in library.primitives)
-        )
+        names = self.labels.shown(self.learner.tree.leaves)
+        primitives = (named(each, names.get(each.id, each.name)) for each in library.primitives)
+        return replace(library, primitives=tuple(primitives))
 
     # ---- the store
 

@@ -14,7 +14,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from ..errors import InvalidValueError, StoreDamagedError, StoreError, StoreWarning, StoreWriteError
+from ..errors import (
+    InvalidValueError,
+    NotAStoreError,
+    StoreDamagedError,
+    StoreError,
+    StoreWarning,
+    StoreWriteError,
+)
 from .database import errors_of, integrity, look_at, open_reading, open_writing
 from .journal import Entry
 from .life_state import LifeState
@@ -193,6 +200,7 @@ class Store:
             problem = None if done else writer.problem
         try:
             if problem is None:
+                self._connection.execute("PRAGMA incremental_vacuum").fetchall()
                 self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
         except sqlite3.Error:  # a reader holds it: what is beside the file is read as well
             pass
@@ -278,6 +286,25 @@ def _others(
                 damage.append(str(error))
 
 
+def is_begun(path: str | Path) -> bool:
+    """Whether there is a store that holds something: one that was never finished does not.
+
+    Raises:
+        StoreError: There is a file, and it cannot be read.
+    """
+    path = Path(path)
+    if not path.exists() or not path.stat().st_size:
+        return False
+    connection = open_reading(path)
+    try:
+        with errors_of(path):
+            return bool(checkpoints(connection))
+    except NotAStoreError:
+        return False
+    finally:
+        connection.close()
+
+
 def backup(path: str | Path, to: str | Path) -> Path:
     """Write a copy of a store as it is now, whoever writes to it; return its path.
 
@@ -288,6 +315,8 @@ def backup(path: str | Path, to: str | Path) -> Path:
     path, to = Path(path), Path(to)
     if to.exists():
         raise InvalidValueError(f"{to} exists already; a backup is a new file")
+    if not is_begun(path):
+        raise NotAStoreError(f"{path} holds no store: it was never finished")
     connection = open_reading(path)
     try:
         with errors_of(to):

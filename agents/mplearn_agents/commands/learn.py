@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
     from mplearn.learner import LearnerConfig
     from mplearn.recording import Recording
+    from mplearn.store import LifelongLearner
     from mplearn.tree import TreeConfig
     from mplearn_agents.learning import LearningLog
 
@@ -37,7 +39,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument("data", type=Path, nargs="?", help="a recording, or a folder of them")
     add_live_arguments(parser)
-    parser.add_argument("--out", type=Path, required=True, help="library file to write")
+    parser.add_argument("--out", type=Path, help="library file to write")
+    parser.add_argument(
+        "--store",
+        type=Path,
+        help="store that keeps all that is learned, as it is learned: stopped at any moment, the "
+        "same command goes on; what it has learned from already is not learned again",
+    )
     parser.add_argument(
         "--rate-hz", type=float, help="resample to this rate [1/s] (default: the recordings' own)"
     )
@@ -75,6 +83,8 @@ def run(args: argparse.Namespace) -> None:
     """Learn, save the library and print a summary."""
     if (args.data is None) == (args.live is None):
         raise InvalidValueError("give a recording, or --live SOURCE")
+    if args.out is None and args.store is None:
+        raise InvalidValueError("give a library to write, --out, or a store, --store, or both")
     if args.live is not None:
         learn_from_source(args, partial(_configured, args))
     else:
@@ -84,8 +94,9 @@ def run(args: argparse.Namespace) -> None:
 def _learn_from_files(args: argparse.Namespace) -> None:
     from rich.console import Console
 
-    from mplearn.learner import LearnerConfig, MotionLearner
+    from mplearn.learner import LearnerConfig
     from mplearn.mocap import command_line, open_takes
+    from mplearn.store import LifelongLearner, is_begun
     from mplearn_agents.learning import learn, why_nothing
     from mplearn_agents.tables import primitive_table
 
@@ -100,25 +111,44 @@ def _learn_from_files(args: argparse.Namespace) -> None:
         say_takes(console, takes)
         recordings = _of_persons(args, takes.recordings)
         recordings = _as_learned(args, recordings, console)
-    recordings = _at_one_rate(args, recordings, console)
-    first = recordings[0]
-    learner = MotionLearner(_configured(args, LearnerConfig(first.channels, first.rate_hz)))
-    log = learn(learner, recordings, console, strict=args.strict)
-    for name, error in log.refused.items():
-        say_left_out(console, name, error)
-    library = learner.snapshot(shown_once=args.demonstrations == 1)
-    n_known = len(learner.tree.leaves)
-    if not len(library):
-        library = learner.snapshot(shown_once=True)
-    args.out.parent.mkdir(parents=True, exist_ok=True)
-    library.save(args.out)
+    kept = args.store is not None and is_begun(args.store)
+    with ExitStack() as stack:
+        life: LifelongLearner | None = None
+        if kept:
+            life = stack.enter_context(LifelongLearner.open(args.store))
+            _check_rules(args, life.learner.config)
+            args.rate_hz = args.rate_hz or life.learner.config.rate_hz
+        recordings = _at_one_rate(args, recordings, console)
+        first = recordings[0]
+        if life is None:
+            config = _configured(args, LearnerConfig(first.channels, first.rate_hz))
+            life = _new_life(args, config, stack)
+        log = learn(life, recordings, console, strict=args.strict, taken=life.taken)
+        learner = life.learner
+        for name, error in log.refused.items():
+            say_left_out(console, name, error)
+        library = life.snapshot(shown_once=args.demonstrations == 1)
+        n_known = len(learner.tree.leaves)
+        if not len(library):
+            library = life.snapshot(shown_once=True)
+    if args.out is not None:
+        args.out.parent.mkdir(parents=True, exist_ok=True)
+        library.save(args.out)
     console.print(primitive_table(library))
+    paths = [str(path) for path in (args.out, args.store) if path is not None]
     console.print(
         f"{n_known} primitives from {_takes_of(recordings, log)}, "
         f"{log.watched_s / 60:.1f} minutes of motion in {len(log.moving)} segments, "
-        f"{log.times_real_time:.0f} x real time; written to {printable(str(args.out))}",
+        f"{log.times_real_time:.0f} x real time; written to {printable(' and '.join(paths))}",
         markup=False,
     )
+    if log.already:
+        console.print(f"{log.already} takes had been learned before, and are in the store already.")
+    if log.stopped:
+        console.print(
+            "Stopped: what was learned until then is written."
+            + (" The same command goes on from there." if args.store is not None else "")
+        )
     if not n_known:
         console.print(why_nothing(learner, len(log.moving), log.watched_s))
     if len(library) > n_known:
@@ -131,6 +161,28 @@ def _learn_from_files(args: argparse.Namespace) -> None:
             f"{log.n_lost / first.rate_hz:.1f} s in {len(log.lost)} stretches were left out: "
             f"{log.reasons}",
             markup=False,
+        )
+
+
+def _new_life(args: argparse.Namespace, config: LearnerConfig, stack: ExitStack) -> LifelongLearner:
+    """Return what learns, in a new store if one is wanted."""
+    from mplearn.learner import MotionLearner
+    from mplearn.store import LifelongLearner
+
+    if args.store is None:
+        return LifelongLearner(MotionLearner(config))
+    args.store.parent.mkdir(parents=True, exist_ok=True)
+    return stack.enter_context(LifelongLearner.open(args.store, lambda: MotionLearner(config)))
+
+
+def _check_rules(args: argparse.Namespace, config: LearnerConfig) -> None:
+    """Refuse options that contradict the rules that a store was made with."""
+    asked = {"--segmenter": args.segmenter, "--demonstrations": args.demonstrations}
+    named = [f"{name} {value}" for name, value in asked.items() if value is not None]
+    if _configured(args, config) != config:
+        raise InvalidValueError(
+            f"{args.store} was made with other rules than --observe {args.observe}"
+            f"{''.join(', ' + each for each in named)}: leave these out, or take another store"
         )
 
 

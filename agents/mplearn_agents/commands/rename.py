@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from mplearn_agents.reading import printable
+
 HELP = "Give a primitive of a library a name; its id stays."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    parser.add_argument("library", type=Path, help="library file, which is changed")
+    parser.add_argument("library", type=Path, help="library file or store, which is changed")
     parser.add_argument("primitive", metavar="ID", help="id or present name of the primitive")
     parser.add_argument("name", help="its new name")
 
@@ -18,7 +20,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> None:
     """Rename the primitive and save the library."""
     from mplearn.library import PrimitiveLibrary
+    from mplearn.store.database import looks_like_one
+    from mplearn_agents.commands import store
 
+    if looks_like_one(args.library):
+        print(printable(store.rename(args.library, args.primitive, args.name)))
+        return
     library = PrimitiveLibrary.load(args.library)
     digits = args.primitive.isdecimal() and args.primitive not in library
     key = int(args.primitive) if digits else args.primitive

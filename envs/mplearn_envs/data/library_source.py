@@ -10,6 +10,8 @@ from typing import Protocol, TypeAlias, runtime_checkable
 
 from mplearn.errors import LibraryError
 from mplearn.library import PrimitiveLibrary
+from mplearn.store import StoreReader
+from mplearn.store.database import looks_like_one
 
 
 @runtime_checkable
@@ -28,15 +30,19 @@ class LibrarySource:
 
     Args:
         source: A library, its file, or None for the built-in one: these never change. Or a
-            `MotionLearner` that someone else feeds, or a function that returns a library: these are
-            *live*, and asked again at each reset. The learner must not be fed by another thread at
-            that moment.
+            `MotionLearner` that someone else feeds, the file of a store that another process
+            writes to (`mplearn.store`), or a function that returns a library: these are *live*, and
+            asked again at each reset. The learner must not be fed by another thread at that
+            moment.
 
     Raises:
+        StoreError: The store cannot be read.
         LibraryError: The file is missing or damaged, or this is none of these.
     """
 
     def __init__(self, source: Source) -> None:
+        if isinstance(source, (str, Path)) and looks_like_one(Path(source)):
+            source = _of_store(Path(source))
         self.source = source
         self.live = isinstance(source, Learner) or (
             callable(source) and not isinstance(source, PrimitiveLibrary)
@@ -60,6 +66,17 @@ class LibrarySource:
                 "not a PrimitiveLibrary"
             )
         return library
+
+
+def _of_store(path: Path) -> Callable[[], PrimitiveLibrary]:
+    """Return what gives the library of a store as it is when it is asked."""
+    reader = StoreReader(path)
+
+    def now() -> PrimitiveLibrary:
+        reader.refresh()
+        return reader.life.snapshot()
+
+    return now
 
 
 def _opened(source: object) -> PrimitiveLibrary:

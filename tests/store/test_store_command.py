@@ -1,0 +1,113 @@
+"""The command line of a store: learning that is stopped and goes on, and looking after it."""
+
+import json
+import os
+import signal
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+from streams import CHANNELS, RATE_HZ, learner, stream
+
+import mplearn_agents.learning
+from mplearn import PrimitiveLibrary, Recording
+from mplearn.store import LifelongLearner, StoreReader
+from mplearn_agents.cli import main
+from mplearn_agents.learning import learn
+
+TAKES = [Recording(stream(24, k), RATE_HZ, CHANNELS, name=f"take {k}") for k in range(3)]
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Path:
+    path = tmp_path / "life.db"
+    with LifelongLearner.open(path, learner) as life:
+        for take in TAKES:
+            for _ in life.learn_recording(take):
+                pass
+    return path
+
+
+def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
+    assert main([str(each) for each in argv]) == 2
+    return capsys.readouterr().err
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_learning_that_is_stopped_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    whole = learner()
+    for take in TAKES:
+        for _ in whole.learn_recording(take, 50):
+            pass
+    console = Console(quiet=True)
+    shown = mplearn_agents.learning._show
+    left = [0]
+
+    def show(*args: object) -> None:
+        left[0] -= 1
+        if left[0] == 0:
+            os.kill(os.getpid(), number)
+        shown(*args)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(mplearn_agents.learning, "_show", show)
+    for stop, done in ((5, False), (30, False), (10**9, True)):
+        left[0] = stop
+        with LifelongLearner.open(tmp_path / "life.db", learner) as life:
+            log = learn(life, TAKES, console, taken=life.taken)
+            assert log.stopped == (not done)
+    with LifelongLearner.open(tmp_path / "life.db") as life:
+        assert life.learner.state() == whole.state()
+        log = learn(life, TAKES, console, taken=life.taken)
+        assert (log.already, len(log.segments), log.refused) == (3, 0, {})
+
+
+def test_commands(store: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = PrimitiveLibrary.load(store)
+    one, two = before.ids[:2]
+    for argv in (
+        ["rename", store, one, "bow [/red] \\low"],
+        ["store", "merge", store, "bow [/red] \\low", two, "--by", "Anna"],
+        ["store", "note", store, "slow", "--primitive", one],
+        ["store", "undo", store, 2, "--by", "Ben"],
+        ["store", "redo", store],
+        ["store", "undo", store, 2],
+        ["store", "freeze", store, two],
+        ["store", "unfreeze", store, two],
+        ["store", "split", store, one],
+        ["store", "delete", store, before.ids[2]],
+        ["store", "undo", store],
+        ["store", "undo", store, 9],
+    ):
+        assert main([str(each) for each in argv]) == 0, argv
+    capsys.readouterr()
+    after = StoreReader(store).life.snapshot()
+    assert after.rename(one, f"P{one}").version == before.version
+    assert main(["store", "log", str(store), "--json"]) == 0
+    log = json.loads(capsys.readouterr().out)
+    assert [each["kind"] for each in log][:4] == ["rename", "merge", "note", "undo"]
+    assert log[1]["by"] == "Anna" and log[1]["undone"]
+    for action in ("info", "log"):
+        assert main(["store", action, str(store)]) == 0
+    assert main(["store", "history", str(store), str(two)]) == 0
+    said = capsys.readouterr().out
+    assert "born from" in said and "merge" in said and "by Anna" in said
+    assert main(["store", "info", str(store), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["primitives"] == len(before)
+    assert main(["store", "backup", str(store), str(tmp_path / "copy.db")]) == 0
+    assert main(["store", "check", str(tmp_path / "copy.db")]) == 0
+    assert main(["show", str(store)]) == 0
+    assert "bow [/red]" in capsys.readouterr().out
+
+
+def test_what_cannot_be_is_said_in_a_line(
+    store: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "there is no store" in refused(capsys, "store", "info", tmp_path / "none.db")
+    assert "no primitive" in refused(capsys, "store", "delete", store, "nobody")
+    assert "no command that can be undone" in refused(capsys, "store", "undo", store)
+    assert "exists already" in refused(capsys, "store", "backup", store, store)
+    (tmp_path / "b.db").write_bytes(store.read_bytes()[:5000])
+    assert "damaged" in refused(capsys, "store", "check", tmp_path / "b.db")
+    assert "--out, or a store" in refused(capsys, "learn", tmp_path)
