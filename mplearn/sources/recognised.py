@@ -13,7 +13,7 @@ from ..errors import MPLearnError
 from ..mocap.findings import Findings
 from ..mocap.markers.names import chosen_names
 from ..mocap.placing.space import Space, placed
-from ..recording import FloatArray, IntArray, Recording, marker_channels
+from ..recording import BoolArray, FloatArray, IntArray, Recording, marker_channels
 from .registry import Wanted
 from .source import Block, Change, Source, Stream
 
@@ -21,7 +21,8 @@ FIRST_LOOK_S, DOUBT_S, PATIENCE_S = 1.0, 4.0, 10.0
 """A body is looked for in so much of the stream; so long while something stays in doubt; and no
 more than so much is kept while there is none."""
 KEPT = 0.6  # of the points by which a body was recognised: with fewer it is looked for again
-NEAR_M, FAST_M_S = 0.03, 5.0  # a marker that gets another name is where it was
+NEAR_M, FAST_M_S, FAR_M = 0.03, 5.0, 0.15  # a marker that gets another name is where it was
+MATCHED_S = 0.3  # so long after the names changed, those that are missing are looked for
 SUBJECT = 6  # names with a new prefix: another person
 
 
@@ -78,7 +79,8 @@ class RecognisedSource(Source):
         self._columns: IntArray = np.zeros(0, dtype=np.int64)  # of the sight's labels; -1: missing
         self._places: IntArray = np.zeros(0, dtype=np.int64)  # of the sight's channels in ours
         self._last: FloatArray | None = None  # where the sight's points were last, (K, 3)
-        self._last_s = 0.0
+        self._last_s, self._changed_s = 0.0, 0.0
+        self._free: IntArray = np.zeros(0, dtype=np.int64)  # new names that may be those missing
         self._held: deque[Block] = deque()
         self._held_frames, self._seen_frames, self._next_look, self._refused = 0, 0, 0, ""
         self._joins = True
@@ -112,56 +114,74 @@ class RecognisedSource(Source):
         out: list[Block | Change] = []
         if block.stream is not self._raw:
             out += self._changed(block)
-        if self._sight is not None:
-            return [*out, self._seen(block)]
+        elif self._sight is not None and len(self._free):
+            out += self._renamed(self._match(block), float(block.times_s[0]))
+        if self._sight is not None and self._enough:
+            held, self._held = self._held, deque()
+            return [*out, *(self._seen(each) for each in (*held, block))]
         self._held.append(block)
         self._held_frames += len(block)
         self._seen_frames += int(np.isfinite(block.frames).any(axis=1).sum())
-        return out + self._look()
+        late = float(block.times_s[0]) - self._changed_s > MATCHED_S or not len(self._free)
+        if self._sight is not None and late:  # it is another body
+            self._sight, self._free = None, self._free[:0]
+        return out if self._sight is not None else out + self._look()
+
+    @property
+    def _enough(self) -> bool:
+        """Whether enough is left of the points by which the body was recognised."""
+        return int((self._columns >= 0).sum()) >= KEPT * len(self._columns)
 
     def _changed(self, block: Block) -> list[Block | Change]:
         """Take notice of another description of the stream."""
-        before, self._raw = self._raw, block.stream
-        if before is None or self._sight is None:
-            self._begin_search()
-            return []
-        out: list[Block | Change] = [*_told(before, block, self._follow(block, before))]
-        used = int((self._columns >= 0).sum())
-        if used < KEPT * len(self._columns) or before.skeleton is not block.stream.skeleton:
+        out: list[Block | Change] = []
+        if self._held:
             self._sight = None
-            self._begin_search()
-        return out
+            out += self._look(at_last=True)
+        before, self._raw = self._raw, block.stream
+        self._begin_search()
+        if before is None or self._sight is None:
+            return out
+        names, known = _names(block.stream), set(_names(before))
+        at = {name: i for i, name in reversed([*enumerate(names)])}
+        self._columns = np.array([at.get(label, -1) for label in self._sight.labels])
+        free = [i for i, name in enumerate(names) if name not in known]
+        self._free = np.array(free if block.stream.is_markers else [], dtype=np.int64)
+        self._changed_s = float(block.times_s[0])
+        return [*out, *_told(before, block, self._match(block))]
 
     def _begin_search(self) -> None:
         self._held.clear()
         self._held_frames, self._seen_frames, self._refused = 0, 0, ""
         self._next_look = self._frames(FIRST_LOOK_S)
 
-    def _follow(self, block: Block, before: Stream) -> dict[str, str]:
-        """Find the points in use by their names, and those renamed by where they are."""
+    def _match(self, block: Block) -> dict[str, str]:
+        """Find points that are gone among those that are new, by where they are."""
         assert self._sight is not None
-        names = _names(block.stream)
-        at = {name: i for i, name in reversed([*enumerate(names)])}
-        self._columns = np.array([at.get(label, -1) for label in self._sight.labels])
         gone = np.flatnonzero(self._columns < 0)
-        known = set(_names(before))
-        new = np.array([i for i, name in enumerate(names) if name not in known], dtype=np.int64)
-        if self._last is None or not block.stream.is_markers or not len(gone) or not len(new):
+        points = block.frames.reshape(len(block), -1, 3)[:, self._free] if len(self._free) else None
+        if self._last is None or points is None or not len(gone):
             return {}
-        seen = block.frames.reshape(len(block), -1, 3)[0, new]
-        apart = np.linalg.norm(seen[None] - self._last[gone][:, None], axis=2)  # (gone, new)
-        apart = np.where(np.isnan(apart), np.inf, apart)
-        passed_s = float(block.times_s[0]) - self._last_s
-        reach = (NEAR_M + FAST_M_S * passed_s) / self._sight.unit_m
-        renamed: dict[str, str] = {}
+        row = int(np.argmax(_seen_rows(points)))
+        apart = np.linalg.norm(points[row][None] - self._last[gone][:, None], axis=2)
+        apart = np.where(np.isnan(apart), np.inf, apart)  # (gone, new)
+        passed_s = float(block.times_s[row]) - self._last_s
+        reach = min(NEAR_M + FAST_M_S * passed_s, FAR_M) / self._sight.unit_m
+        names, renamed, taken = _names(block.stream), {}, []
         for i, place in enumerate(gone):
             j = int(apart[i].argmin())
             if apart[i, j] <= reach and int(apart[:, j].argmin()) == i:
-                self._columns[place] = new[j]
-                renamed[self._sight.labels[place]] = names[new[j]]
+                self._columns[place] = self._free[j]
+                renamed[self._sight.labels[place]] = names[self._free[j]]
+                taken.append(j)
+        self._free = np.delete(self._free, taken)
         labels = tuple(renamed.get(label, label) for label in self._sight.labels)
         self._sight = replace(self._sight, labels=labels)
         return renamed
+
+    @staticmethod
+    def _renamed(renamed: dict[str, str], time_s: float) -> list[Change]:
+        return [Change("names", _renamings(renamed), time_s)] if renamed else []
 
     def _look(self, *, at_last: bool = False) -> list[Block | Change]:
         """Look for a body in what is held back, if there is enough of it."""
@@ -239,12 +259,11 @@ class RecognisedSource(Source):
         if block.stream.is_markers:
             points = block.frames.reshape(len(block), -1, 3)[:, self._columns]
             points[:, missing] = np.nan
-            self._last = np.where(np.isnan(points[-1]), np.nan, points[-1])
+            self._remember(points, block)
             frames = self._sight.see(points)
         else:
             frames = block.frames[:, self._columns]
             frames[:, missing] = np.nan
-        self._last_s = float(block.times_s[-1])
         if not np.array_equal(self._places, np.arange(len(self._channels))):
             ours = np.full((len(frames), len(self._channels)), np.nan)
             kept = self._places >= 0
@@ -263,6 +282,18 @@ class RecognisedSource(Source):
             )
         joins, self._joins = block.joins and self._joins, True
         return replace(block, stream=self._out, frames=frames, joins=joins)
+
+    def _remember(self, points: FloatArray, block: Block) -> None:
+        """Keep where points were when they were seen last, if that is not long ago."""
+        seen = np.flatnonzero(_seen_rows(points))
+        if not len(seen):
+            return
+        row = int(seen[-1])
+        last = points[row].copy()
+        before = float(block.times_s[row]) - self._last_s
+        if self._last is not None and len(self._last) == len(last) and before < MATCHED_S:
+            last = np.where(np.isnan(last), self._last, last)
+        self._last, self._last_s = last, float(block.times_s[row])
 
     @property
     def _placeable(self) -> bool:
@@ -344,7 +375,7 @@ def _told(before: Stream, block: Block, renamed: dict[str, str]) -> list[Change]
     if before.subject != block.stream.subject:
         said = f"{block.stream.subject!r} is followed now, {before.subject!r} no longer"
         changes.append(Change("subject", said, at_s))
-    texts = [f"renamed: {', '.join(f'{a} to {b}' for a, b in renamed.items())}"] if renamed else []
+    texts = [_renamings(renamed)] if renamed else []
     new = [name for name, prefix in zip(new, prefixes, strict=True) if prefix not in people]
     texts += [f"new: {', '.join(new)}"] if new else []
     texts += [f"gone: {', '.join(gone)}"] if gone else []
@@ -353,3 +384,13 @@ def _told(before: Stream, block: Block, renamed: dict[str, str]) -> list[Change]
     if texts:
         changes.append(Change("names", f"the names changed; {'; '.join(texts)}", at_s))
     return changes
+
+
+def _seen_rows(points: FloatArray) -> BoolArray:
+    """Return in which frames a point is seen, shape (T, K, 3) to (T,)."""
+    seen: BoolArray = np.asarray(np.isfinite(points).all(axis=2))
+    return np.asarray(seen.any(axis=1))
+
+
+def _renamings(renamed: dict[str, str]) -> str:
+    return f"renamed: {', '.join(f'{a} to {b}' for a, b in renamed.items())}"

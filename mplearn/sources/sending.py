@@ -19,7 +19,8 @@ from .protocols.own import PORT
 from .sender import Sender
 from .source import WAIT_S, Block, Source, Stream
 
-HEADER_EACH_S = 1.0  # in datagrams, of which one may be lost: so often
+HEADER_EACH_S, HEADERS_FIRST = 1.0, 5
+"""In datagrams, of which some are lost, a header goes with the first frames, and then so often."""
 CONNECT_S = 10.0
 
 
@@ -34,17 +35,18 @@ class LineSender(Sender):
     def __init__(self, write: Callable[[bytes], object], *, repeat: bool = False) -> None:
         self._write, self._repeat = write, repeat
         self._stream: Stream | None = None
-        self._header, self._sent_s = b"", 0.0
+        self._header, self._sent_s, self._first = b"", 0.0, 0
 
     def send(self, block: Block) -> None:
         """Send the frames that came, each with its number and its time."""
         if block.stream is not self._stream:
-            self._stream, self._header, self._sent_s = block.stream, header_line(block.stream), 0.0
+            self._stream, self._header = block.stream, header_line(block.stream)
+            self._first = HEADERS_FIRST if self._repeat else 1
         for values, time_s, gap in zip(block.frames, block.times_s, block.gaps, strict=True):
             now_s = time.monotonic()
-            if not self._sent_s or (self._repeat and now_s - self._sent_s > HEADER_EACH_S):
+            if self._first or (self._repeat and now_s - self._sent_s > HEADER_EACH_S):
                 self._write(self._header)
-                self._sent_s = now_s
+                self._sent_s, self._first = now_s, max(self._first - 1, 0)
             if not gap:
                 number = round(time_s * block.rate_hz)
                 self._write(frame_line(values, number, float(time_s)))

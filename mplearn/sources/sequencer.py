@@ -46,6 +46,7 @@ class Sequencer:
         self._clock, self._interpolation = EvenClock(1.0), Interpolation(1.0)
         self._next = 0  # place of the next frame
         self._base: int | None = None  # the number that has place 0, in strides
+        self._newest = (-1, math.nan)  # highest number, and its time on the sender's clock
         self._last: Sample | None = None
         self._off = 0.0  # how far stamps are off an even clock, on average [frames]
         self._pending: dict[int, Sample] = {}
@@ -203,12 +204,14 @@ class Sequencer:
         if self._base is None:
             self._base = number - self._next * stride
         place = round((number - self._base) / stride)
-        ours, theirs = self._passed(sample)
+        ours, _ = self._passed(sample)
         last = self._last
-        if theirs is not None and last is not None and last.number is not None:
-            counted = (number - last.number) / stride / rate_hz
-            if abs(theirs - counted) > JUMP_S and abs(counted) < FILLED_S:
-                self._say("clock", f"the sender's clock jumped by {theirs - counted:+.3f} s")
+        if sample.time_s is not None and number > self._newest[0]:
+            counted = (number - self._newest[0]) / stride / rate_hz
+            jump_s = sample.time_s - self._newest[1] - counted
+            if abs(jump_s) > JUMP_S and counted < FILLED_S:
+                self._say("clock", f"the sender's clock jumped by {jump_s:+.3f} s")
+            self._newest = number, sample.time_s
         ahead = place - self._next
         if -rate_hz <= ahead <= FILLED_S * rate_hz:
             self._fill_or_wait(place, sample)
@@ -221,6 +224,7 @@ class Sequencer:
             self._say("clock", f"the sender's numbers jumped from {since} to {number}")
             place = self._go_on(ours)
             self._base = number - place * stride
+            self._newest = number, sample.time_s if sample.time_s is not None else math.nan
         self._fill(place, sample)
 
     def _put_timed(self, sample: Sample, time_s: float) -> None:
