@@ -16,6 +16,7 @@ from . import (
     graph,
     hmm,
     inverse_kinematics,
+    live,
     memory,
     performing,
     segmentation,
@@ -33,6 +34,7 @@ TITLES = {
     generation: "Generation",
     performing: "Planning and performing",
     environment: "The environment",
+    live: "Live motion",
     memory: "Memory of a stream of ten hours",
     states: "A state, a checkpoint and a library, after one segment more",
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from mplearn.sources.protocols.own import UDPReceiver
 from mplearn.sources.sequencer import Sequencer
 
 HEADER_EACH = 50  # frames
+AT_ONCE = 20  # datagrams that a receiver takes
 STREAMS = {"named": 1, "renamed": 2, "shuffled": 3, "two": 4, "stranger": 9}
 
 
@@ -149,16 +151,18 @@ class _Received(Source):
 
     def read(self, timeout_s: float | None = None) -> list[Block | Change]:
         out: list[Block | Change] = []
-        for i, data in self._datagrams:
+        now_s = 0.0
+        for i, data in islice(self._datagrams, AT_ONCE):
             now_s = i / self._rate_hz
             self._receiver.take(data, (LOOPBACK, 1), now_s, self._inbox)
-            for item in self._inbox.take(0.0):
-                if isinstance(item, Sample):
-                    out += self._sequencer.take([item], now_s)
-                else:
-                    self.tally.unnamed += item.count
-                    out.append(Change(item.kind, item.text, now_s, item.count))
-            if out:
-                return out
-        self.close()
-        return self._sequencer.finish()
+        samples = []
+        for item in self._inbox.take(0.0):
+            if isinstance(item, Sample):
+                samples.append(item)
+            else:
+                self.tally.unnamed += item.count
+                out.append(Change(item.kind, item.text, now_s, item.count))
+        if not samples and not out:
+            self.close()
+            return self._sequencer.finish()
+        return out + self._sequencer.take(samples, now_s)
