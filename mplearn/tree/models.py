@@ -68,6 +68,8 @@ class GroupModels:
 
     def forget(self) -> None:
         """Let the models of nodes that are gone, or have changed, go."""
+        if not self._kept:
+            return
         held = {tuple(node.members) for node in self._structure.nodes.values()}
         self._kept = {key: model for key, model in self._kept.items() if key[0] in held}
 

@@ -75,10 +75,8 @@ def _leaf_of(structure: Structure, members: Sequence[int], limit: float) -> Node
     """
     bank = structure.memory.bank
     best, found = limit, None
-    for leaf in structure.nodes.values():
-        if leaf.id == ROOT or not leaf.is_leaf:
-            continue
-        far = 0.0
+    for id in structure.index.near(bank[members[0]], bank):
+        leaf, far = structure.nodes[id], 0.0
         for number in members:
             far = max(far, float(bank.distances(bank[number], leaf.members).max()))
             if far > best:
@@ -96,12 +94,13 @@ def forget_chances(structure: Structure, when: int) -> Change:
         when: Segments seen.
     """
     config = structure.config
-    leaves = [n for n in structure.nodes.values() if n.id != ROOT and n.is_leaf]
-    patience = max(config.patience, 4 * len(leaves))
+    nodes = structure.nodes.values()
+    young = [n for n in nodes if n.n_placed < config.confirmed and n.id != ROOT and n.is_leaf]
+    patience = max(config.patience, 4 * int(structure.index.leaves.sum()))
     change = Change()
-    for leaf in leaves:
+    for leaf in young:
         by_hand = leaf.whole or leaf.frozen or leaf.apart or len(leaf.history) > 1
-        if leaf.n_placed < config.confirmed and when - leaf.born_at > patience and not by_hand:
+        if when - leaf.born_at > patience and not by_hand:
             change = change.then(structure.remove(leaf, when, forget=True))
     return change
 

@@ -124,13 +124,13 @@ class NodeIndex:
         self._known[k] = (*facts, extent, slot)
         if self.members[k] != members:
             self.members[k] = list(members)
-            self._known["extent"][k] = bank.extents(members).mean()
+            self._known["extent"][k] = _mean_extents(bank, [members])[0]
             self._means.write(slot, (bank.mean_profile(members),))
 
     def remeasured(self, diameters: Mapping[int, float], bank: ExemplarBank) -> None:
         """Take note of nodes' new diameters, by id, and of the new models of their exemplars."""
         self._known["diameter"] = [diameters[id] for id in self.ids.tolist()]
-        self._known["extent"] = [bank.extents(members).mean() for members in self.members]
+        self._known["extent"] = _mean_extents(bank, self.members)
 
     def scale(self, but: int | None = None) -> float:
         """Return the median diameter of the leaves, but for one: how much executions vary.
@@ -182,18 +182,24 @@ class NodeIndex:
 
     def others(self, exemplar: Exemplar, bank: ExemplarBank, but: int) -> list[Match]:
         """Return the leaves that a segment is near to, best first, but for one of them."""
-        near = self._candidates(exemplar, bank) if self.config.n_candidates else self.leaves
-        places = np.arange(len(self.ids))[near]
-        return self._compare(exemplar, bank, places[self.ids[places] != but])
+        near = self._candidates(exemplar, bank)
+        return self._compare(exemplar, bank, near[self.ids[near] != but])
+
+    def near(self, exemplar: Exemplar, bank: ExemplarBank) -> list[int]:
+        """Return the ids of the leaves that a segment may belong to, in order."""
+        found: list[int] = self.ids[self._candidates(exemplar, bank)].tolist()
+        return found
 
     def _candidates(self, exemplar: Exemplar, bank: ExemplarBank) -> IntArray:
-        """Return the leaves nearest by mean trajectory."""
+        """Return the places of the leaves nearest by mean trajectory; of all if that is asked."""
+        if not self.config.n_candidates:
+            return np.flatnonzero(self.leaves)
         if len(self.ids) <= self.config.n_candidates:
             return np.arange(len(self.ids))
         profile, slots = bank.profile(exemplar), self._known["slot"]
-        nearness = np.empty(len(slots))
+        nearness, best = np.empty(len(slots)), np.full(self.config.n_candidates, np.inf)
         for (means,), rows, here in self._means.parted(slots):
-            nearness[here] = _squared_offsets(means, rows, profile)
+            nearness[here] = _squared_offsets(means, rows, profile, best)
         return np.sort(np.argsort(nearness, kind="stable")[: self.config.n_candidates])
 
     def _compare(self, exemplar: Exemplar, bank: ExemplarBank, places: IntArray) -> list[Match]:
@@ -261,20 +267,45 @@ def mean_nearest(distances: FloatArray, n_nearest: int) -> FloatArray:
     return np.asarray(np.sort(distances, axis=-1)[..., :n_nearest].mean(axis=-1))
 
 
+def _mean_extents(bank: ExemplarBank, groups: Sequence[Sequence[int]]) -> FloatArray:
+    """Return the mean extent of the exemplars of each group, shape (n,)."""
+    sizes = np.array([len(group) for group in groups], np.int64)
+    extents = bank.extents([number for group in groups for number in group])
+    return np.asarray(np.add.reduceat(extents, np.cumsum(sizes) - sizes) / sizes)
+
+
+_PART = 64  # values after which it is asked whether the sum is too large already
+
+
 @njit(cache=True)
-def _squared_offsets(means: FloatArray, rows: IntArray, profile: FloatArray) -> FloatArray:
-    """Return the squared distance of some means (n, F) to a profile (F,), shape (k,)."""
-    out = np.empty(len(rows))
+def _squared_offsets(
+    means: FloatArray, rows: IntArray, profile: FloatArray, best: FloatArray
+) -> FloatArray:
+    """Return the squared distance of some means (n, F) to a profile (F,), shape (k,).
+
+    It is inf for those that are not among the least: as many as ``best`` holds, which are the least
+    of former calls, in order, and then of this one as well.
+    """
+    out = np.full(len(rows), np.inf)
     n = len(profile)
     for k, row in enumerate(rows):
-        sums = np.zeros(4)  # four sums at once, in an order of their own
         mean = means[row]
-        for f in range(0, n - n % 4, 4):
-            sums[0] += (mean[f] - profile[f]) ** 2
-            sums[1] += (mean[f + 1] - profile[f + 1]) ** 2
-            sums[2] += (mean[f + 2] - profile[f + 2]) ** 2
-            sums[3] += (mean[f + 3] - profile[f + 3]) ** 2
-        for f in range(n - n % 4, n):
-            sums[0] += (mean[f] - profile[f]) ** 2
-        out[k] = sums.sum()
+        a = b = c = d = 0.0  # four sums at once, in an order of their own
+        for part in range(0, n, _PART):
+            end = min(part + _PART, n)
+            for f in range(part, end - 3, 4):
+                a += (mean[f] - profile[f]) ** 2
+                b += (mean[f + 1] - profile[f + 1]) ** 2
+                c += (mean[f + 2] - profile[f + 2]) ** 2
+                d += (mean[f + 3] - profile[f + 3]) ** 2
+            for f in range(end - (end - part) % 4, end):
+                a += (mean[f] - profile[f]) ** 2
+            if a + b + c + d > best[-1]:
+                break
+        else:
+            out[k] = total = a + b + c + d
+            place = np.searchsorted(best, total)
+            if place < len(best):
+                best[place + 1 :] = best[place:-1].copy()
+                best[place] = total
     return out
