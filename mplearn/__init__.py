@@ -32,6 +32,8 @@ _ROOMS = {
     "Segment": "recording",
 }
 
+__all__ = sorted(_ROOMS)
+
 
 def __getattr__(name: str) -> Any:
     if name not in _ROOMS:

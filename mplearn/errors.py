@@ -5,7 +5,16 @@ A message names the wrong value and the allowed ones.
 
 
 class MPLearnError(Exception):
-    """Base of every error that mplearn raises on purpose."""
+    """Base of every error that mplearn raises on purpose.
+
+    Example:
+        >>> from mplearn import LearnerConfig, MPLearnError
+        >>> try:
+        ...     LearnerConfig(("head_x",), rate_hz=7.0)
+        ... except MPLearnError as error:
+        ...     print(error)
+        rate_hz must lie in [20, 250], not 7.0
+    """
 
 
 class InvalidValueError(MPLearnError, ValueError):

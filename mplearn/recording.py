@@ -36,6 +36,10 @@ class Segment:
             posture comes back; ``"return"``, the posture comes back, whatever moves; ``"state"``,
             the density of the motion changes; ``"length"``, the segment was too long to go on;
             ``"end"``, that of the stream; empty where not known.
+
+    Example:
+        >>> Segment(100, 180, cause="rest").length_frames
+        80
     """
 
     start: int
@@ -66,6 +70,10 @@ class LabelledSegment:
         end: One past the last frame.
         label: Class of the motion.
         person: Who performs it; empty where unknown.
+
+    Example:
+        >>> LabelledSegment(0, 120, "squat", person="s01").label
+        'squat'
     """
 
     start: int
@@ -167,6 +175,12 @@ class Recording:
         skeleton: The joints whose angles or positions it holds; None for plain markers, and
             where angles come without their skeleton. Positions are its joints', in the same order.
         report: How its file was read; None where it comes from no file.
+
+    Example:
+        >>> import numpy as np
+        >>> take = Recording(np.zeros((200, 3)), 100.0, marker_channels(["head"]), name="still")
+        >>> len(take), take.channels, take.is_markers
+        (200, ('head.x', 'head.y', 'head.z'), True)
     """
 
     frames: FloatArray

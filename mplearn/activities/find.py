@@ -35,6 +35,14 @@ def find_activities(
 
     Raises:
         InvalidValueError: There are no frames, or their values or their rate are not finite.
+
+    Example:
+        >>> import numpy as np
+        >>> t = np.arange(6000) / 50.0
+        >>> arms, legs = np.sin(4 * t) * (t < 60), np.sin(5 * t) * (t >= 60)
+        >>> found = find_activities(np.stack((arms, legs), axis=1), 50.0)
+        >>> np.unique(found).tolist(), np.flatnonzero(np.diff(found)).tolist()
+        ([0, 1], [2999])
     """
     config = config or ActivityConfig()
     if frames.ndim != 2 or not len(frames) or np.isinf(frames).any():

@@ -57,6 +57,11 @@ def demonstrate(
     Raises:
         InvalidValueError: The script is empty, or names an unknown primitive or one that cannot
             follow its predecessor; the seed or the rate is not allowed.
+
+    Example:
+        >>> taught = demonstrate(["BAR", "BAL"], seed=1)
+        >>> taught.recording.is_markers, [each.label for each in taught.truth if each.label]
+        (True, ['BAR', 'BAL'])
     """
     names = tuple(script)
     check_script(names)

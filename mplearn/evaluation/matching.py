@@ -56,6 +56,13 @@ def match_segments(
 
     Raises:
         InvalidValueError: The rate is not positive, or the tolerance negative.
+
+    Example:
+        >>> from mplearn.recording import LabelledSegment, Segment
+        >>> truth = [LabelledSegment(0, 100, "wave"), LabelledSegment(100, 200, "bow")]
+        >>> matching = match_segments(truth, [Segment(3, 98), Segment(98, 150)], 100.0)
+        >>> matching.labels, matching.n_matched
+        (('wave', ''), 1)
     """
     if not rate_hz > 0 or not tolerance_s >= 0:
         raise InvalidValueError(

@@ -49,6 +49,17 @@ def generate(
 
     Raises:
         InvalidValueError: An argument is out of range, or lacks what its style needs.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.hmm import fit
+        >>> from mplearn.library import Primitive
+        >>> swing = np.sin(np.linspace(0, np.pi, 50))[:, None]
+        >>> model = fit([swing], n_states=6, variance_floor=1e-3)
+        >>> primitive = Primitive.from_exemplars(1, model, [swing], 50.0)
+        >>> twice = generate([primitive, primitive], ("elbow",), 50.0, style="smooth")
+        >>> twice.frames.shape[1], twice.path
+        (1, (1, 1))
     """
     if style not in STYLES:
         raise InvalidValueError(f"style must be one of {tuple(STYLES)}, not {style!r}")

@@ -38,6 +38,19 @@ def retime(
 
     Raises:
         InvalidValueError: A limit or the speed is not positive, or limits have the wrong shape.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.generation import generate
+        >>> from mplearn.hmm import fit
+        >>> from mplearn.library import Primitive
+        >>> swing = np.sin(np.linspace(0, np.pi, 50))[:, None]
+        >>> model = fit([swing], n_states=6, variance_floor=1e-3)
+        >>> primitive = Primitive.from_exemplars(1, model, [swing], 50.0)
+        >>> motion = generate([primitive], ("elbow",), 50.0)
+        >>> slow = retime(motion, velocity_limits=np.array([1.0]))
+        >>> slow.duration_s > motion.duration_s, bool(np.abs(slow.velocities).max() <= 1.0 + 1e-9)
+        (True, True)
     """
     if not (math.isfinite(speed) and speed > 0):
         raise InvalidValueError(f"speed must be positive and finite, not {speed}")

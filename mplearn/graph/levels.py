@@ -52,6 +52,17 @@ class LevelledGraph:
 
     Raises:
         InvalidValueError: A group lies in two groups of the next level.
+
+    Example:
+        >>> from mplearn.graph import TransitionGraph
+        >>> graph = TransitionGraph()
+        >>> for id in (1, 2, 3, 4):
+        ...     graph.add_node(id)
+        >>> for previous, next_id in ((1, 2), (2, 3), (3, 4)):
+        ...     graph.observe(previous, next_id, 1.0)
+        >>> groups = {1: 10, 2: 10, 3: 11, 4: 11}  # nodes of the tree above the primitives
+        >>> LevelledGraph(graph, [groups]).path(1, 4).nodes
+        (1, 2, 3, 4)
     """
 
     def __init__(self, graph: TransitionGraph, groups: Sequence[Mapping[int, int]]) -> None:

@@ -579,6 +579,18 @@ class MergedGraph:
         graph: The graph of chains, of order 1; a chain goes by its first primitive. Durations are
             from the start of a chain to the start of the next.
         chains: The primitives of each chain, by the first.
+
+    Example:
+        >>> graph = TransitionGraph()
+        >>> for id in (1, 2, 3):
+        ...     graph.add_node(id)
+        >>> for previous, next_id in ((1, 2), (2, 3), (3, 1), (3, 3)):  # 2 only ever follows 1
+        ...     graph.observe(previous, next_id, 1.0)
+        >>> merged = graph.merged()
+        >>> merged.chains
+        {1: (1, 2), 3: (3,)}
+        >>> merged.expand(merged.graph.path(3, 1))
+        (3, 1, 2)
     """
 
     whole: TransitionGraph

@@ -30,6 +30,14 @@ def distance(
 
     Returns:
         About 0 for equal models; +inf where a sequence is shorter than the other's states.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.hmm import fit
+        >>> swing = np.sin(np.linspace(0, np.pi, 40))[:, None]
+        >>> up, low = (fit([k * swing], n_states=4, variance_floor=1e-2) for k in (1.0, 0.5))
+        >>> distance(up, [swing], up, [swing]) == 0.0 < distance(up, [swing], low, [0.5 * swing])
+        True
     """
     directions = []
     for own, other, sequences, weights in (

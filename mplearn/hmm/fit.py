@@ -42,6 +42,15 @@ def fit(
         ModelError: A sequence has fewer frames than there are states, or a channel is never
             measured.
         InvalidValueError: ``n_states`` or ``n_steps`` is out of range.
+
+    Example:
+        >>> import numpy as np
+        >>> swing = [np.sin(np.linspace(0, np.pi, n))[:, None] for n in (40, 44, 48)]
+        >>> model = fit(swing, n_states=4, variance_floor=1e-3)
+        >>> model.means.round(1).ravel().tolist()
+        [0.3, 0.8, 0.9, 0.4]
+        >>> model.score(swing[0]) > model.score(-swing[0])
+        True
     """
     if n_states < 1 or n_steps < 0:
         raise InvalidValueError(f"n_states >= 1 and n_steps >= 0, not {n_states} and {n_steps}")

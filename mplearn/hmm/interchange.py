@@ -18,6 +18,15 @@ def to_hmmlearn(model: LeftRightHMM) -> Any:
 
     Raises:
         MissingDependencyError: hmmlearn is not installed.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.hmm import fit
+        >>> swing = np.sin(np.linspace(0, np.pi, 40))[:, None]
+        >>> model = fit([swing], n_states=4, variance_floor=1e-3)
+        >>> theirs = to_hmmlearn(model)
+        >>> bool(np.isclose(theirs.score(swing), model.score(swing, complete=False)))
+        True
     """
     try:
         from hmmlearn.hmm import GaussianHMM

@@ -47,6 +47,12 @@ class LearnerConfig:
             consecutive [s].
         false_alarms: Share of the motions, and of the transitions, like those learned that may be
             reported as an anomaly, in (0, 1). Before 1 / false_alarms were seen, none is.
+
+    Example:
+        >>> from mplearn.tree import TreeConfig
+        >>> config = LearnerConfig(("hip", "knee"), rate_hz=50.0, tree=TreeConfig(min_exemplars=3))
+        >>> LearnerConfig.from_dict(config.to_dict()) == config
+        True
     """
 
     channels: tuple[str, ...]

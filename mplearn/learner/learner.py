@@ -72,6 +72,21 @@ class MotionLearner:
         n_frames: Frames seen, of all streams.
         watching: Who is watched by which markers; None where channels are learned as they come.
         chain: The latest segments, and which followed which.
+
+    Example:
+        >>> import numpy as np
+        >>> t = np.arange(1200) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+        >>> for frame in swing:
+        ...     for event in learner.learn_one(frame):
+        ...         if isinstance(event, PrimitiveBorn):
+        ...             print(event.primitive, "is known from frame", event.segment.end)
+        1 is known from frame 250
+        2 is known from frame 300
+        >>> library = learner.snapshot()
+        >>> library.graph.n_transitions > 0
+        True
     """
 
     def __init__(self, config: LearnerConfig) -> None:

@@ -52,6 +52,24 @@ class PrimitiveLibrary:
 
     Raises:
         InvalidValueError: Ids, names or channels are not unique, or parts do not fit each other.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> from mplearn.learner import LearnerConfig, MotionLearner
+        >>> take = demonstrate(["BAR", "BAL"] * 6, seed=1, rate_hz=50.0).recording
+        >>> learner = MotionLearner(LearnerConfig(take.channels, take.rate_hz))
+        >>> events = [*learner.learn_recording(take), *learner.end_stream()]
+        >>> library = learner.snapshot()
+        >>> first, second = library.names
+        >>> library.graph.count(library[first].id, library[second].id) >= 2
+        True
+        >>> motion = library.generate([first, second])
+        >>> motion.frames.shape[1], motion.path == (library[first].id, library[second].id)
+        (33, True)
+        >>> library.save("two.mplearn").name
+        'two.mplearn'
+        >>> PrimitiveLibrary.load("two.mplearn").version == library.version
+        True
     """
 
     primitives: tuple[Primitive, ...]

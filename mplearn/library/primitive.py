@@ -33,6 +33,14 @@ class Primitive:
         kept: The kept demonstrations, compact.
         name: "P" and the id, until a person gives another.
         parent: Node of the tree above it; None where it hangs from the root.
+
+    Example:
+        >>> from mplearn.hmm import fit
+        >>> swing = np.sin(np.linspace(0, np.pi, 50))[:, None]
+        >>> model = fit([swing], n_states=6, variance_floor=1e-3)
+        >>> primitive = Primitive.from_exemplars(1, model, [swing], 50.0, name="swing")
+        >>> primitive.name, primitive.mean_duration_s
+        ('swing', 1.0)
     """
 
     id: int

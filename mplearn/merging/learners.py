@@ -30,6 +30,19 @@ def merge_learners(learners: Sequence[MotionLearner]) -> MotionLearner:
     Raises:
         InvalidValueError: There are no learners, or they have other configurations; bodies may be
             observed by other markers.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.learner import LearnerConfig, MotionLearner
+        >>> t = np.arange(1200) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]
+        >>> config = LearnerConfig(("elbow",), segmenter="zero-velocity")
+        >>> shards = [MotionLearner(config), MotionLearner(config)]
+        >>> for shard in shards:
+        ...     events = shard.learn_many(swing)
+        >>> merged = merge_learners(shards)
+        >>> len(merged.snapshot()), merged.n_frames
+        (2, 2400)
     """
     if not learners:
         raise InvalidValueError("at least one learner is needed to merge")

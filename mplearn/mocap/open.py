@@ -60,7 +60,7 @@ def open_recording(
     positions: bool = False,
     hints: Hints | None = None,
 ) -> Recording:
-    """Read one recording.
+    r"""Read one recording.
 
     Args:
         path: A file of any format that a reader is registered for, plain or gzipped, or a folder.
@@ -81,6 +81,14 @@ def open_recording(
         RecordingError: The path holds no recording, several takes and none is named, or a file does
             not hold what its format promises.
         InvalidValueError: A rate or a hint lies outside its range.
+
+    Example:
+        >>> from pathlib import Path
+        >>> rows = "".join(f"{k / 100},0.0,0.0,{1.7 + 0.001 * (k % 5)}\n" for k in range(50))
+        >>> _ = Path("walk.csv").write_text("time_s,head.x,head.y,head.z\n" + rows)
+        >>> take = open_recording("walk.csv", hints=Hints(unit_m=1.0, up_axis="z"))
+        >>> len(take), take.rate_hz, take.channels
+        (50, 100.0, ('head.x', 'head.y', 'head.z'))
     """
     takes = _takes(Path(path))
     if take is None and len(takes) > 1:
@@ -101,7 +109,7 @@ def open_recordings(
     hints: Hints | None = None,
     strict: bool = False,
 ) -> tuple[Recording, ...]:
-    """Read all takes of a folder, in order of their names, or one file.
+    r"""Read all takes of a folder, in order of their names, or one file.
 
     A take of several people becomes one for each (`each_person`).
 
@@ -112,6 +120,15 @@ def open_recordings(
         hints: What the files do not say about themselves.
         strict: Whether a take that cannot be read is an error; otherwise it is left out, with a
             `RecordingWarning`, as long as another one can be read.
+
+    Example:
+        >>> from pathlib import Path
+        >>> rows = "".join(f"{k / 50},{0.01 * k}\n" for k in range(100))
+        >>> Path("takes").mkdir(exist_ok=True)
+        >>> for take in ("one", "two"):
+        ...     _ = Path(f"takes/{take}.csv").write_text("time_s,elbow\n" + rows)
+        >>> [recording.name for recording in open_recordings("takes")]
+        ['one', 'two']
     """
     takes = open_takes(path, rate_hz=rate_hz, positions=positions, hints=hints, strict=strict)
     for error in takes.unreadable.values():

@@ -46,6 +46,21 @@ class PeopleTree:
 
     Attributes:
         n_seen: Segments seen, of all people.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.tree import TreeConfig
+        >>> t = np.linspace(0, 1, 50)
+        >>> shapes = [(np.sin(np.pi * t), k * t * (1 - t)) for k in (-4.0, 4.0, 12.0)]
+        >>> kinds = [np.stack(shape, axis=1) for shape in shapes]
+        >>> rng = np.random.default_rng(0)
+        >>> tree = PeopleTree(TreeConfig(), 2, 100.0)
+        >>> for person in (0, 1):
+        ...     for _ in range(4):
+        ...         for kind in kinds:
+        ...             placed = tree.insert(kind + rng.normal(0, 0.01, kind.shape), person)
+        >>> tree.people, len(tree.leaves)
+        ((0, 1), 3)
     """
 
     def __init__(

@@ -36,6 +36,16 @@ class Segmenter(ABC):
 
     Every frame belongs to exactly one segment: segments follow each other without gap or overlap,
     starting at frame 0. Pauses are segments with ``still=True``.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.segmentation import make_segmenter
+        >>> t = np.arange(600) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)
+        >>> segmenter = make_segmenter("zero-velocity", 1, 100.0)
+        >>> segments = segmenter.segment(swing[:, None])
+        >>> [(s.start, s.end, s.still) for s in segments[:3]]  # up, down, a rest
+        [(0, 50, False), (50, 100, False), (100, 201, True)]
     """
 
     @abstractmethod

@@ -61,6 +61,7 @@ def open_source(
 
     Example:
         >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.sources import Block
         >>> learner = None
         >>> with open_source("demonstrator:7", speed=float("inf")) as source:
         ...     for item in source:

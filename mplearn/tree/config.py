@@ -117,6 +117,13 @@ class TreeConfig:
         max_unplaced: Segments that wait in the root.
         n_sampled: Segments, of all ever seen, that mu and sigma are taken over.
         seed: Seed of the choice of those.
+
+    Example:
+        >>> from dataclasses import replace
+        >>> replace(TreeConfig(), min_exemplars=4).min_exemplars
+        4
+        >>> TreeConfig.printed().distance
+        'monte_carlo'
     """
 
     normalisation: NormalisationConfig = field(default_factory=NormalisationConfig)

@@ -140,6 +140,21 @@ class PrimitiveTree:
 
     Raises:
         InvalidValueError: A value is out of range.
+
+    Example:
+        >>> import numpy as np
+        >>> t = np.linspace(0, 1, 50)
+        >>> shapes = [(np.sin(np.pi * t), k * t * (1 - t)) for k in (-4.0, 4.0, 12.0)]
+        >>> kinds = [np.stack(shape, axis=1) for shape in shapes]
+        >>> rng = np.random.default_rng(0)
+        >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+        >>> for _ in range(4):
+        ...     for kind in kinds:
+        ...         placement = tree.insert(kind + rng.normal(0, 0.01, kind.shape))
+        >>> len(tree.leaves), placement.recognised
+        (3, True)
+        >>> tree.recogniser().recognise(kinds[0]).primitive == tree.leaves[0]
+        True
     """
 
     def __init__(

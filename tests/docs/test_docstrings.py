@@ -27,5 +27,39 @@ def test_examples_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert not failed
 
 
+PUBLIC = {  # beside all of `mplearn.__all__`: what a user of each room starts from
+    "mplearn.activities": ["find_activities"],
+    "mplearn.baselines": ["minimum_error_split"],
+    "mplearn.body": [
+        *("human_body", "robot_body", "marker_set", "KinematicTree", "InverseKinematics"),
+        *("MotionObserver", "features_of", "keypoints_of"),
+    ],
+    "mplearn.demonstrator": ["demonstrate"],
+    "mplearn.evaluation": ["match_segments", "content_of"],
+    "mplearn.generation": ["generate", "retime"],
+    "mplearn.graph": ["TransitionGraph", "MergedGraph", "LevelledGraph"],
+    "mplearn.hmm": ["fit", "fit_factorial", "fit_semi_markov", "distance", "to_hmmlearn"],
+    "mplearn.library": ["Primitive", "PrimitiveLibrary"],
+    "mplearn.learner": ["MotionLearner", "LearnerConfig"],
+    "mplearn.merging": ["merge_learners", "merge_graphs"],
+    "mplearn.people": ["PeopleTree"],
+    "mplearn.segmentation": ["Segmenter"],
+    "mplearn.sources": ["open_source"],
+    "mplearn.state": ["checkpoint", "newer", "saved_as"],
+    "mplearn.store": ["LifelongLearner"],
+    "mplearn.tree": ["PrimitiveTree", "TreeConfig"],
+    "mplearn_envs.environment.primitive_humanoid": ["PrimitiveHumanoidEnv"],
+}
+
+
+@pytest.mark.parametrize(
+    ("room", "name"),
+    [("mplearn", name) for name in mplearn.__all__]
+    + [(room, name) for room, names in PUBLIC.items() for name in names],
+)
+def test_what_a_user_starts_from_has_an_example(room: str, name: str) -> None:
+    assert ">>> " in (getattr(importlib.import_module(room), name).__doc__ or "")
+
+
 def test_the_ground_floor_has_examples() -> None:
     assert "mplearn.maths.rotations" in MODULES

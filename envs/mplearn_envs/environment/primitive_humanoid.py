@@ -167,6 +167,17 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
     ## Versions
 
     * v0: first.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0")
+        >>> observation, info = env.reset(seed=0)
+        >>> action = int(info["action_mask"].nonzero()[0][1])  # 0 is hold
+        >>> observation, reward, terminated, truncated, info = env.step(action)
+        >>> terminated, info["primitive"] > 0
+        (False, True)
+        >>> env.close()
     """
 
     def __init__(

@@ -111,6 +111,17 @@ class InverseKinematics:
 
     Raises:
         BodyError: The markers belong to no known set, or do not fit the body.
+
+    Example:
+        >>> from mplearn.body import robot_body
+        >>> from mplearn.demonstrator import demonstrate
+        >>> take = demonstrate(["BAR", "BAL"], seed=1).recording
+        >>> ik = InverseKinematics(robot_body(), take.marker_names, rate_hz=take.rate_hz)
+        >>> markers = take.markers  # (T, M, 3)
+        >>> calibration = ik.calibrate(markers[:80])
+        >>> postures = ik.update_many(markers)
+        >>> len(postures) == len(take), bool(np.nanmedian(ik.residual_m) < 0.02)
+        (True, True)
     """
 
     def __init__(

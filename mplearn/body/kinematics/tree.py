@@ -44,6 +44,13 @@ class KinematicTree:
         site_names: Names of the S sites.
         site_body: Body of each site, shape (S,).
         site_offset: Sites in their body's frame, shape (S, 3) [m].
+
+    Example:
+        >>> from mplearn.body import human_body
+        >>> tree = human_body().tree
+        >>> position, rotation = tree.forward(tree.rest)
+        >>> position.shape, rotation.shape
+        ((20, 3), (20, 3, 3))
     """
 
     body_names: tuple[str, ...]

@@ -139,6 +139,10 @@ def marker_set(name: str) -> MarkerSet:
 
     Raises:
         BodyError: There is none of that name.
+
+    Example:
+        >>> len(marker_set("plug_in_gait39").names)
+        39
     """
     if name not in TABLES:
         raise BodyError(f"no marker set {name!r}; there are {', '.join(TABLES)}")

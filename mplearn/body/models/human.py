@@ -41,6 +41,11 @@ def human_body(height_m: float = 1.75, proportions: Mapping[str, float] | None =
 
     Raises:
         BodyError: The stature or a factor is out of range, or a proportion has an unknown name.
+
+    Example:
+        >>> body = human_body(1.60)
+        >>> len(body.joint_names), body.joint_names[:2]
+        (40, ('lumbar_pitch', 'lumbar_roll'))
     """
     if not 0.5 < height_m < 2.6:
         raise BodyError(f"height_m must lie in (0.5, 2.6) m, not {height_m}")

@@ -140,6 +140,14 @@ class MotionObserver:
 
     Raises:
         BodyError: The markers belong to no known set.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> take = demonstrate(["BAR", "BAL"], seed=1).recording
+        >>> observer = MotionObserver(take.marker_names, take.rate_hz)
+        >>> features = observer.observe(take.frames)
+        >>> features.shape[1] == len(observer.channels)
+        True
     """
 
     def __init__(

@@ -36,6 +36,12 @@ def features_of(q: FloatArray, body: Body | None = None) -> FloatArray:
 
     Returns:
         Height [m], roll and pitch [rad], driven joint angles [rad], shape (..., 3 + driven).
+
+    Example:
+        >>> from mplearn.body import robot_body
+        >>> features = features_of(robot_body().rest[None])
+        >>> features.shape, feature_channels()[:3]
+        ((1, 33), ('base_height', 'base_roll', 'base_pitch'))
     """
     body = body or robot_body()
     if q.shape[-1] != body.nq:

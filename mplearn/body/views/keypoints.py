@@ -54,6 +54,11 @@ def keypoints_of(features: FloatArray, body: Body | None = None) -> FloatArray:
 
     Raises:
         BodyError: The features are not this body's.
+
+    Example:
+        >>> from mplearn.body import features_of, robot_body
+        >>> keypoints_of(features_of(robot_body().rest[None])).shape, len(keypoint_channels())
+        ((1, 46), 46)
     """
     body = body or robot_body()
     features = np.ascontiguousarray(features, dtype=np.float64)

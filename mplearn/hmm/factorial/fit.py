@@ -46,6 +46,14 @@ def fit_factorial(
         ModelError: A sequence has fewer frames than there are states, or a channel is never
             measured.
         InvalidValueError: There is no chain, or a number is out of range.
+
+    Example:
+        >>> import numpy as np
+        >>> t = np.linspace(0, 1, 60)
+        >>> two = np.stack((np.sin(np.pi * t), np.sin(3 * np.pi * t)), axis=1)
+        >>> model = fit_factorial([two], (3, 4), variance_floor=1e-3)
+        >>> [chain.n_states for chain in model.chains], model.mean_motion().shape[1]
+        ([3, 4], 2)
     """
     if not len(sizes):
         raise InvalidValueError("sizes must name at least one chain")

@@ -154,6 +154,13 @@ def fit_semi_markov(
     Raises:
         ModelError: As in `fit`.
         InvalidValueError: ``n_states``, ``n_steps`` or ``duration_spread`` is out of range.
+
+    Example:
+        >>> import numpy as np
+        >>> swing = [np.sin(np.linspace(0, np.pi, n))[:, None] for n in (40, 44, 48)]
+        >>> model = fit_semi_markov(swing, n_states=4, variance_floor=1e-3)
+        >>> float(model.durations_frames.sum().round(6))
+        44.0
     """
     if not duration_spread >= 0:
         raise InvalidValueError(f"duration_spread must be at least 0, not {duration_spread}")
