@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import InvalidValueError, RecordingError
 
-from .event_lines import change_json, change_text, event_json, event_text
 from .interrupts import asked_to_stop
-from .learning import why_nothing
 from .reading import hints_of, printable
 
 if TYPE_CHECKING:
@@ -24,16 +22,17 @@ if TYPE_CHECKING:
     from mplearn.sources import Block, Source
     from mplearn.store import LifelongLearner
 
+SOURCES = (  # `source_kinds` would tell, but takes a second to import
+    "recording:FILE, demonstrator[:SEED], udp:[HOST:]PORT, ndjson:[HOST:]PORT, ndjson:-, lsl:NAME, "
+    "qtm:HOST, natnet:HOST, vmc:[HOST:]PORT, xsens:[HOST:]PORT"
+)
 _WAIT_S = 0.2  # a wish to stop is heard so soon
 
 
 def add_live_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what learning from a live source takes."""
-    from mplearn.sources import source_kinds
-
     group = parser.add_argument_group("live motion, instead of recordings")
-    kinds = "; ".join(text.rstrip(".") for text in source_kinds().values())
-    group.add_argument("--live", metavar="SOURCE", help=f"what to learn from: {kinds}")
+    group.add_argument("--live", metavar="SOURCE", help=f"what to learn from: {SOURCES}")
     group.add_argument(
         "--speed",
         type=float,
@@ -153,6 +152,8 @@ def learn_live(
     from mplearn.sources import Change
     from mplearn.store import LifelongLearner
 
+    from .event_lines import change_json, change_text, event_json, event_text
+
     log = LiveLog()
 
     def tell(events: list[Event], arrived_s: float, rate_hz: float) -> None:
@@ -215,6 +216,7 @@ def _report(
     console: Any, args: argparse.Namespace, source: Source, log: LiveLog, *, stopped: bool
 ) -> None:
     """Write the library, and say what came of it all."""
+    from .learning import why_nothing
     from .tables import primitive_table
 
     faults = source.tally.faults()

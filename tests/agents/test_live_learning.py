@@ -15,12 +15,12 @@ import pytest
 from mplearn.demonstrator import demonstrate
 from mplearn.learner import LearnerConfig, MotionLearner
 from mplearn.library import PrimitiveLibrary
-from mplearn.sources import Block, Change, Source, Stream, Tally
+from mplearn.sources import Block, Change, Source, Stream, Tally, source_kinds
 from mplearn.sources.played import PlayedSource
 from mplearn_agents.cli import main
 from mplearn_agents.event_lines import change_text
 from mplearn_agents.interrupts import asked_to_stop
-from mplearn_agents.live_learning import learn_live
+from mplearn_agents.live_learning import SOURCES, learn_live
 
 ENV = {**os.environ, "NO_COLOR": "1", "COLUMNS": "120"}
 RUN = [sys.executable, "-m", "mplearn_agents.cli"]
@@ -115,6 +115,15 @@ def test_bad_input_is_refused(
 ) -> None:
     assert main(["learn", "--out", str(tmp_path / "x"), *more]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_the_help_names_all_sources_and_imports_none() -> None:
+    assert {each.partition(":")[0].partition("[")[0] for each in SOURCES.split(", ")} == {
+        kind for kind in source_kinds() if kind != "mine"
+    }
+    code = "import sys; from mplearn_agents import cli; cli._parser(); "
+    code += "sys.exit('mplearn.sources' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], env=ENV).returncode == 0
 
 
 def test_nowhere_to_send_is_refused(take: Path, capsys: pytest.CaptureFixture[str]) -> None:
