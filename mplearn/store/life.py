@@ -269,7 +269,7 @@ class LifelongLearner:
         self._record(entry)
         return entry
 
-    def undo(self, by: str = "", number: int | None = None) -> Entry:
+    def undo(self, by: str = "", number: int | None = None, when: float | None = None) -> Entry:
         """Undo a command; the last that was done, where none is named.
 
         Primitives that are gone by it come back with ids, names, exemplars and counts; what was
@@ -278,20 +278,21 @@ class LifelongLearner:
         Args:
             by: Who asks.
             number: The command, one of the last hundred.
+            when: Clock time [s since 1970]; now, where not given.
 
         Raises:
             InvalidValueError: It cannot be undone: it is too long ago, undone already, or later
                 ones build on it; the message names them.
         """
-        return self.execute(Undo(self._chosen(number, undone=False)), by)
+        return self.execute(Undo(self._chosen(number, undone=False)), by, when)
 
-    def redo(self, by: str = "", number: int | None = None) -> Entry:
+    def redo(self, by: str = "", number: int | None = None, when: float | None = None) -> Entry:
         """Do a command again that was undone; the last, where none is named.
 
         Raises:
             InvalidValueError: It cannot be done again; see `undo`.
         """
-        return self.execute(Redo(self._chosen(number, undone=True)), by)
+        return self.execute(Redo(self._chosen(number, undone=True)), by, when)
 
     # ---- looking
 

@@ -195,6 +195,7 @@ class Store:
         if writer is not None:
             if state is not None:
                 writer.put_checkpoint(self._seq, state)
+            writer.retry()
             done = writer.flush(_CLOSE_S)
             writer.close(_CLOSE_S)
             problem = None if done else writer.problem

@@ -99,6 +99,12 @@ class Writer:
             self._wake.wait_for(lambda: self._is_done() or self.problem is not None, timeout_s)
             return self._is_done()
 
+    def retry(self) -> None:
+        """Try now to write what could not be written."""
+        with self._wake:
+            self.problem = None
+            self._wake.notify_all()
+
     @property
     def n_waiting(self) -> int:
         """Records that are not written yet."""
@@ -135,7 +141,7 @@ class Writer:
             if error is not None:
                 if self._next is not None:
                     self._forget_before(self._next[0])
-                self._wake.wait_for(lambda: self._ends, _RETRY_S)
+                self._wake.wait_for(lambda: self._ends or self.problem is None, _RETRY_S)
 
     def _is_done(self) -> bool:
         return not (self._rows or self._next or self._busy)
@@ -177,7 +183,8 @@ class Writer:
         with _transaction(self._connection):
             write_checkpoint(self._connection, seq, time.time(), made)
             self._connection.execute("DELETE FROM log WHERE seq <= ?", (kept[0],))
-            self._connection.execute("DELETE FROM checkpoint WHERE seq < ?", (kept[0],))
+            marks = ", ".join("?" * len(kept))
+            self._connection.execute(f"DELETE FROM checkpoint WHERE seq NOT IN ({marks})", kept)
         with self._wake:
             if self._next is not None and self._next[0] == seq:
                 self._next = None
