@@ -39,6 +39,12 @@ def add_live_arguments(parser: argparse.ArgumentParser) -> None:
         help="times as fast as in time, for a recording and the demonstrator; inf: as fast as "
         "it is learned",
     )
+    group.add_argument(
+        "--record",
+        type=Path,
+        metavar="XDF",
+        help="also write what comes to this file",
+    )
     group.add_argument("--seconds", type=float, help="stop after so much of the stream [s]")
     group.add_argument(
         "--json",
@@ -101,6 +107,7 @@ def learn_from_source(
             hints=hints_of(args),
             names=None if args.map is None else read_map(args.map),
             at_hz=args.rate_hz or (learnable_rate if life is None else _rate_of(life)),
+            record=args.record,
             **({} if args.speed is None else {"speed": args.speed}),
         )
         with source:

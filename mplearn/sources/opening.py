@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 from ..mocap import Hints
@@ -15,6 +17,7 @@ from .protocols.vmc import open_vmc
 from .protocols.xsens import open_xsens
 from .rate import ResampledSource
 from .recognised import RecognisedSource
+from .recorded import RecordedSource
 from .registry import Observe, Wanted, connect, register_source
 from .source import Source
 
@@ -36,6 +39,7 @@ def open_source(
     hints: Hints | None = None,
     names: Mapping[str, str] | None = None,
     at_hz: float | Callable[[float], float] | None = None,
+    record: str | os.PathLike[str] | None = None,
     **options: Any,
 ) -> Source:
     """Open a live source: what it yields can be learned as it comes.
@@ -48,6 +52,7 @@ def open_source(
         names: Place of the body by marker or joint, for what is known better.
         at_hz: Frames per second of what is yielded [1/s], or what gives it for the stream's own
             rate, as `mplearn.learner.learnable_rate`; the stream's own where None.
+        record: XDF file to write what comes to, as it comes.
         options: Of the source, as ``speed=2.0`` for a recording.
 
     Returns:
@@ -76,5 +81,16 @@ def open_source(
         ('LFHD.x', 100.0)
     """
     wanted = Wanted(observe, hints or Hints(), names)
-    source = RecognisedSource(connect(name, wanted, **options), wanted)
+    raw = connect(name, wanted, **options)
+    if record is not None:
+        raw = _recorded(raw, Path(record))
+    source = RecognisedSource(raw, wanted)
     return source if at_hz is None else ResampledSource(source, at_hz)
+
+
+def _recorded(source: Source, path: Path) -> Source:
+    try:
+        return RecordedSource(source, path)
+    except BaseException:
+        source.close()
+        raise
