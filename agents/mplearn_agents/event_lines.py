@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import math
-from dataclasses import fields, is_dataclass
-from typing import Any
+from dataclasses import fields
 
 from mplearn.learner import (
     Anomaly,
@@ -21,6 +19,7 @@ from mplearn.learner import (
     Recognised,
     SegmentClosed,
     TransitionSeen,
+    plain_event,
 )
 from mplearn.recording import Segment
 from mplearn.sources import Change
@@ -84,11 +83,7 @@ def change_text(change: Change) -> str:
 
 def event_json(event: Event, rate_hz: float) -> str:
     """Return an event as a JSON object: its name, its time [s], and its fields as they are."""
-    end = getattr(event, "frame", None)
-    if end is None:
-        end = event.end if isinstance(event, FramesLost) else event.segment.end  # type: ignore[union-attr]
-    plain = {field.name: _plain(getattr(event, field.name)) for field in fields(event)}
-    return json.dumps({"event": type(event).__name__, "time_s": end / rate_hz, **plain})
+    return json.dumps(plain_event(event, rate_hz))
 
 
 def change_json(change: Change) -> str:
@@ -103,15 +98,3 @@ def _line(frame: int, rate_hz: float, text: str) -> str:
 
 def _length(segment: Segment, rate_hz: float) -> str:
     return f"{segment.length_frames / rate_hz:.2f} s"
-
-
-def _plain(value: Any) -> Any:
-    if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
-    if isinstance(value, tuple | list):
-        return [_plain(each) for each in value]
-    if hasattr(value, "item"):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

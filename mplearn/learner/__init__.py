@@ -15,6 +15,7 @@ from .events import PrimitiveSplit as PrimitiveSplit
 from .events import Recognised as Recognised
 from .events import SegmentClosed as SegmentClosed
 from .events import TransitionSeen as TransitionSeen
+from .events import plain_event as plain_event
 from .foresight import NextMotion as NextMotion
 from .learner import MotionLearner as MotionLearner
 from .learner_state import LearnerState as LearnerState

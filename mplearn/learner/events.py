@@ -6,8 +6,11 @@ goes on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, TypeAlias
+import math
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
 
 from ..recording import Segment
 from ..tree import Placement
@@ -213,3 +216,40 @@ Event: TypeAlias = (
     | FramesLost
     | AxesChanged
 )
+
+
+def plain_event(event: Event, rate_hz: float) -> dict[str, Any]:
+    """Return an event as plain values, which JSON can hold.
+
+    Args:
+        event: What a learner said.
+        rate_hz: Frames per second of its stream [1/s].
+
+    Returns:
+        ``"event"``, its kind; ``"time_s"``, when it was said to be, since the learner's first frame
+        [s]; and its fields by name. What is not finite, as the distance where nothing is known, is
+        None.
+
+    Example:
+        >>> plain_event(Recognised(Segment(0, 80, cause="rest"), 3, 0.25), 100.0)["time_s"]
+        0.8
+    """
+    if isinstance(event, PersonChanged | AxesChanged):
+        frame = event.frame
+    else:
+        frame = event.end if isinstance(event, FramesLost) else event.segment.end
+    plain = {each.name: _plain(getattr(event, each.name)) for each in fields(event)}
+    return {"event": type(event).__name__, "time_s": frame / rate_hz, **plain}
+
+
+def _plain(value: Any) -> Any:
+    if is_dataclass(value) and not isinstance(value, type):
+        return {each.name: _plain(getattr(value, each.name)) for each in fields(value)}
+    if isinstance(value, tuple):
+        named = getattr(value, "_asdict", None)
+        if named is not None:
+            return {name: _plain(each) for name, each in named().items()}
+        return [_plain(each) for each in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

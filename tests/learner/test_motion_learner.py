@@ -1,4 +1,5 @@
 import hashlib
+import json
 import subprocess
 import sys
 from collections import Counter
@@ -12,7 +13,14 @@ from hypothesis import strategies as st
 from mplearn import LearnerConfig, MotionLearner, PrimitiveLibrary, Recording
 from mplearn.demonstrator import Demonstration
 from mplearn.errors import FrameError, InvalidValueError
-from mplearn.learner import Event, PrimitiveBorn, Recognised, SegmentClosed, TransitionSeen
+from mplearn.learner import (
+    Event,
+    PrimitiveBorn,
+    Recognised,
+    SegmentClosed,
+    TransitionSeen,
+    plain_event,
+)
 from mplearn.recording import Segment, marker_channels
 from mplearn.state import checkpoint
 from mplearn.tree import TreeConfig
@@ -286,3 +294,14 @@ def test_looking_changes_nothing_that_is_seen_later(four: Demonstration) -> None
     resumed = MotionLearner.from_state(watched.state())
     assert watched.snapshot().version == plain.snapshot().version
     assert resumed.snapshot().version == plain.snapshot().version
+
+
+def test_every_event_is_plain_values_at_a_time(learned: tuple[MotionLearner, list[Event]]) -> None:
+    learner, events = learned
+    rate_hz = learner.config.rate_hz
+    plain = [json.loads(json.dumps(plain_event(e, rate_hz), allow_nan=False)) for e in events]
+    assert [each["event"] for each in plain] == [type(event).__name__ for event in events]
+    assert all(0 < each["time_s"] <= learner.n_frames / rate_hz for each in plain)
+    closed = next(each for each in plain if each["event"] == "SegmentClosed" and each["placement"])
+    assert closed["placement"]["distance"] is None  # the first: nothing was known
+    assert closed["segment"]["end"] == pytest.approx(closed["time_s"] * rate_hz)
