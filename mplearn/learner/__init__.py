@@ -21,4 +21,5 @@ from .learner import MotionLearner as MotionLearner
 from .learner_state import LearnerState as LearnerState
 from .reversal import Known as Known
 from .reversal import LearnerEdit as LearnerEdit
+from .shown_once import with_takes as with_takes
 from .watching import Watching as Watching

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from ..body import View
+from ..hmm import fit
 from ..library import Primitive, PrimitiveLibrary, TreeNode
 from ..people import PeopleTree
+from ..recording import FloatArray
 from ..tree import ROOT
 from .chain import Chain
 from .snapshot import read_model
 
 FIRST_ID = 1 << 30  # of a motion shown once: far from those of the tree, which are for life
+POSTURE_S = 2.0  # of a take in which nothing moves that are kept
+N_STATES = 8
+STILL_VARIANCE = 1e-6  # least variance of a model of what does not move [m^2, rad^2]
 
 
 def with_shown_once(
@@ -58,3 +64,29 @@ def with_shown_once(
         graph=graph,
         tree=(*library.tree, *(TreeNode(each.id, ROOT, 1) for each in once)),
     )
+
+
+def with_takes(library: PrimitiveLibrary, takes: Sequence[FloatArray]) -> PrimitiveLibrary:
+    """Return a library that also holds takes as they came, of which a learner made no motion.
+
+    Of a take in which nothing moves the first seconds are enough: they show its posture.
+
+    Args:
+        library: What is known.
+        takes: In the library's channels, shape (T, D) each.
+    """
+    longest = round(POSTURE_S * library.rate_hz)
+    pieces = [frames[:longest] for frames in takes if len(frames)]
+    once = tuple(
+        Primitive.from_exemplars(
+            FIRST_ID + number,
+            fit([frames], min(N_STATES, len(frames)), variance_floor=STILL_VARIANCE),
+            [frames],
+            library.rate_hz,
+            name=f"once-{number}",
+            parent=ROOT,
+        )
+        for number, frames in enumerate(pieces)
+    )
+    nodes = tuple(TreeNode(each.id, ROOT, 1) for each in once)
+    return replace(library, primitives=(*library.primitives, *once), tree=(*library.tree, *nodes))

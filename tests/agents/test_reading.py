@@ -161,3 +161,19 @@ def test_what_was_shown_once_is_kept_to_be_performed_and_said(
     assert "2 primitives" in capsys.readouterr().out
     assert main(["learn", str(take), "--out", str(out), "--demonstrations", "0"]) == 2
     assert "--demonstrations must be at least 1, not 0" in capsys.readouterr().err
+
+
+def test_a_take_in_which_nothing_moves_is_kept_as_its_posture(
+    motion: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "library.mplearn"
+    frames = np.repeat(motion.frames[20:21], 150, axis=0)
+    take = write(tmp_path / "take.csv", replace(motion, frames=frames, labels=()))
+    assert main(["learn", str(take), "--out", str(out)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "1 takes in which nothing moved are in the library" in said
+    library = PrimitiveLibrary.load(out)
+    assert [each.n_exemplars for each in library.primitives] == [1]
+    assert library.primitives[0].mean_duration_s == pytest.approx(2.0)
+    assert library.recognise(library.primitives[0].exemplars[0]).primitive is None
+    assert main(["perform", str(out), "--steps", "1", "--dynamics", "kinematic"]) == 0

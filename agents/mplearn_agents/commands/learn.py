@@ -94,7 +94,8 @@ def run(args: argparse.Namespace) -> None:
 def _learn_from_files(args: argparse.Namespace) -> None:
     from rich.console import Console
 
-    from mplearn.learner import LearnerConfig
+    from mplearn.evaluation import observe
+    from mplearn.learner import LearnerConfig, with_takes
     from mplearn.mocap import command_line, open_takes
     from mplearn.store import LifelongLearner, is_begun
     from mplearn_agents.learning import learn, why_nothing
@@ -131,6 +132,8 @@ def _learn_from_files(args: argparse.Namespace) -> None:
         n_known = len(learner.tree.leaves)
         if not len(library):
             library = life.snapshot(shown_once=True)
+        if not len(library) and not log.stopped:
+            library = with_takes(library, [observe(each).frames for each in recordings])
     if args.out is not None:
         args.out.parent.mkdir(parents=True, exist_ok=True)
         library.save(args.out)
@@ -151,7 +154,12 @@ def _learn_from_files(args: argparse.Namespace) -> None:
         )
     if not n_known:
         console.print(why_nothing(learner, len(log.moving), log.watched_s))
-    if len(library) > n_known:
+    if len(library) and not log.moving and not log.already:
+        console.print(
+            f"{len(library)} takes in which nothing moved are in the library, named once-...: "
+            "their postures can be performed, and are recognised as nothing."
+        )
+    elif len(library) > n_known:
         console.print(
             f"{len(library) - n_known} motions that were shown once are in the library as they "
             "came, named once-...: they can be performed, and are recognised as nothing."
