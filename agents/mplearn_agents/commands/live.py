@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from mplearn.extras import require
 from mplearn_agents.reading import printable
@@ -17,6 +18,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         default="demonstrator",
         help="where motion comes from: demonstrator (default), recording:FILE, lsl:NAME, ...",
+    )
+    parser.add_argument(
+        "--store",
+        type=Path,
+        metavar="FILE",
+        help="keep all that is learned in this file, and go on from it the next time",
     )
     parser.add_argument("--speed", type=float, help="times as fast, of a source that is played")
     parser.add_argument(
@@ -46,7 +53,7 @@ def run(args: argparse.Namespace) -> None:
         print(f"open {printable(url)}   (Ctrl-C ends it)", flush=True)
 
     serve(
-        Watch(args.source, args.observe, args.speed),
+        Watch(args.source, args.observe, args.speed, str(args.store or "")),
         host=args.host,
         port=args.port,
         token=args.token,

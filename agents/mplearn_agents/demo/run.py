@@ -96,6 +96,7 @@ def run_demo(out: Path, minutes: float, steps: int, seed: int, console: Console)
     for table in tables(page):
         console.print(table)
     console.print(f"[bold]report[/]   {report}, after {time.perf_counter() - begin:.0f} s")
+    console.print("[bold]next[/]     watch it learn, and teach it, in the browser: mplearn live")
     return report
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,10 +21,8 @@ if TYPE_CHECKING:
 SMALLEST_M = 0.012  # shapes with a smaller radius (fingers' details) are not worth their drawing
 _SEEN_GROUPS = 3  # geoms from this group on are for contact, not to be seen
 _KINDS = {2: "sphere", 3: "capsule", 4: "ellipsoid", 5: "cylinder", 6: "box"}
-#: The robot's joints whose names differ from the human's.
-_HUMAN_NAMES = {"waist_yaw": "lumbar_yaw", "wrist_yaw_l": "forearm_yaw_l"} | {
-    "wrist_yaw_r": "forearm_yaw_r"
-}
+#: Bodies of the human that the robot lacks, and which of its turn as they do.
+_LIKE = {"abdomen": "pelvis", "clavicle_l": "chest", "clavicle_r": "chest"}
 
 
 def shapes_of(model: mujoco.MjModel) -> list[dict[str, Any]]:
@@ -73,41 +70,37 @@ def has_figure(channels: Sequence[str]) -> bool:
     return set(feature_channels()) <= set(channels)
 
 
-def human_postures(features: FloatArray, channels: Sequence[str]) -> FloatArray:
-    """Return postures of the human body that do what the robot's features say, (T, 7 + n).
+def human_poses(features: FloatArray, channels: Sequence[str]) -> Poses:
+    """Return where the bodies of a human figure are that does what the robot's features say.
 
-    Joints of the same meaning take the same angles; the soles are as high above the floor as the
-    robot's, in proportion.
+    Each segment is turned as the robot's is, whatever the joints in between; the soles are as high
+    above the floor as the robot's, in proportion.
 
     Args:
         features: Shape (T, D).
         channels: Names of the D channels, among them the robot's.
+
+    Returns:
+        Shape (T, B, 7): position [m] and quaternion.
     """
-    robot, human = robot_body(), human_body()
-    order = [list(channels).index(name) for name in feature_channels(robot)]
-    features = features[:, order]
-    of_robot = posture_of(features)
-    q = np.tile(human.rest, (len(features), 1))
-    larger = human.rest[2] / robot.rest[2]
-    q[:, 2], q[:, 3:7] = features[:, 0] * larger, of_robot[:, 3:7]
-    for theirs, mine in _joints():
-        q[:, mine] = of_robot[:, theirs]
-    for t in range(len(q)):
-        lowest = _lowest_sole(robot.tree, of_robot[t]) * larger
-        q[t, 2] += lowest - _lowest_sole(human.tree, q[t])
-    return q
-
-
-@cache
-def _joints() -> tuple[tuple[int, int], ...]:
-    """Return the joints that both bodies have: place in the robot's posture, and the human's."""
-    robot, human = robot_body(), human_body()
-    pairs = []
-    for k, name in enumerate(robot.joint_names):
-        mine = _HUMAN_NAMES.get(name, name)
-        if mine in human.joint_names:
-            pairs.append((7 + k, 7 + human.joint_names.index(mine)))
-    return tuple(pairs)
+    robot, human = robot_body().tree, human_body().tree
+    order = [list(channels).index(name) for name in feature_channels()]
+    larger = human.offset[0, 2] / robot.offset[0, 2]
+    like = [robot.body(_LIKE.get(name, name)) for name in human.body_names]
+    soles = [i for i, name in enumerate(human.site_names) if name.startswith("sole_")]
+    at, under = human.site_body[soles], human.site_offset[soles]
+    poses = np.empty((len(features), len(like), 7), np.float32)
+    for t, posture in enumerate(posture_of(features[:, order])):
+        turns = robot.forward(posture)[1][like]
+        places = np.zeros((len(like), 3))
+        places[0] = posture[:3] * larger
+        for body, parent in enumerate(human.parent):
+            if parent >= 0:
+                places[body] = places[parent] + turns[parent] @ human.offset[body]
+        lowest = (places[at] + np.einsum("sij,sj->si", turns[at], under))[:, 2].min()
+        places[:, 2] += larger * _lowest_sole(robot, posture) - lowest
+        poses[t, :, :3], poses[t, :, 3:] = places, matrix_to_quaternion(turns)
+    return poses
 
 
 def _lowest_sole(tree: KinematicTree, posture: FloatArray) -> float:

@@ -240,8 +240,8 @@ class Hub:
     def _learner_ended(self, reason: str) -> None:
         self._person = _NO_POSE
         self._set("learner", "stopped")
-        text = f"the learner stopped ({reason}): it begins anew"
-        self._happened(happening("process", text, 0.0))
+        then = "it goes on from the store" if self.settings.store else "it begins anew"
+        self._happened(happening("process", f"the learner stopped ({reason}): {then}", 0.0))
 
     def _robot_ended(self, reason: str) -> None:
         self._robot_pose = _NO_POSE

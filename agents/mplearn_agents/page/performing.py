@@ -26,7 +26,7 @@ from mplearn_envs.robot import humanoid
 from mplearn_envs.skills.action_choices import HOLD
 from mplearn_envs.skills.repertoire import Repertoire
 
-from .figures import has_figure, human_postures, poses_of, shapes_of
+from .figures import has_figure, human_poses, shapes_of
 from .happenings import happening
 from .messages import Header, Poses, clip, unpack
 from .outbox import Outbox
@@ -197,8 +197,7 @@ class Stage:
         for motion in motions:
             n = max(2, round(len(motion) / rate_hz * CLIP_HZ))
             at = np.linspace(0, len(motion) - 1, n).round().astype(np.int64)
-            postures = human_postures(motion[at], library.channels)
-            poses.append(poses_of(human_body().tree, postures))
+            poses.append(human_poses(motion[at], library.channels))
         header = {"kind": "clip", "client": asked.get("client")}
         self._outbox.post(header, clip(_number(asked, "ref"), CLIP_HZ, poses))
 

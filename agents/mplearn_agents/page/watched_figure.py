@@ -14,11 +14,10 @@ from mplearn.body import MotionObserver, human_body
 from mplearn.errors import MPLearnError
 from mplearn.recording import FloatArray, are_markers
 
-from .figures import has_figure, human_postures, poses_of
+from .figures import has_figure, human_poses, poses_of
 from .messages import Poses
 
 SHOWN_HZ = 50.0
-_NOBODY: Poses = np.empty((0, 0, 7), np.float32)
 
 
 class WatchedFigure:
@@ -56,8 +55,7 @@ class WatchedFigure:
         self._phase = (self._phase - len(frames)) % self.stride
         if self._observer is None:
             if self._is_robot and len(shown) and np.isfinite(shown[-1]).all():
-                posture = human_postures(shown[-1:], self._given)
-                self.pose = poses_of(human_body().tree, posture)[0]
+                self.pose = human_poses(shown[-1:], self._given)[0]
             return shown
         rows = [np.empty((0, len(self.channels)))]
         while len(shown):

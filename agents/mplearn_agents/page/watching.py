@@ -8,18 +8,20 @@ import queue
 import signal
 import threading
 import time
+import warnings
 from collections import deque
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from typing import Any
+from pathlib import Path
+from typing import Any, TextIO
 
 import numpy as np
 
 from mplearn.demonstrator import demonstrate
-from mplearn.errors import InvalidValueError, MPLearnError
+from mplearn.errors import InvalidValueError, MPLearnError, RecordingWarning, StoreWarning
 from mplearn.learner import LearnerConfig, MotionLearner, learnable_rate
 from mplearn.sources import Block, Change, Observe, Source, open_source
-from mplearn.store import LifelongLearner
+from mplearn.store import LifelongLearner, Store
 
 from .happenings import happening, tell
 from .knowledge import knowledge
@@ -43,11 +45,13 @@ class Watch:
         source: See `mplearn.sources.open_source`.
         observe: What is learned: see `mplearn.sources.open_source`.
         speed: Times as fast as it was recorded; None for what the source does.
+        store: File in which all is kept; empty for memory alone.
     """
 
     source: str
     observe: Observe = "robot"
     speed: float | None = None
+    store: str = ""
 
 
 def watch(settings: Watch, connection: Connection) -> None:
@@ -77,7 +81,6 @@ class Watcher:
         self._lifelong: LifelongLearner | None = None
         self._figure: WatchedFigure | None = None
         self._source: Source | None = None
-        self._channels: tuple[str, ...] = ()
         self._rate_hz = 0.0
         self._sender = Sender()
         self._told_revision = -1
@@ -97,21 +100,36 @@ class Watcher:
         Raises:
             MPLearnError: The source cannot be opened.
         """
+        warnings.simplefilter("always")
+        warnings.showwarning = self._warned
         settings = self._settings
         options: dict[str, Any] = {} if settings.speed is None else {"speed": settings.speed}
-        source = open_source(
-            settings.source, observe=settings.observe, at_hz=learnable_rate, **options
-        )
-        with source:
-            self._source = source
-            self._state = "compiling, which takes a while the first time"
-            self._outbox.post(self._status(), key="status")
-            _warm_up()
-            self._state = "waiting for frames"
-            for target in (self._read_source, self._read_requests):
-                threading.Thread(target=target, args=(source,), daemon=True).start()
-            while self._step():
-                pass
+        try:
+            if settings.store and Path(settings.store).exists():
+                self._lifelong = LifelongLearner.open(settings.store)
+                self._rate_hz = self._lifelong.learner.config.rate_hz
+            source = open_source(
+                settings.source,
+                observe=settings.observe,
+                at_hz=self._rate_hz or learnable_rate,
+                **options,
+            )
+            with source:
+                self._watch(source)
+        finally:
+            if self._lifelong is not None:
+                self._lifelong.close()
+
+    def _watch(self, source: Source) -> None:
+        self._source = source
+        self._state = "compiling, which takes a while the first time"
+        self._outbox.post(self._status(), key="status")
+        _warm_up()
+        self._state = "waiting for frames"
+        for target in (self._read_source, self._read_requests):
+            threading.Thread(target=target, args=(source,), daemon=True).start()
+        while self._step():
+            pass
 
     # ---- threads that read
 
@@ -162,7 +180,7 @@ class Watcher:
         return not self._outbox.broken
 
     def _learn(self, block: Block) -> None:
-        if self._lifelong is None or block.channels != self._channels:
+        if self._figure is None:
             self._begin(block)
         lifelong, figure = self._lifelong, self._figure
         assert lifelong is not None and figure is not None
@@ -185,11 +203,11 @@ class Watcher:
 
     def _begin(self, block: Block) -> None:
         """Begin to learn, now that it is known what comes."""
-        self._channels, self._rate_hz = block.channels, block.rate_hz
+        self._rate_hz = block.rate_hz
         if self._lifelong is None:
-            self._lifelong = LifelongLearner(
-                MotionLearner(LearnerConfig(block.channels, block.rate_hz))
-            )
+            self._lifelong = self._new(LearnerConfig(block.channels, block.rate_hz))
+        else:
+            self._tell(self._lifelong.begin_stream(block.channels))
         self._figure = WatchedFigure(block.channels, block.rate_hz)
         self._outbox.post(
             {
@@ -202,6 +220,26 @@ class Watcher:
             }
         )
         self._told_revision = -1
+
+    def _new(self, config: LearnerConfig) -> LifelongLearner:
+        """Return a learner that knows nothing yet."""
+        if self._settings.store:
+            return LifelongLearner.open(self._settings.store, lambda: MotionLearner(config))
+        return LifelongLearner(MotionLearner(config))
+
+    def _warned(
+        self,
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        """Tell teachers of what would be printed where nobody looks."""
+        if issubclass(category, StoreWarning | RecordingWarning):
+            what = "store" if issubclass(category, StoreWarning) else "source"
+            self._happened(what, str(message))
 
     def _changed(self, change: Change) -> None:
         if change.kind in ("connected", "disconnected"):
@@ -282,9 +320,17 @@ class Watcher:
             "frames": tally.get("frames", 0),
             "person": None if lifelong is None else lifelong.learner.person + 1,
             "people": 0 if lifelong is None else len(lifelong.learner.tree.people),
+            "store": self._settings.store,
+            "problem": self._problem(),
             "paused": False if lifelong is None else lifelong.learner.paused,
             "memory_mb": _memory_mb(),
         }
+
+    def _problem(self) -> str:
+        """Return why what is learned cannot be kept; empty where it can."""
+        store = None if self._lifelong is None else self._lifelong.store
+        problem = store.problem if isinstance(store, Store) else None
+        return "" if problem is None else str(problem)
 
     def _live(self) -> Message | None:
         """Return the rows that were not sent yet, with the latest pose."""

@@ -1,7 +1,7 @@
 import pytest
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # while it is open no other event loop runs in this thread
 def chromium():
     """A headless browser; without one, its tests are skipped."""
     pytest.importorskip("playwright.sync_api", reason="needs playwright, of the extra 'dev'")

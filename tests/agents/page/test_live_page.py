@@ -8,7 +8,6 @@ import pytest
 
 pytest.importorskip("uvicorn", reason="needs the extra 'ui'")
 from benchmarks.teaching_session import NAMES, live, session, until
-from mplearn_agents.cli import main
 
 STARTED_S = 120  # compiling, the first time
 
@@ -143,20 +142,6 @@ def test_experiment_4_1_of_the_paper(chromium):
     assert sorted(found["graph"]) == sorted(NAMES.values())
     sure = [text for text in found["edges"] if text.startswith("1.00")]
     assert len(found["edges"]) == 6 and len(sure) == 2  # raise, lower; bend, return: then any
-
-
-@pytest.mark.parametrize(
-    ("options", "why"),
-    [
-        (["--port", "99999"], "65535"),
-        (["--host", "203.0.113.7", "--port", "0"], "cannot listen"),
-        (["recording:/no/such/file.bvh", "--port", "0"], "file.bvh"),
-    ],
-)
-def test_what_cannot_be_is_refused_in_a_line(options, why, capsys):
-    assert main(["live", *options]) == 2
-    said = capsys.readouterr().err
-    assert why in said and len(said.splitlines()) == 1
 
 
 def test_a_learner_that_was_killed_is_started_again_and_all_end_together(new_page):

@@ -11,6 +11,7 @@ from page_server import served
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from mplearn_agents.cli import main
 from mplearn_agents.page import hub as hub_module
 
 
@@ -234,3 +235,17 @@ def test_with_a_token_only_who_knows_it_looks_on():
         for stolen in ({}, {"Cookie": own + "x"}):
             with pytest.raises((InvalidStatus, ConnectionClosed)), open_socket(server, **stolen):
                 pass
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (["--port", "99999"], "65535"),
+        (["--host", "203.0.113.7", "--port", "0"], "cannot listen"),
+        (["recording:/no/such/file.bvh", "--port", "0"], "file.bvh"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_line(options, why, capsys):
+    assert main(["live", *options]) == 2
+    said = capsys.readouterr().err
+    assert why in said and len(said.splitlines()) == 1

@@ -1,0 +1,308 @@
+"""The parts of the page that need neither server nor browser."""
+
+import itertools
+import json
+import struct
+import threading
+from multiprocessing import Pipe
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from benchmarks.teaching_session import until
+from mplearn.body import human_body, posture_of, robot_body
+from mplearn.demonstrator import demonstrate
+from mplearn.errors import InvalidValueError, LibraryError
+from mplearn.learner import LearnerConfig, MotionLearner
+from mplearn.maths.rotations import quaternion_to_matrix
+from mplearn.store import LifelongLearner
+from mplearn_agents.page import messages, teaching
+from mplearn_agents.page.figures import has_figure, human_poses, poses_of, shapes_of
+from mplearn_agents.page.happenings import tell
+from mplearn_agents.page.knowledge import knowledge
+from mplearn_agents.page.outbox import Outbox
+from mplearn_agents.page.performing import Stage
+from mplearn_agents.page.shelf import Receiver, Sender
+from mplearn_agents.page.watched_figure import WatchedFigure
+
+SCRIPT = ("BAR", "BAL", "BAD", "BAU") * 5
+
+
+@pytest.fixture(scope="module")
+def shown():
+    return demonstrate(SCRIPT, 2)
+
+
+@pytest.fixture(scope="module")
+def taught(shown):
+    """A learner that has seen four primitives, and what it said."""
+    recording = shown.recording
+    life = LifelongLearner(MotionLearner(LearnerConfig(recording.channels, recording.rate_hz)))
+    events = life.learn_many(recording.frames) + life.end_stream()
+    return life, events
+
+
+# ---- messages
+
+
+@given(st.dictionaries(st.text(), st.text() | st.integers() | st.none()), st.binary())
+def test_messages_survive_the_way(header, blob):
+    assert messages.unpack(messages.pack(header, blob)) == (header, blob)
+
+
+def test_any_name_at_all_can_be_sent():
+    text = messages.as_text({"name": "\ud800 \u2028 </script>"})
+    assert text.isascii() and json.loads(text)["name"].startswith("\ud800")
+
+
+def test_what_is_not_a_number_is_never_sent():
+    with pytest.raises(ValueError, match="JSON"):
+        messages.as_text({"x": float("nan")})
+
+
+def test_a_clip_says_how_long_each_motion_is():
+    motions = [np.random.default_rng(k).normal(size=(n, 3, 7)) for k, n in enumerate((4, 2))]
+    data = messages.clip(9, 30.0, motions)
+    kind, _, bodies, number, rate_hz, n = struct.unpack_from("<BBHIfI", data)
+    assert (kind, bodies, number, rate_hz, n) == (messages.CLIP, 3, 9, 30.0, 2)
+    assert np.frombuffer(data, "<u4", 2, 16).tolist() == [4, 2]
+    values = np.frombuffer(data, "<f4", offset=24)
+    np.testing.assert_array_equal(values, np.concatenate(motions).ravel().astype(np.float32))
+
+
+# ---- figures
+
+
+def test_poses_are_those_of_mujoco():
+    import mujoco
+
+    body = human_body()
+    model, rng = body.model(), np.random.default_rng(0)
+    data = mujoco.MjData(model)
+    q = np.tile(body.rest, (5, 1))
+    q[:, 7:] += rng.uniform(-0.4, 0.4, (5, body.nq - 7))
+    for posture, pose in zip(q, poses_of(body.tree, q), strict=True):
+        data.qpos[:] = posture
+        mujoco.mj_kinematics(model, data)
+        np.testing.assert_allclose(pose[:, :3], data.xpos[1:], atol=1e-6)
+        same = np.abs(np.sum(pose[:, 3:] * data.xquat[1:], axis=1))
+        np.testing.assert_allclose(same, 1.0, atol=1e-6)
+
+
+def test_every_shape_belongs_to_a_body():
+    for body in (human_body(), robot_body()):
+        shapes = shapes_of(body.model())
+        assert len(shapes) > 20
+        assert {s["body"] for s in shapes} <= set(range(len(body.tree.body_names)))
+        json.dumps(shapes, allow_nan=False)
+
+
+def test_the_human_figure_does_what_the_robots_features_say():
+    """Arms point where the robot's do, and the soles stay on the floor."""
+    robot, human = robot_body(), human_body()
+    rng = np.random.default_rng(1)
+    features = np.zeros((6, 3 + len(robot.driven)))
+    features[:, 0] = robot.rest[2]
+    names = list(robot.driven_names)
+    for joint in ("shoulder_pitch_l", "elbow_r", "shoulder_roll_r"):
+        low, high = robot.joint_limits[robot.joint_names.index(joint)]
+        features[:, 3 + names.index(joint)] = rng.uniform(max(low, -1), min(high, 1), 6)
+    channels = ("base_height", "base_roll", "base_pitch", *names)
+    assert has_figure(channels) and not has_figure(channels[:-1])
+    figure = human_poses(features, channels)
+    for pose, posture in zip(figure, posture_of(features), strict=True):
+        _, meant = robot.tree.forward(posture)
+        for part in ("upper_arm_l", "forearm_r", "thigh_l", "head"):
+            mine = quaternion_to_matrix(pose[human.tree.body(part), 3:].astype(float))
+            np.testing.assert_allclose(mine, meant[robot.tree.body(part)], atol=1e-5)
+        hand, forearm, foot = (human.tree.body(n) for n in ("hand_l", "forearm_l", "foot_l"))
+        length = np.linalg.norm(pose[hand, :3] - pose[forearm, :3])
+        assert abs(length - np.linalg.norm(human.tree.offset[hand])) < 1e-5
+        standing = poses_of(human.tree, human.rest[None])[0]
+        assert abs(pose[foot, 2] - standing[foot, 2]) < 1e-3
+
+
+def test_the_watched_person_stands_like_the_demonstrator(shown):
+    recording = shown.recording
+    figure = WatchedFigure(recording.channels, recording.rate_hz)
+    rows = [figure.take(recording.frames[t : t + 7]) for t in range(0, 700, 7)]
+    assert figure.stride == 2 and sum(map(len, rows)) == 350  # in blocks of any size, every second
+    truth = poses_of(human_body().tree, shown.posture.frames[698:699])[0]
+    hands = [human_body().tree.body(f"hand_{side}") for side in "lr"]
+    for hand in hands:
+        above = figure.pose[hand, 2] - figure.pose[0, 2], truth[hand, 2] - truth[0, 2]
+        assert abs(above[0] - above[1]) < 0.08
+
+
+# ---- the library, from process to process
+
+
+def test_only_what_has_changed_is_sent(taught):
+    life, _ = taught
+    sender, receiver = Sender(), Receiver()
+    first = sender.send(life.snapshot())
+    got = receiver.receive(*first)
+    assert got.ids == life.snapshot().ids and got.names == life.snapshot().names
+    np.testing.assert_array_equal(got.graph.edge_rows(), life.snapshot().graph.edge_rows())
+    id = got.ids[0]
+    life.execute(teaching.COMMANDS["rename"]({"id": id, "name": "arms"}))
+    second = sender.send(life.snapshot())
+    assert len(second[1]) < 0.6 * len(first[1])
+    again = receiver.receive(*second)
+    assert again[id].name == "arms" and again.ids == got.ids
+    for one, two in zip(again.primitives, life.snapshot().primitives, strict=True):
+        np.testing.assert_array_equal(one.hmm.means, two.hmm.means)
+    life.undo()
+    with pytest.raises(LibraryError, match="never delivered"):
+        Receiver().receive(*second)
+    sender.forget()
+    assert Receiver().receive(*sender.send(life.snapshot())).ids == got.ids
+
+
+# ---- what is known, and what happened
+
+
+def test_knowledge_is_the_librarys(taught):
+    life, _ = taught
+    library, told = life.snapshot(), knowledge(life.snapshot(), life.learner.tree)
+    assert [p["id"] for p in told["primitives"]] == list(library.ids)
+    leaves = {n["id"] for n in told["nodes"]} - {n["parent"] for n in told["nodes"]}
+    assert leaves == set(library.ids)
+    for source, target, count, p, duration_s in told["edges"]:
+        assert count == library.graph.count(source, target)
+        row = dict(zip(library.graph.ids, library.graph.prior(source), strict=True))
+        assert p == pytest.approx(row[target], abs=1e-4)
+        assert duration_s == pytest.approx(library.graph.duration_s(source, target), abs=2e-3)
+    json.dumps(told, allow_nan=False)
+
+
+def test_every_segment_is_told_with_what_became_of_it(taught):
+    life, events = taught
+    told = list(tell(events, 100.0))
+    segments = [m for m in told if m["kind"] == "segment"]
+    assert all(a["end"] <= b["start"] for a, b in itertools.pairwise(segments))
+    assert sum(m["state"] == "known" for m in segments) >= 8
+    born = [m["primitive"] for m in told if m["kind"] == "event" and m["what"] == "born"]
+    assert set(life.snapshot().ids) <= set(born)
+    assert any(m["state"] == "unlike" and m["why"] for m in segments)
+    json.dumps(told, allow_nan=False)
+
+
+# ---- what teachers ask
+
+
+def test_each_request_is_a_command_and_can_be_undone(taught):
+    life, _ = taught
+    a, b = life.snapshot().ids[:2]
+    before = life.snapshot().ids, life.snapshot().names
+    for asked in (
+        {"do": "rename", "id": a, "name": "  raise "},
+        {"do": "merge", "id": a, "other": b},
+        {"do": "forget", "id": b},
+        {"do": "freeze", "id": a},
+        {"do": "note", "id": a, "text": "slow"},
+        {"do": "pause"},
+    ):
+        said = teaching.do(life, asked, "Anna")
+        assert said
+        assert teaching.do(life, {"do": "undo"}, "Bob").startswith("undone: ")
+    assert (life.snapshot().ids, life.snapshot().names) == before
+    assert not life.learner.paused
+    lines = teaching.history(life, {"id": a})
+    assert any("Anna" in line["text"] and "undone" in line["text"] for line in lines)
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"do": "rename", "id": "1", "name": "x"},
+        {"do": "rename", "id": 1, "name": "x" * 81},
+        {"do": "rename", "id": 1, "name": "a\x1b[31m"},
+        {"do": "rename", "id": True, "name": "x"},
+        {"do": "merge", "id": 1},
+        {"do": "forget", "id": -1},
+        {"do": "note", "id": 1, "text": None},
+        {"do": "open the pod bay doors"},
+    ],
+)
+def test_what_is_asked_wrongly_changes_nothing(taught, asked):
+    life, _ = taught
+    revision = life.revision
+    with pytest.raises(InvalidValueError):
+        teaching.do(life, asked, "Anna")
+    assert life.revision == revision
+
+
+# ---- sending and performing
+
+
+def test_who_reads_slowly_gets_the_latest_of_each_kind():
+    mine, theirs = Pipe()
+    outbox = Outbox(mine)
+    for k in range(2000):
+        outbox.post({"kind": "pose", "k": k}, b"x" * 4000, key="pose")
+    outbox.post({"kind": "event"})
+    got = []
+    while not got or got[-1]["kind"] != "event":
+        got.append(messages.unpack(theirs.recv_bytes())[0])
+    poses = [m["k"] for m in got[:-1]]
+    assert poses == sorted(poses) and poses[-1] == 1999 and len(poses) < 1500
+    theirs.close()
+    outbox.post({"kind": "event"})
+    outbox.close()
+    assert outbox.broken
+
+
+class Kept:
+    """An outbox that keeps what is posted."""
+
+    broken = False
+
+    def __init__(self):
+        self.posted = []
+
+    def post(self, header, blob=b"", key=None):
+        self.posted.append((header, blob))
+
+
+def test_the_robot_performs_what_it_is_asked(taught):
+    """A click: the figure with its demonstrations, and the robot in MuJoCo; then a path."""
+    life, _ = taught
+    mine, theirs = Pipe()
+    kept = Kept()
+    stage = Stage(mine, kept)
+    library = life.snapshot()
+    delivery = Sender().send(library)
+
+    def ask(what, **values):
+        theirs.send_bytes(messages.pack({"kind": "ask", "do": what, "client": 1} | values))
+
+    theirs.send_bytes(messages.pack({"kind": "library", "content": delivery[0]}, delivery[1]))
+    running = threading.Thread(target=stage.run)
+    running.start()
+    ask("show", id=library.ids[0], ref=7)
+    ask("perform", id=library.ids[0], ref=8)
+    ask("walk", length=0, ref=9)
+    ask("path", id=10**6, ref=10)
+
+    def performed():
+        return {h["primitive"] for h, _ in kept.posted if h["kind"] == "robot"} - {None}
+
+    until(performed, 200)  # compiling, the first time
+    assert performed() == {library.ids[0]}
+    ask("path", id=library.ids[1], ref=11)
+    until(lambda: library.ids[1] in performed(), 60)
+    theirs.close()
+    running.join(10)
+    replies = {h["ref"]: h for h, _ in kept.posted if h["kind"] == "reply"}
+    assert replies[7]["ok"] and replies[8]["ok"] and replies[11]["ok"]
+    assert not replies[9]["ok"] and "1 to" in replies[9]["text"]
+    assert not replies[10]["ok"]
+    figures = [blob for h, blob in kept.posted if h["kind"] == "clip"]
+    assert len(figures) == 1 and np.frombuffer(figures[0], "<u4", 1, 4)[0] == 7
+    assert library.ids[1] in performed()
+    poses = [blob for h, blob in kept.posted if h["kind"] == "robot-pose"]
+    heights = [np.frombuffer(p, np.float32).reshape(-1, 7)[0, 2] for p in poses]
+    assert len(poses) > 50 and min(heights) > 0.5  # it stands
