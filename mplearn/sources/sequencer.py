@@ -218,7 +218,8 @@ class Sequencer:
             return
         waited = max(round(ours * rate_hz) - 1, 0)
         since = last.number if last is not None else number
-        if ahead > 0 and waited >= 0.5 * ahead:
+        ours_dropped = self._dropped and abs(ahead - self._dropped) <= FILLED_S * rate_hz
+        if ahead > 0 and (waited >= 0.5 * ahead or ours_dropped):
             self._begin_stretch(place)
         else:
             self._say("clock", f"the sender's numbers jumped from {since} to {number}")
@@ -343,9 +344,11 @@ class Sequencer:
     def _begin_stretch(self, place: int) -> None:
         """Begin another stretch after a gap that is too long to fill."""
         self._break()
-        lost = self._count_lost(place - self._next)
+        missing = place - self._next
+        lost = self._count_lost(missing)
         self._lost = 0
-        self._say("gap", f"{lost} frames are missing: what comes is taken as another stretch", lost)
+        text = f"{missing} frames are missing: what comes is taken as another stretch"
+        self._say("gap", text, lost)
         self._next = place
 
     def _break(self) -> None:

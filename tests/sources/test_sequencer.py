@@ -193,6 +193,16 @@ def test_what_waits_too_long_is_dropped_and_counted() -> None:
     assert texts_of(items, "overrun") == ["20 frames found the queue full"]
 
 
+def test_what_was_dropped_for_long_begins_another_stretch() -> None:
+    samples = numbered(list(range(20)))
+    samples += [sample(1020 + i, 1.0, 0.5 + 0.01 * i, dropped=1000 * (i == 0)) for i in range(5)]
+    items, tally = run(samples)
+    assert (tally.overrun, tally.lost, tally.frames) == (1000, 0, 25)
+    assert texts_of(items, "clock") == []
+    assert texts_of(items, "gap")[0].startswith("1000 frames are missing")
+    assert max(places(items)) == 1024
+
+
 def test_without_numbers_and_times_what_was_dropped_still_has_a_place() -> None:
     samples = [sample(None, 0.0, 0.0), sample(None, 1.0, 0.01, dropped=5), sample(None, 2.0, 0.02)]
     items, tally = run(samples, ordered=True)
