@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from ..state import Count, Range, State
-from .shape_table import ShapeTable
-from .shapes import ShapeState
+from .shapes.shape import ShapeState
+from .shapes.shape_table import ShapeTable
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ from numba import njit
 
 from ..recording import BoolArray, FloatArray, IntArray
 from .config import PeopleConfig
-from .offsets import offsets_of
-from .shape_table import ShapeTable
+from .shapes.offsets import offsets_of
+from .shapes.shape_table import ShapeTable
 
 _ROUNDS = 3  # links and people's offsets are found in turn
 

@@ -11,8 +11,8 @@ import numpy as np
 from ..recording import FloatArray, IntArray
 from ..state import Array, Count, Range, SharedState, require
 from ..tree import ROOT
-from .shape_table import ShapeTable
-from .shapes import Shape, mean_shape
+from .shapes.shape import Shape, mean_shape
+from .shapes.shape_table import ShapeTable
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,10 +15,10 @@ from .identities import executions_held, identities, recognised_as, split_into
 from .leaf import Leaf
 from .matching import Known, solve, tension
 from .nodes import nodes_of, tidied
-from .offsets import offsets_of
 from .provisional import ProvisionalLeaf, ProvisionalLeaves
-from .shape_table import ShapeTable
-from .shapes import Shape, shape_of
+from .shapes.offsets import offsets_of
+from .shapes.shape import Shape, shape_of
+from .shapes.shape_table import ShapeTable
 from .sharing_state import AboveState, NumbersState, OffsetState, SharingState
 
 TIDY = 32  # segments after which those are forgotten that the tree has forgotten

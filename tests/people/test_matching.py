@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from mplearn.errors import InvalidValueError
 from mplearn.people import PeopleConfig
 from mplearn.people.matching import Known, agglomerate, solve, tension, unit_of
-from mplearn.people.offsets import offsets_of
-from mplearn.people.shape_table import ShapeTable
-from mplearn.people.shapes import Shape, mirrored, shape_of
+from mplearn.people.shapes.offsets import offsets_of
+from mplearn.people.shapes.shape import Shape, mirrored, shape_of
+from mplearn.people.shapes.shape_table import ShapeTable
 from mplearn.tree import MirrorMap, NormalisationConfig
 
 RULES = PeopleConfig(repertoire=5)

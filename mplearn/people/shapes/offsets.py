@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..recording import FloatArray, IntArray
+from ...recording import FloatArray, IntArray
 
 _ROUNDS = 3  # means of primitives and people's offsets are found in turn
 

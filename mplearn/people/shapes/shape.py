@@ -13,10 +13,10 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from ..recording import FloatArray
-from ..state import Array, SharedState
-from ..tree import MirrorMap, NormalisationConfig
-from ..tree.exemplars import normalisation
+from ...recording import FloatArray
+from ...state import Array, SharedState
+from ...tree import MirrorMap, NormalisationConfig
+from ...tree.exemplars import normalisation
 
 
 class Shape(NamedTuple):

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
-from ..recording import FloatArray, IntArray
-from ..tree import MirrorMap
-from .shapes import Shape, ShapeState, mirrored, squares
+from ...recording import FloatArray, IntArray
+from ...tree import MirrorMap
+from .shape import Shape, ShapeState, mirrored, squares
 
 
 class ShapeTable:

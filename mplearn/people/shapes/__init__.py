@@ -1,0 +1,1 @@
+"""Shapes of motions, by which leaves of several people are compared."""
