@@ -1,0 +1,175 @@
+"""A long life with a store, accelerated: ``python -m benchmarks.life --hours 168 --out life.png``.
+
+The demonstrator's motions come again and again, each time a little different, with new ones now and
+then in the first tenth and none after it: from there on nothing may grow. Prints, and plots over
+the stream: memory, size of the file, time a frame, time of a checkpoint, and for how long the
+stream was ever held up by a checkpoint or by a snapshot for readers.
+"""
+
+import argparse
+import gc
+import os
+import tempfile
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from mplearn import LearnerConfig, MotionLearner
+from mplearn.demonstrator import demonstrate
+from mplearn.evaluation.observing import observe
+from mplearn.recording import FloatArray
+from mplearn.store import LifelongLearner, info
+from mplearn.store.store import Store
+
+_BLOCK = 10  # frames that come at once: 100 ms
+_AGAIN_S = 7.5  # until a motion's variant comes again
+
+
+@dataclass
+class Figures:
+    """What was measured at times of the stream [h]."""
+
+    at_h: list[float] = field(default_factory=list)
+    memory_mb: list[float] = field(default_factory=list)
+    file_mb: list[float] = field(default_factory=list)
+    frame_us: list[float] = field(default_factory=list)
+    checkpoint_ms: list[float] = field(default_factory=list)
+    held_up_ms: list[float] = field(default_factory=list)
+    snapshot_ms: list[float] = field(default_factory=list)
+    primitives: list[int] = field(default_factory=list)
+
+
+def motions() -> tuple[FloatArray, tuple[str, ...], float]:
+    """Return half a minute of features in which four primitives come, and their channels."""
+    script = ["BAR", "BAL", "BAD", "BAU"] * 6
+    shown = observe(demonstrate(script, seed=4).recording)
+    return shown.frames, shown.channels, shown.rate_hz
+
+
+def scene(frames: FloatArray, rng: np.random.Generator, kind: int) -> FloatArray:
+    """Return the motions as somebody else would make them: a kind is a pattern of joints."""
+    own = np.random.default_rng(kind)
+    mean = frames.mean(axis=0)
+    size = own.uniform(0.6, 1.3, frames.shape[1]) * np.where(
+        own.random(frames.shape[1]) < 0.2, -1, 1
+    )
+    varied = size * rng.normal(1.0, 0.02)
+    return np.asarray(mean + (frames - mean) * varied + 1e-3 * rng.normal(size=frames.shape))
+
+
+def live(hours: float, path: Path, checkpoint_s: float = 30.0) -> Figures:
+    """Live for so long [h of stream], and measure a hundred times."""
+    frames, channels, rate_hz = motions()
+    config = LearnerConfig(channels, rate_hz)
+    rng = np.random.default_rng(0)
+    figures = Figures()
+    n_frames = round(hours * 3600 * rate_hz)
+    due, n_kinds = 0.0, 1
+    held: list[float] = []
+    start, since = time.process_time(), 0
+    with LifelongLearner.open(
+        path, lambda: MotionLearner(config), checkpoint_s=checkpoint_s
+    ) as life:
+        assert isinstance(life.store, Store)
+        append = life.store.append
+
+        def timed(*args: object) -> None:
+            begin = time.perf_counter()
+            append(*args)  # type: ignore[arg-type]
+            held.append(time.perf_counter() - begin)
+
+        life.store.append = timed  # type: ignore[method-assign, assignment]
+        while life.n_frames < n_frames:
+            share = life.n_frames / n_frames
+            n_kinds = max(n_kinds, min(1 + int(share * 10 * 6), 6))
+            shown = scene(frames, rng, int(rng.integers(n_kinds)))
+            for at in range(0, len(shown), _BLOCK):
+                life.learn_many(shown[at : at + _BLOCK])
+            if life.n_frames >= due:
+                due += n_frames / 100
+                took = time.process_time() - start
+                begin = time.perf_counter()
+                life.snapshot()
+                figures.snapshot_ms.append(1e3 * (time.perf_counter() - begin))
+                life.store.flush()
+                gc.collect()
+                figures.at_h.append(life.n_frames / rate_hz / 3600)
+                figures.memory_mb.append(memory_mb())
+                figures.file_mb.append(info(path).file_bytes / 1e6)
+                figures.frame_us.append(1e6 * took / max(life.n_frames - since, 1))
+                figures.checkpoint_ms.append(1e3 * max(life.store.figures.checkpoints_s, default=0))
+                life.store.figures.checkpoints_s.clear()
+                figures.held_up_ms += [1e3 * each for each in held]
+                held.clear()
+                figures.primitives.append(len(life.learner.tree.leaves))
+                start, since = time.process_time(), life.n_frames
+    return figures
+
+
+def memory_mb() -> float:
+    """Return the memory of this process that is in use [MB]."""
+    with Path("/proc/self/statm").open() as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def plot(figures: Figures, out: Path) -> None:
+    """Draw the figures over the stream."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 7), layout="constrained")
+    axes = figure.subplots(2, 3).ravel()
+    series = (
+        ("memory of the process [MB]", figures.memory_mb),
+        ("size of the file [MB]", figures.file_mb),
+        ("processor time a frame [µs]", figures.frame_us),
+        ("longest checkpoint, in its thread [ms]", figures.checkpoint_ms),
+        ("snapshot for readers [ms]", figures.snapshot_ms),
+        ("primitives", figures.primitives),
+    )
+    for each, (title, values) in zip(axes, series, strict=True):
+        each.plot(figures.at_h, values, lw=1.2)
+        each.set_ylim(0, 1.15 * max(values))
+        each.set_title(title, loc="left", fontsize=10)
+        each.set_xlabel("stream [h]")
+        each.axvspan(0, figures.at_h[-1] / 10, alpha=0.12)
+        each.spines[["top", "right"]].set_visible(False)
+    figure.savefig(out, dpi=110)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.life", description=__doc__)
+    parser.add_argument("--hours", type=float, default=168.0, help="of stream")
+    parser.add_argument("--out", type=Path, default=Path("life.png"))
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        begin = time.perf_counter()
+        figures = live(args.hours, Path(folder) / "life.db")
+        took = time.perf_counter() - begin
+    plot(figures, args.out)
+    table = Table("what", "after a fifth", "at the end", "largest", title_justify="left")
+    table.title = f"{args.hours:g} h of stream in {took / 60:.1f} minutes"
+    early = len(figures.at_h) // 5
+    for name, values in (
+        ("memory [MB]", figures.memory_mb),
+        ("file [MB]", figures.file_mb),
+        ("a frame [µs of processor time]", figures.frame_us),
+        ("a checkpoint, in its thread [ms]", figures.checkpoint_ms),
+        ("a snapshot for readers [ms]", figures.snapshot_ms),
+        ("primitives", figures.primitives),
+    ):
+        table.add_row(name, *(f"{v:.1f}" for v in (values[early], values[-1], max(values))))
+    console = Console(width=120)
+    console.print(table)
+    p50, p99 = np.percentile(figures.held_up_ms, [50, 99])
+    console.print(
+        f"the stream was held up by the store {len(figures.held_up_ms)} times: "
+        f"p50 {p50:.2f} ms, p99 {p99:.2f} ms, at most {max(figures.held_up_ms):.1f} ms"
+    )
+
+
+if __name__ == "__main__":
+    main()
