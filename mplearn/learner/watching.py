@@ -155,7 +155,8 @@ class Watching:
                 watch.people.extend(state.people)
                 watches.append(watch)
         known = [watch for watch in watches if _columns(channels, watch.channels) is not None]
-        require(bool(known), "stream", "must have the columns of a watch")
+        fits = are_markers(channels) and bool(known)
+        require(fits, "stream", "must have the columns of a watch")
         self.watches = watches
         self.n_people = sum(len(watch.people) for watch in watches)
         self.turn_to(known[0], channels)
