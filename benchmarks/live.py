@@ -190,8 +190,8 @@ def _hour(session: Recording) -> list[tuple[str, str, str, str]]:
             if learner is not None and learner.n_frames >= quarter * (len(sizes) + 1):
                 sizes.append(_resident_mb())
         stop.set()
-        source.close()
-        thread.join()
+        while thread.is_alive():
+            source.read(0.1)
     took_s = time.monotonic() - begin
     faults = source.tally.faults()
     return [

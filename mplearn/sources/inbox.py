@@ -130,13 +130,16 @@ class Inbox:
             self._finished = True
             self._arrived.notify_all()
 
-    def close(self) -> None:
-        """Let the receiver know that nobody reads any more."""
+    def close(self) -> int:
+        """Let the receiver know that nobody reads any more; return how many frames still wait."""
         with self._arrived:
             self._closed = True
+            unread = sum(isinstance(item, Sample) for item in self._items) + self._dropped
+            self._dropped = 0
             self._items.clear()
             self._arrived.notify_all()
             self._room.notify_all()
+            return unread
 
     def pause(self, seconds: float) -> bool:
         """Wait, in the receiver; return whether to stop."""

@@ -60,6 +60,7 @@ class ReceivedSource(Source):
         self._sequencer = Sequencer(self.tally, ordered=receiver.ordered, rate_hz=rate_hz)
         self._connected: bool | None = None  # None: nothing came yet
         self._heard, self._heard_s = False, time.monotonic()
+        self._read_s = self._heard_s  # when something was there to be read
         self._late = self._over = False
         self._thread = threading.Thread(target=self._receive, name=name, daemon=True)
         self._thread.start()
@@ -71,8 +72,9 @@ class ReceivedSource(Source):
 
     def close(self) -> None:
         """End it, and wait for the thread."""
+        unread = self._inbox.close() + self._sequencer.n_waiting
+        self.tally.unread += 0 if self._over else unread
         self._over = True
-        self._inbox.close()
         if self._thread is not threading.current_thread():
             self._thread.join(10.0)
 
@@ -101,6 +103,7 @@ class ReceivedSource(Source):
                     out += self._behind(now_s - item.arrived_s)
                 samples.append(item)
                 self._connected, self._heard, self._heard_s = True, True, item.arrived_s
+                self._read_s = now_s
                 continue
             out += self._sequencer.take(samples, now_s)
             samples = []
@@ -133,7 +136,7 @@ class ReceivedSource(Source):
         return [Change("connected", f"frames come again, {after}", self._sequencer.time_s)]
 
     def _silence(self, now_s: float) -> list[Change]:
-        silent_s = now_s - self._heard_s
+        silent_s = now_s - self._read_s
         if self._connected is None and silent_s > PATIENT_S:
             text = f"nothing has come for {PATIENT_S:g} s"
             text += f": {self._receiver.hint}" if self._receiver.hint else ""

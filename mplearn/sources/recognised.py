@@ -92,7 +92,10 @@ class RecognisedSource(Source):
 
     def close(self) -> None:
         """End the stream."""
+        waiting = sum(int((~block.gaps).sum()) for block in self._held)
         self._held.clear()
+        self.tally.frames -= waiting
+        self.tally.unread += waiting
         self._source.close()
 
     def read(self, timeout_s: float | None = None) -> list[Block | Change]:

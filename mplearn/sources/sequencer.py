@@ -65,6 +65,11 @@ class Sequencer:
         return bool(self._pending)
 
     @property
+    def n_waiting(self) -> int:
+        """Number of frames that are held back; they are forgotten where it is not finished."""
+        return len(self._pending) + len(self._unpaced)
+
+    @property
     def time_s(self) -> float:
         """Time of the next frame [s]."""
         return self._next / self._stream.rate_hz if self._stream else 0.0

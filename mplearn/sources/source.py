@@ -144,6 +144,7 @@ class Tally:
         foreign: Frames of somebody else than who is followed.
         unnamed: Frames that came before it was said what they hold.
         unrecognised: Frames in which nobody was recognised, before anybody was.
+        unread: Frames that had come and were not read yet when the source was closed.
         reconnected: How often a connection was made again.
     """
 
@@ -156,6 +157,7 @@ class Tally:
     foreign: int = 0
     unnamed: int = 0
     unrecognised: int = 0
+    unread: int = 0
     reconnected: int = 0
 
     def faults(self) -> dict[str, int]:

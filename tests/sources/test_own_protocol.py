@@ -203,7 +203,7 @@ def test_silence_is_said() -> None:
         one = Block(Stream(("a",), 100.0), np.ones((1, 1)), np.zeros(1), np.zeros(1))
         sender.send(one)
         gather(source, lambda: None, 1)
-        source._source._heard_s -= 2.0
+        source._source._read_s -= 2.0
         items = source.read(0.0)
         assert texts_of(items, "disconnected") == ["nothing has come for 1 s"]
         later = Block(one.stream, one.frames, np.array([0.01]), np.zeros(1))
