@@ -12,10 +12,12 @@ from pathlib import Path
 from threading import Event as Flag
 from typing import TYPE_CHECKING, Any
 
-from mplearn.errors import InvalidValueError, RecordingError
+from mplearn.errors import RecordingError
 
+from .arguments import pace, positive
+from .console import open_console, printable
 from .interrupts import asked_to_stop
-from .reading import hints_of, printable
+from .reading import hints_of
 
 if TYPE_CHECKING:
     from mplearn.learner import Event, LearnerConfig, MotionLearner
@@ -35,7 +37,7 @@ def add_live_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--live", metavar="SOURCE", help=f"what to learn from: {SOURCES}")
     group.add_argument(
         "--speed",
-        type=float,
+        type=pace,
         help="times as fast as in time, for a recording and the demonstrator; inf: as fast as "
         "it is learned",
     )
@@ -45,7 +47,7 @@ def add_live_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="XDF",
         help="also write what comes to this file",
     )
-    group.add_argument("--seconds", type=float, help="stop after so much of the stream [s]")
+    group.add_argument("--seconds", type=positive, help="stop after so much of the stream [s]")
     group.add_argument(
         "--json",
         action="store_true",
@@ -86,17 +88,13 @@ def learn_from_source(
         args: The options of ``mplearn learn``.
         configure: What they make of a learner's configuration.
     """
-    from rich.console import Console
-
     from mplearn.anatomy import read_map
     from mplearn.learner import learnable_rate
     from mplearn.mocap import command_line
     from mplearn.sources import open_source
     from mplearn.store import LifelongLearner, is_begun
 
-    if args.seconds is not None and not args.seconds > 0:
-        raise InvalidValueError(f"--seconds must be positive, not {args.seconds}")
-    console = Console(stderr=args.json)
+    console = open_console(stderr=args.json)
     has_begun = args.store is not None and is_begun(args.store)
     kept = " and ".join(str(path) for path in (args.out, args.store) if path is not None)
     with command_line(), asked_to_stop() as stop, ExitStack() as stack:

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING
 
 from mplearn.errors import InvalidValueError
 
+from .arguments import positive
+from .console import printable
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -19,17 +22,12 @@ if TYPE_CHECKING:
 _SHOWN = 8  # names in a line
 
 
-def printable(text: str) -> str:
-    """Return a text in which what would steer a terminal, in names of a file, is spelled out."""
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-
-
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what a file may not say about itself, and what to do with one that is refused."""
     group = parser.add_argument_group("what the files do not say, or say wrongly")
     group.add_argument("--unit", help="length of their unit: m, cm, mm, in, ... or a number [m]")
     group.add_argument("--up", metavar="AXIS", help="their axis that points up: x, y, z, -x, ...")
-    group.add_argument("--rate", type=float, help="frames per second in the files [1/s]")
+    group.add_argument("--rate", type=positive, help="frames per second in the files [1/s]")
     group.add_argument(
         "--skeleton", type=Path, metavar="ASF", help="the skeleton that belongs to AMC files"
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,8 +22,8 @@ def most_active(primitive: Primitive, channels: Sequence[str], k: int = 3) -> tu
 
 def primitive_table(library: PrimitiveLibrary) -> Table:
     """Return a row for each primitive."""
-    from rich.markup import escape
     from rich.table import Table
+    from rich.text import Text
 
     table = Table(title="primitives", title_justify="left")
     for name, justify in (("id", "right"), ("name", "left"), ("demonstrations", "right")):
@@ -33,18 +33,18 @@ def primitive_table(library: PrimitiveLibrary) -> Table:
     for primitive in library.primitives:
         table.add_row(
             str(primitive.id),
-            escape(primitive.name),
+            Text(primitive.name),
             str(primitive.n_exemplars),
             f"{primitive.mean_duration_s:.2f} s",
-            ", ".join(most_active(primitive, library.channels)),
+            Text(", ".join(most_active(primitive, library.channels))),
         )
     return table
 
 
 def transition_table(library: PrimitiveLibrary) -> Table:
     """Return a row for each primitive: what followed it, the most frequent first."""
-    from rich.markup import escape
     from rich.table import Table
+    from rich.text import Text
 
     graph = library.graph.to_networkx()
     table = Table(title="transitions", title_justify="left")
@@ -55,17 +55,17 @@ def transition_table(library: PrimitiveLibrary) -> Table:
             graph.out_edges(primitive.id, data=True), key=lambda e: (-e[2]["probability"], e[1])
         )
         following = "; ".join(
-            f"{escape(library[after].name)} {100 * edge['probability']:.0f} %"
-            for _, after, edge in out
+            f"{library[after].name} {100 * edge['probability']:.0f} %" for _, after, edge in out
         )
-        table.add_row(escape(primitive.name), following or "[dim]nothing was seen to follow[/dim]")
+        nothing = Text("nothing was seen to follow", "dim")
+        table.add_row(Text(primitive.name), Text(following) if following else nothing)
     return table
 
 
 def chain_table(library: PrimitiveLibrary) -> Table:
     """Return a row for each chain of primitives that only ever follow each other: nodes merged."""
-    from rich.markup import escape
     from rich.table import Table
+    from rich.text import Text
 
     merged = library.graph.merged()
     table = Table(title="chains, each as one node of the graph", title_justify="left")
@@ -73,8 +73,7 @@ def chain_table(library: PrimitiveLibrary) -> Table:
     table.add_column("comes")
     graph = merged.graph.to_networkx()
     names = {
-        head: " > ".join(escape(library[id].name) for id in chain)
-        for head, chain in merged.chains.items()
+        head: " > ".join(library[id].name for id in chain) for head, chain in merged.chains.items()
     }
     for head, chain in merged.chains.items():
         if len(chain) > 1:
@@ -83,13 +82,14 @@ def chain_table(library: PrimitiveLibrary) -> Table:
                 f"{names[next_head]} {100 * edge['probability']:.0f} %"
                 for _, next_head, edge in after
             )
-            table.add_row(names[head], following or "[dim]nothing was seen to follow[/dim]")
+            nothing = Text("nothing was seen to follow", "dim")
+            table.add_row(Text(names[head]), Text(following) if following else nothing)
     return table
 
 
 def primitive_tree(library: PrimitiveLibrary) -> Tree:
     """Return the tree that the primitives were learned in."""
-    from rich.markup import escape
+    from rich.text import Text
     from rich.tree import Tree
 
     below: dict[int | None, list[int]] = {}
@@ -99,9 +99,39 @@ def primitive_tree(library: PrimitiveLibrary) -> Tree:
 
     def grow(branch: Tree, parent: int | None) -> None:
         for id in below.get(parent, ()):
-            name = escape(library[id].name) if id in library else f"node {id}"
-            grow(branch.add(f"{name} [dim]{counts[id]} demonstrations[/dim]"), id)
+            name = library[id].name if id in library else f"node {id}"
+            count = (f"{counts[id]} demonstrations", "dim")
+            grow(branch.add(Text.assemble(f"{name} ", count)), id)
 
     tree = Tree("tree")
     grow(tree, None)
     return tree
+
+
+def library_summary(library: PrimitiveLibrary) -> dict[str, Any]:
+    """Return what the tables show, as values that JSON has."""
+    graph = library.graph.to_networkx()
+    return {
+        "version": library.version,
+        "body": library.body,
+        "rate_hz": library.rate_hz,
+        "channels": list(library.channels),
+        "primitives": [
+            {
+                "id": primitive.id,
+                "name": primitive.name,
+                "demonstrations": primitive.n_exemplars,
+                "duration_s": primitive.mean_duration_s,
+                "most_active": most_active(primitive, library.channels),
+            }
+            for primitive in library.primitives
+        ],
+        "transitions": [
+            {"from": before, "to": after, "probability": edge["probability"]}
+            for before, after, edge in graph.edges(data=True)
+        ],
+        "tree": [
+            {"id": node.id, "parent": node.parent, "demonstrations": node.n_exemplars}
+            for node in library.tree
+        ],
+    }

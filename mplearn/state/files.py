@@ -65,9 +65,12 @@ class FileFormat:
         }
         parts = {"header.json": as_json(header), "arrays.bin": blob}
         try:
+            path = path.resolve()  # a link stays one: what it leads to is written
+            mode = path.stat().st_mode & 0o7777 if path.exists() else 0o644
             handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        except OSError as error:
-            raise self.error(f"cannot write {path}: {error.strerror}") from error
+        except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle
+            reason = error.strerror if isinstance(error, OSError) else str(error)
+            raise self.error(f"cannot write {path}: {reason}") from error
         temporary = Path(name)
         try:
             with os.fdopen(handle, "wb") as file:
@@ -78,7 +81,7 @@ class FileFormat:
                         archive.writestr(info, data, compresslevel=self.compression)
                 file.flush()
                 os.fsync(file.fileno())
-            temporary.chmod(0o644)
+            temporary.chmod(mode)
             temporary.replace(path)
         except OSError as error:
             raise self.error(f"cannot write {path}: {error.strerror}") from error

@@ -89,7 +89,7 @@ def test_what_cannot_be_stored_is_said(library, tmp_path):
 
 
 def test_the_command(library, tmp_path, capsys):
-    command = ["export", "mplearn/x-v0", "--library", library, "--out", tmp_path,
+    command = ["episodes", "mplearn/x-v0", "--library", library, "--out", tmp_path,
                "--episodes", 2, "--dynamics", "kinematic"]  # fmt: skip
     assert main([str(each) for each in command]) == 0
     assert "2 episodes, 200 macro steps" in capsys.readouterr().out

@@ -6,12 +6,14 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+from mplearn_agents.arguments import count, seed
 from mplearn_agents.suited import SUITED
 
 if TYPE_CHECKING:
     from mplearn_agents.contest import Contest
 
 HELP = "Compare policies and trained agents on the environment's tasks."
+EXAMPLE = "mplearn compare --tasks goal --policies random greedy --seeds 3"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,26 +37,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="compare on 'goal', too, the uses of the prior, and PPO and DQN without masks",
     )
-    parser.add_argument("--seeds", type=int, default=5, help="number of seeds (default: 5)")
-    parser.add_argument("--first-seed", type=int, default=100, help="the first (default: 100)")
-    parser.add_argument("--episodes", type=int, default=50, help="kinematic episodes a seed")
+    parser.add_argument("--seeds", type=count, default=5, help="number of seeds (default: 5)")
+    parser.add_argument("--first-seed", type=seed, default=100, help="the first (default: 100)")
+    parser.add_argument("--episodes", type=count, default=50, help="kinematic episodes a seed")
     parser.add_argument(
-        "--simulated-episodes", type=int, default=4, help="simulated episodes a seed"
+        "--simulated-episodes", type=count, default=4, help="simulated episodes a seed"
     )
-    parser.add_argument("--steps", type=int, help="macro steps of a training (default: by task)")
-    parser.add_argument("--jobs", type=int, help="processes (default: one a processor)")
+    parser.add_argument("--steps", type=count, help="macro steps of a training (default: by task)")
+    parser.add_argument("--jobs", type=count, help="processes (default: one a processor)")
 
 
 def run(args: argparse.Namespace) -> None:
     """Train and play what was not before, and print and write each table as it is done."""
     from dataclasses import replace
 
-    from rich.console import Console
     from rich.progress import Progress
     from rich.table import Table as Shown
 
     from mplearn_agents.compare import compare
     from mplearn_agents.comparison import Comparison
+    from mplearn_agents.console import open_console
     from mplearn_agents.policies import POLICIES
     from mplearn_agents.rl.config import AlgorithmName, PriorUse
 
@@ -77,7 +79,7 @@ def run(args: argparse.Namespace) -> None:
             replace(alone, algorithms=("maskable-ppo",), priors=get_args(PriorUse)),
             replace(alone, algorithms=get_args(AlgorithmName), priors=None),
         ]
-    console, file = Console(), args.out / "compare.md"
+    console, file = open_console(), args.out / "compare.md"
     args.out.mkdir(parents=True, exist_ok=True)
     written: list[str] = []
     total = sum(each.n_contests for each in comparisons)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mplearn.errors import InvalidValueError, MPLearnError
+from mplearn_agents.arguments import count, seed
 
 from ..evaluations import BUILT_IN, Setting, evaluations_for
 from ..reading import say_left_out
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from mplearn.evaluation import Table
 
 HELP = "Measure segmentation, learning and performing, on synthetic sessions or on recordings."
+EXAMPLE = "mplearn evaluate synthetic --only segmentation"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,11 +32,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only", nargs="+", metavar="NAME", help="run these experiments only")
     parser.add_argument("--list", action="store_true", help="name the experiments, run none")
     parser.add_argument(
-        "--orders", type=int, default=5, help="orders of presentation a person (default: 5)"
+        "--orders", type=count, default=5, help="orders of presentation a person (default: 5)"
     )
     parser.add_argument(
         "--seeds",
-        type=int,
+        type=seed,
         nargs="+",
         default=[101, 102, 103],
         help="seeds of synthetic sessions and of walks (default: 101 102 103)",
@@ -48,9 +50,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Run the experiments; print each table as it is done."""
-    from rich.console import Console
+    from mplearn_agents.console import open_console
 
-    console = Console()
+    console = open_console()
     setting = Setting(args.data, tuple(args.seeds), args.orders, _wrong(args))
     found = evaluations_for(setting)
     if args.list:

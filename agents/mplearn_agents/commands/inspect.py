@@ -8,7 +8,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mplearn_agents.reading import add_reading_arguments, hints_of, printable, say_left_out
+from mplearn_agents.console import open_console
+from mplearn_agents.reading import add_reading_arguments, hints_of, say_left_out
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from mplearn_agents.inspection import Inspection
 
 HELP = "Show what recordings hold: how they were read, and the person recognised in them."
+EXAMPLE = "mplearn inspect session.c3d --up y --unit mm"
 _MANY = 12  # names in a line
 _MOST_ROWS = 20  # of a picture
 
@@ -33,13 +35,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Read, recognise, print and draw."""
-    from rich.console import Console
-
     from mplearn.anatomy import read_map
     from mplearn.mocap import command_line, open_takes
     from mplearn_agents.inspection import inspect
 
-    console = Console(soft_wrap=True, highlight=False, markup=False)
+    console = open_console()
     with command_line():
         takes = open_takes(
             args.data, positions=True, hints=hints_of(args, joint_axes=True), strict=args.strict
@@ -74,12 +74,12 @@ def _draw(args: argparse.Namespace, found: list[Inspection], console: Console) -
     draw(found[::step], path)
     if not args.json:
         more = f" of every {step}th take" if step > 1 else ""
-        console.print(printable(f"stick figures{more} written to {path}"))
+        console.print(f"stick figures{more} written to {path}")
 
 
 def _say(console: Console, each: Inspection) -> None:
     def say(text: str) -> None:
-        console.print(printable(text))
+        console.print(text, soft_wrap=True)
 
     facts = each.as_dict()
     unit = f", unit {facts['unit_m']:g} m" if facts["unit_m"] else ""

@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import InvalidValueError, MPLearnError, RecordingError, StateError
+from mplearn_agents.arguments import count, positive
+from mplearn_agents.console import open_console, printable
 from mplearn_agents.live_learning import add_live_arguments, learn_from_source
 from mplearn_agents.reading import (
     add_reading_arguments,
     hints_of,
-    printable,
     say_bodies,
     say_left_out,
     say_takes,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 _SAME_RATE = 1e-3  # rates that differ by a smaller share are one
 
 HELP = "Learn primitives and their order from recordings, or from a live stream."
+EXAMPLE = "mplearn learn recordings/ --out my.mplearn"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,7 +49,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "same command goes on; what it has learned from already is not learned again",
     )
     parser.add_argument(
-        "--rate-hz", type=float, help="resample to this rate [1/s] (default: the recordings' own)"
+        "--rate-hz",
+        type=positive,
+        help="resample to this rate [1/s] (default: the recordings' own)",
     )
     parser.add_argument(
         "--observe",
@@ -59,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--segmenter", help="how the stream is cut (default: the learner's own)")
     parser.add_argument(
         "--demonstrations",
-        type=int,
+        type=count,
         metavar="N",
         help="how often a motion must be shown to be known (default: 2); with 1, what was shown "
         "once is kept as well, to be performed, not to be recognised. Where nothing was shown "
@@ -92,8 +96,6 @@ def run(args: argparse.Namespace) -> None:
 
 
 def _learn_from_files(args: argparse.Namespace) -> None:
-    from rich.console import Console
-
     from mplearn.evaluation import observe
     from mplearn.learner import LearnerConfig, with_takes
     from mplearn.mocap import command_line, open_takes
@@ -101,7 +103,7 @@ def _learn_from_files(args: argparse.Namespace) -> None:
     from mplearn_agents.learning import learn, why_nothing
     from mplearn_agents.tables import primitive_table
 
-    console = Console()
+    console = open_console()
     with command_line():
         takes = open_takes(
             args.data,

@@ -6,9 +6,11 @@ import argparse
 from pathlib import Path
 
 from mplearn.extras import require
-from mplearn_agents.reading import printable
+from mplearn_agents.arguments import pace, port
+from mplearn_agents.console import printable
 
 HELP = "Learn from live motion, and show it all on a page in the browser."
+EXAMPLE = "mplearn live demonstrator --port 8765"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="keep all that is learned in this file, and go on from it the next time",
     )
-    parser.add_argument("--speed", type=float, help="times as fast, of a source that is played")
+    parser.add_argument("--speed", type=pace, help="times as fast, of a source that is played")
     parser.add_argument(
         "--observe",
         choices=["robot", "positions", "channels"],
@@ -35,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--host", default="127.0.0.1", help="address to be reached at (default: this machine only)"
     )
-    parser.add_argument("--port", type=int, default=8765, help="port, 0 for any (default: 8765)")
+    parser.add_argument("--port", type=port, default=8765, help="port, 0 for any (default: 8765)")
     parser.add_argument(
         "--token", default="", help="what others must know to look on; made up where needed"
     )

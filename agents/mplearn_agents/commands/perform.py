@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import InvalidValueError, MissingDependencyError
+from mplearn_agents.arguments import count, positive, primitive_key, seed, whole
 
 if TYPE_CHECKING:
     import gymnasium
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from mplearn_agents.policies import Policy
 
 HELP = "Let the robot walk the graph of a library, or do a task."
+EXAMPLE = "mplearn perform my.mplearn --steps 20 --video walk.mp4"
 _GOAL = "path"
 _CUT_OFF = {"overshoot": math.inf, "slowest": 0.05}  # what is shown where not all can be
 
@@ -36,11 +38,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dynamics", choices=["simulated", "kinematic"], default="simulated", help="how it moves"
     )
-    parser.add_argument("--steps", type=int, default=20, help="how many primitives (default: 20)")
-    parser.add_argument("--episodes", type=int, help="how many episodes, instead of --steps")
-    parser.add_argument("--seed", type=int, default=0, help="seed of the walk (default: 0)")
     parser.add_argument(
-        "--speed", type=float, default=0.5, help="share of the human's speed (default: 0.5)"
+        "--steps", type=whole(1, noun="step"), default=20, help="how many primitives (default: 20)"
+    )
+    parser.add_argument("--episodes", type=count, help="how many episodes, instead of --steps")
+    parser.add_argument("--seed", type=seed, default=0, help="seed of the walk (default: 0)")
+    parser.add_argument(
+        "--speed", type=positive, default=0.5, help="share of the human's speed (default: 0.5)"
     )
     parser.add_argument(
         "--upper-body",
@@ -137,5 +141,5 @@ def _policy(args: argparse.Namespace, env: gymnasium.Env[Any, Any]) -> Policy:
         return agent
     if args.goal is None:
         return POLICIES[args.policy](env)
-    goal = int(args.goal) if args.goal.isdecimal() else args.goal
+    goal = primitive_key(args.goal)
     return PathToGoal.for_env(env, goal)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from mplearn_agents.reading import printable
+from mplearn_agents.arguments import primitive_key
 
 HELP = "Give a primitive of a library a name; its id stays."
+EXAMPLE = "mplearn rename my.mplearn 7 'bow down'"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,11 +25,10 @@ def run(args: argparse.Namespace) -> None:
     from mplearn_agents.commands import store
 
     if looks_like_one(args.library):
-        print(printable(store.rename(args.library, args.primitive, args.name)))
+        print(store.rename(args.library, args.primitive, args.name))
         return
     library = PrimitiveLibrary.load(args.library)
-    digits = args.primitive.isdecimal() and args.primitive not in library
-    key = int(args.primitive) if digits else args.primitive
+    key = args.primitive if args.primitive in library else primitive_key(args.primitive)
     before = library[key]
     library.rename(key, args.name).save(args.library)
     print(f"primitive {before.id}: {before.name} -> {args.name}")

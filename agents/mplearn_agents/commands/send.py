@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 
 from mplearn.errors import InvalidValueError
+from mplearn_agents.arguments import pace
 
 HELP = "Send a recording over a network, at its own pace, for another program to learn live."
+EXAMPLE = "mplearn send session.c3d --to udp:127.0.0.1:5005"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="WHERE",
         help="udp:HOST:PORT, ndjson:HOST:PORT (TCP), ndjson:- (standard output) or lsl:NAME",
     )
-    parser.add_argument("--speed", type=float, help="times as fast as it was recorded (default: 1)")
+    parser.add_argument("--speed", type=pace, help="times as fast as it was recorded (default: 1)")
     parser.add_argument("--take", help="which take of a folder")
     parser.add_argument(
         "--observe",

@@ -10,12 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import StoreDamagedError
-from mplearn_agents.reading import printable
+from mplearn_agents.arguments import whole
+from mplearn_agents.console import printable
 
 if TYPE_CHECKING:
     from mplearn.store import Command, Entry, Happening, LifelongLearner
 
 HELP = "Look after a store: what it holds, its log, backups, checks, commands, undo and redo."
+EXAMPLE = "mplearn store info life.db"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -69,7 +71,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("redo", "do a command again that was undone"),
     ):
         action = add(name, help, _toggle)
-        action.add_argument("number", type=int, nargs="?", help="its number (default: the last)")
+        action.add_argument(
+            "number", type=whole(1), nargs="?", help="its number (default: the last)"
+        )
         action.set_defaults(kind=name)
         action.add_argument("--by", default="", help="who asks, for the log")
 

@@ -7,12 +7,14 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+from mplearn_agents.arguments import count, seed
 from mplearn_agents.suited import suited
 
 if TYPE_CHECKING:
     from mplearn_agents.rl import TrainedPolicy, TrainingConfig
 
 HELP = "Train an agent to choose primitives, with masks, the prior and macro steps."
+EXAMPLE = "mplearn train --task goal --out agents/goal"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what the transition prior is to the policy (default: a feature in 'follow', initial "
         "logits elsewhere)",
     )
-    parser.add_argument("--steps", type=int, help="macro steps to train for (default: by task)")
+    parser.add_argument("--steps", type=count, help="macro steps to train for (default: by task)")
     for name, what in (
         ("round_steps", "macro steps between checkpoints"),
         ("episodes", "episodes of each evaluation"),
@@ -43,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ):
         parser.add_argument(
             f"--{name.replace('_', '-')}",
-            type=int,
+            type=seed if name == "seed" else count,
             default=default[name],
             help=f"{what} (default: {default[name]})",
         )
@@ -60,8 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Train, and say how good the agent is."""
-    from rich.console import Console
-
+    from mplearn_agents.console import open_console
     from mplearn_agents.rl import TrainingConfig
     from mplearn_agents.rl.train import train
 
@@ -70,7 +71,7 @@ def run(args: argparse.Namespace) -> None:
     usual = suited(args.task)
     given["prior"] = args.prior or usual.prior
     given["steps"] = usual.steps if args.steps is None else args.steps
-    console = Console()
+    console = open_console()
     config = TrainingConfig(**given)
     start = None if args.start is None else _taken_along(args.start, config)
     train(config, args.out, resume=args.resume, start=start, console=console)

@@ -12,6 +12,7 @@ import numpy as np
 
 from mplearn.errors import InvalidValueError
 from mplearn.extras import require
+from mplearn_agents.console import heading
 from mplearn_agents.learning import learn
 from mplearn_agents.report import render_page
 from mplearn_envs.rendering.backend import choose_backend
@@ -60,10 +61,11 @@ def run_demo(out: Path, minutes: float, steps: int, seed: int, console: Console)
     script = markov_script(length, np.random.default_rng(seed), balance=0.5)
     demonstration = demonstrate(script, seed)
     recording = demonstration.recording
-    console.print(
-        f"[bold]watching[/] a person with {len(recording.marker_names)} markers perform "
+    text = (
+        f"a person with {len(recording.marker_names)} markers perform "
         f"{len(PAPER_PRIMITIVES)} kinds of motion for {recording.duration_s / 60:.1f} minutes"
     )
+    console.print(heading("watching", text))
     config = LearnerConfig(recording.channels, recording.rate_hz)
     with console.status("compiling, the first time only"):
         MotionLearner(config).learn_many(recording.frames[:_WARM_UP_FRAMES])
@@ -75,11 +77,11 @@ def run_demo(out: Path, minutes: float, steps: int, seed: int, console: Console)
     library.save(out / "library.mplearn")
 
     walked, robot = perform(library, steps, seed)
-    console.print(
-        f"[bold]walking[/]  {len(walked.primitives)} primitives in {walked.duration_s:.0f} s of "
-        f"the robot's time, {walked.falls} falls: {', '.join(step.name for step in walked.steps)}",
-        highlight=False,
+    text = (
+        f"{len(walked.primitives)} primitives in {walked.duration_s:.0f} s of "
+        f"the robot's time, {walked.falls} falls: {', '.join(step.name for step in walked.steps)}"
     )
+    console.print(heading("walking", text))
     film, without_film = None, ""
     if can_draw:
         film = make_film(walked, robot, demonstration, score.classes, out, console)
@@ -88,28 +90,29 @@ def run_demo(out: Path, minutes: float, steps: int, seed: int, console: Console)
             "There is no off-screen renderer on this machine, so there is neither film nor video: "
             "install libegl1 and libgl1-mesa-dri, or libosmesa6."
         )
-        console.print(f"[yellow]{without_film}[/]")
+        console.print(without_film, style="yellow")
     run = Run(demonstration, log, library, score, walked, film, without_film, seed)
     page = demo_page(run, out)
     report = out / "report.html"
     report.write_text(render_page(page), encoding="utf-8")
     for table in tables(page):
         console.print(table)
-    console.print(f"[bold]report[/]   {report}, after {time.perf_counter() - begin:.0f} s")
-    console.print("[bold]next[/]     watch it learn, and teach it, in the browser: mplearn live")
+    console.print(heading("report", f"{report}, after {time.perf_counter() - begin:.0f} s"))
+    text = "watch it learn, and teach it, in the browser: mplearn live"
+    console.print(heading("next", text))
     return report
 
 
 def tables(page: Page) -> Iterator[Table]:
     """Yield the report's two tables for the console."""
-    from rich.markup import escape
     from rich.table import Table
+    from rich.text import Text
 
     learned = Table(title="what was learned, against the truth", title_justify="left")
     for column in page.primitive_columns[:-1]:
         learned.add_column(column.name, justify="right" if column.numeric else "left", no_wrap=True)
     for row in page.primitives:
-        learned.add_row(*map(escape, row.cells[:-1]), style="dim" if row.absent else None)
+        learned.add_row(*map(Text, row.cells[:-1]), style="dim" if row.absent else None)
     yield learned
     rates = Table(title="against the paper", title_justify="left")
     rates.add_column("measure")
@@ -117,7 +120,7 @@ def tables(page: Page) -> Iterator[Table]:
     rates.add_column("the paper", justify="right")
     for rate in page.rates:
         style = {"better": "green", "worse": "red", "": ""}[rate.verdict]
-        rates.add_row(rate.name, f"[{style}]{rate.here}[/]" if style else rate.here, rate.paper)
+        rates.add_row(rate.name, Text(rate.here, style), rate.paper)
     yield rates
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mplearn.extras import require
+from mplearn_agents.console import printable
 
 
 def captioned(picture: NDArray[np.uint8], text: str, note: str = "") -> NDArray[np.uint8]:
@@ -19,6 +20,7 @@ def captioned(picture: NDArray[np.uint8], text: str, note: str = "") -> NDArray[
     Raises:
         MissingDependencyError: pillow, which matplotlib brings, is not installed.
     """
+    text, note = printable(text), printable(note)
     image = require("PIL.Image", "report").fromarray(picture)
     draw = require("PIL.ImageDraw", "report").Draw(image, "RGBA")
     size = max(11, image.height // 20)

@@ -7,6 +7,7 @@ from importlib.resources import files
 from typing import Literal
 
 from mplearn.extras import require
+from mplearn_agents.console import printable
 
 
 @dataclass(frozen=True)
@@ -112,6 +113,9 @@ class Page:
     footer: str = ""
 
 
+_SPACES = "\n\t\u00a0\u2009\u202f"  # which are not printable, and stay
+
+
 def render_page(page: Page) -> str:
     """Return the page as one HTML text that refers to nothing outside itself.
 
@@ -139,4 +143,5 @@ def render_page(page: Page) -> str:
         "graph": "Graph",
     }
     sections = [(key, names[key]) for key, shown in present.items() if shown]
-    return str(template.render(page=page, sections=sections))
+    text = str(template.render(page=page, sections=sections))
+    return printable(text, keep=_SPACES)

@@ -23,6 +23,7 @@ from mplearn_envs.mechanics.velocity_ik import (
     advance,
     errors,
     rates,
+    settle,
 )
 from mplearn_envs.robot import Robot
 
@@ -75,6 +76,7 @@ class BalanceController:
         q[3:7] = reference.q[3:7]
         rows[HEIGHT] += bowed[HEIGHT] - now[HEIGHT]
         q = advance(robot.stance, q, rates(robot.tree, robot.stance, pose, rows))
+        q, _ = settle(robot.tree, robot.stance, q, height, upright, 1e-9, 2)
         velocity = (target - reference.target) / period_s
         return reference._replace(target=target.copy(), velocity=velocity, q=q)
 

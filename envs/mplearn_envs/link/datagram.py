@@ -17,24 +17,37 @@ offset size type    field
 84     8 n  float64 angles of the upper joints [rad]
 84+8n  4    uint32  CRC-32 of all bytes before
 ====== ==== ======= ==========================================================
+
+In a keyed stream the version is 2, and these follow:
+
+====== ==== ======= ==========================================================
+88+8n  8    float64 when it was sent, on the sender's wall clock [s since 1970]
+96+8n  32   bytes   HMAC-SHA256 of all bytes before, with the shared key
+====== ==== ======= ==========================================================
 """
 
 from __future__ import annotations
 
+import hashlib
+import hmac
 import struct
 import zlib
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from mplearn.errors import MPLearnError
+from mplearn.errors import InvalidValueError, MPLearnError
 from mplearn.maths.yaw_roll_pitch import roll_pitch_of, yaw_roll_pitch_quaternion
 from mplearn.recording import FloatArray
 
-MAGIC, VERSION = b"MPLU", 1
+MAGIC, VERSION, KEYED = b"MPLU", 1, 2
+SHORTEST_KEY = 16  # bytes
 _HEADER = struct.Struct(">4sBBHIIId")
 _CHECKSUM = struct.Struct(">I")
+_SENT = struct.Struct(">d")
+_MAC_SIZE = hashlib.sha256().digest_size
 _FRAME_VALUES = 7
 _LAST = 1
 
@@ -64,6 +77,7 @@ class Datagram(NamedTuple):
         base: Desired frame of the base, shape (7,): position [m] and quaternion (w, x, y, z).
         angles: Angles of the upper joints, shape (n,) [rad].
         last: Whether the stream ends with it.
+        sent_s: When it was sent, on the sender's wall clock [s]; None where it is not keyed.
     """
 
     stream: int
@@ -72,6 +86,30 @@ class Datagram(NamedTuple):
     base: FloatArray
     angles: FloatArray
     last: bool = False
+    sent_s: float | None = None
+
+
+def checked_key(key: bytes | None) -> bytes | None:
+    """Return a key that both ends share.
+
+    Raises:
+        InvalidValueError: It is too short to keep anyone out.
+    """
+    if key is not None and len(key) < SHORTEST_KEY:
+        raise InvalidValueError(f"a key needs {SHORTEST_KEY} bytes or more, not {len(key)}")
+    return key
+
+
+def read_key(path: Path) -> bytes:
+    """Return the key in a file, blanks around it left out.
+
+    Raises:
+        InvalidValueError: The file cannot be read, or its key is too short.
+    """
+    try:
+        return checked_key(path.read_bytes().strip()) or b""
+    except OSError as error:
+        raise InvalidValueError(f"the key file {path} cannot be read: {error.strerror}") from error
 
 
 def robot_code(joint_names: Sequence[str]) -> int:
@@ -79,12 +117,12 @@ def robot_code(joint_names: Sequence[str]) -> int:
     return zlib.crc32(",".join(joint_names).encode())
 
 
-def encode(datagram: Datagram, robot: int) -> bytes:
-    """Return the bytes of a datagram for the robot with this code."""
+def encode(datagram: Datagram, robot: int, key: bytes | None = None) -> bytes:
+    """Return the bytes of a datagram for the robot with this code; keyed, it needs ``sent_s``."""
     n = len(datagram.angles)
     header = _HEADER.pack(
         MAGIC,
-        VERSION,
+        VERSION if key is None else KEYED,
         _LAST * datagram.last,
         n,
         robot,
@@ -93,29 +131,39 @@ def encode(datagram: Datagram, robot: int) -> bytes:
         datagram.time_s,
     )
     values = np.concatenate((datagram.base, datagram.angles)).astype(">f8").tobytes()
-    return header + values + _CHECKSUM.pack(zlib.crc32(header + values))
+    plain = header + values + _CHECKSUM.pack(zlib.crc32(header + values))
+    if key is None:
+        return plain
+    proven = plain + _SENT.pack(datagram.sent_s)
+    return proven + hmac.digest(key, proven, "sha256")
 
 
-def decode(data: bytes, robot: int, n_angles: int) -> Datagram:
+def decode(data: bytes, robot: int, n_angles: int, key: bytes | None = None) -> Datagram:
     """Return what some bytes say.
 
     Args:
         data: What came.
         robot: Code of the robot that they must be for.
         n_angles: Number of its upper joints.
+        key: What the sender must share; None takes datagrams without a key, and only these.
 
     Raises:
         DatagramError: They are foreign or malformed; nothing else is raised, whatever comes.
     """
     if data[:4] != MAGIC:
         raise DatagramError("foreign", f"begins with {data[:4]!r}, not {MAGIC!r}")
+    sent_s = None
+    if key is not None:
+        data, sent_s = _proven(data, key)
     size = _HEADER.size + 8 * (_FRAME_VALUES + n_angles) + _CHECKSUM.size
     if len(data) < _HEADER.size + _CHECKSUM.size:
         raise DatagramError("malformed", f"{len(data)} bytes, not {size}")
+    if key is None and data[len(MAGIC)] == KEYED:
+        raise DatagramError("foreign", "it is keyed, and no key is known here")
     if _CHECKSUM.unpack(data[-_CHECKSUM.size :])[0] != zlib.crc32(data[: -_CHECKSUM.size]):
         raise DatagramError("malformed", "its checksum is wrong")
     _, version, flags, n, code, stream, sequence, time_s = _HEADER.unpack_from(data)
-    if version != VERSION:
+    if version != (VERSION if key is None else KEYED):
         raise DatagramError("malformed", f"version {version}, not {VERSION}")
     if code != robot:
         raise DatagramError("foreign", f"for robot {code:08x}, not {robot:08x}")
@@ -126,7 +174,18 @@ def decode(data: bytes, robot: int, n_angles: int) -> Datagram:
     if not (np.isfinite(values).all() and np.isfinite(time_s) and abs(norm - 1.0) < 1e-3):
         raise DatagramError("malformed", "its values are not finite, or its frame is no rotation")
     last = bool(flags & _LAST)
-    return Datagram(stream, sequence, time_s, values[:_FRAME_VALUES], values[_FRAME_VALUES:], last)
+    base, angles = values[:_FRAME_VALUES], values[_FRAME_VALUES:]
+    return Datagram(stream, sequence, time_s, base, angles, last, sent_s)
+
+
+def _proven(data: bytes, key: bytes) -> tuple[bytes, float]:
+    """Return the part of a keyed datagram before its proof, and when it was sent [s]."""
+    proven, mac = data[:-_MAC_SIZE], data[-_MAC_SIZE:]
+    if len(data) < _MAC_SIZE + _SENT.size:
+        raise DatagramError("foreign", f"{len(data)} bytes hold no proof of a shared key")
+    if not hmac.compare_digest(mac, hmac.digest(key, proven, "sha256")):
+        raise DatagramError("foreign", "its sender does not share the key")
+    return proven[: -_SENT.size], float(_SENT.unpack(proven[-_SENT.size :])[0])
 
 
 def base_frame(height_m: float, roll: float, pitch: float) -> FloatArray:

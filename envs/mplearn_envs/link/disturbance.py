@@ -10,7 +10,8 @@ from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray
 from mplearn_envs.robot import Robot
 
-from .sender import HOST, PORT, Sender
+from .sender import Sender
+from .sockets import HOST, PORT
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ class DisturbedSender(Sender):
         rng: Source of randomness.
         host: See `Sender`.
         port: See `Sender`.
+        key: See `Sender`.
 
     Attributes:
         done: How many suffered what.
@@ -58,8 +60,10 @@ class DisturbedSender(Sender):
         rng: np.random.Generator,
         host: str = HOST,
         port: int = PORT,
+        *,
+        key: bytes | None = None,
     ) -> None:
-        super().__init__(robot, host, port)
+        super().__init__(robot, host, port, key=key)
         self.disturbance, self.rng = disturbance, rng
         self.done = dict.fromkeys(vars(disturbance), 0)
         self._waiting: bytes | None = None

@@ -12,12 +12,15 @@ from mplearn.generation.joins import drawn_from
 from mplearn.recording import FloatArray
 from mplearn_envs.control import StandingController
 from mplearn_envs.mechanics import reference_robot, rest_reference
+from mplearn_envs.mechanics.gravity import standing_commands
 from mplearn_envs.mechanics.reference import tracked_columns
 from mplearn_envs.robot import Robot
 
+from .command_limiter import CommandLimiter
 from .datagram import base_coordinates
 from .playback import Playback
 from .receiver import Receiver
+from .restraint import Restraint
 
 Phase: TypeAlias = Literal["waiting", "following", "holding", "settling"]
 
@@ -28,7 +31,9 @@ class LowerBody:
     Postures are followed as `Playback` plays them, evenly, however they come. Where no newer one
     comes for ``hold_s``, the last one is held; after ``settle_s`` the robot goes back to standing.
     When postures come again it follows them again. All these pass into each other within
-    ``fade_s``: never a jump, never a command outside the joints' limits.
+    ``fade_s``. A sender is not trusted: `Restraint` follows it no faster and no farther than the
+    robot keeps standing, and `CommandLimiter` lets no command pass that is outside the limits of
+    position, velocity and acceleration.
 
     Args:
         robot: The robot.
@@ -41,6 +46,8 @@ class LowerBody:
     Attributes:
         phase: "waiting" for the first posture, "following", "holding" or "settling".
         spent_s: Time spent in each phase [s].
+        restraint: How much of what comes is followed.
+        limiter: The commands' limits.
     """
 
     def __init__(
@@ -67,9 +74,11 @@ class LowerBody:
         self._columns = tracked_columns(robot)
         self._rest = rest_reference(robot).target
         self._limits = reference_robot(robot).limits
+        self.restraint = Restraint(robot, period_s)
+        held = standing_commands(robot, reference_robot(robot).rest)
+        self.limiter = CommandLimiter(robot, period_s, held)
         self._playback = Playback(period_s)
         self._plays = False
-        self._wanted, self._velocity = self._rest, np.zeros_like(self._rest)
         self._fade: Iterator[FloatArray] = iter(())
         self._heard_s = -np.inf
 
@@ -95,11 +104,9 @@ class LowerBody:
         if anew or plays != self._plays:
             self._fade = self._fading(source)
         self._plays = plays
-        before, self._wanted = self._wanted, source + next(self._fade, 0.0)
-        self._velocity = (self._wanted - before) / self.period_s
         frame = np.zeros(len(self.robot.channels))
-        frame[self._columns] = self._wanted
-        return self.controller.update(frame)
+        frame[self._columns] = self.restraint.update(source + next(self._fade, 0.0))
+        return self.limiter.update(self.controller.update(frame))
 
     def _listen(self, now_s: float) -> bool:
         """Take what has come; returns whether it does not follow what came before."""
@@ -113,7 +120,8 @@ class LowerBody:
 
     def _fading(self, source: FloatArray) -> Iterator[FloatArray]:
         """Return what to add to a source, period by period, to pass into it without a jump."""
-        off = self._wanted + self.period_s * self._velocity - source
+        here, velocity = self.restraint.position, self.restraint.velocity
+        off = here + self.period_s * velocity - source
         n = 1 + round(self.fade_s / self.period_s)
         still = np.zeros((n, len(source)))
-        return iter(drawn_from(still, off, self._velocity, 1.0 / self.period_s, self.fade_s))
+        return iter(drawn_from(still, off, velocity, 1.0 / self.period_s, self.fade_s))

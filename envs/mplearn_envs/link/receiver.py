@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
+import time
+from collections import OrderedDict, deque
 from dataclasses import dataclass
 from typing import Self
 
@@ -11,8 +12,8 @@ import numpy as np
 from mplearn.errors import InvalidValueError
 from mplearn_envs.robot import Robot
 
-from .datagram import Datagram, DatagramError, decode, robot_code
-from .sender import HOST, PORT, LinkError, open_socket
+from .datagram import Datagram, DatagramError, checked_key, decode, robot_code
+from .sockets import HOST, PORT, open_socket
 
 _MOST_A_CALL = 256  # datagrams read in one call: a flood must not keep the controller waiting
 _LARGEST = 65_536
@@ -30,7 +31,10 @@ class LinkCounts:
         reordered: Came after a newer one; not used.
         duplicate: Came again; not used.
         malformed: Were damaged; not used.
-        foreign: Were something else, for another robot or from another sender; not used.
+        foreign: Were something else, for another robot, from another sender, or without proof that
+            the sender shares the key; not used.
+        stale: Were keyed, but sent at another time than now, or of a stream that was left: they are
+            replayed, or the wall clocks disagree; not used.
     """
 
     used: int = 0
@@ -40,6 +44,7 @@ class LinkCounts:
     duplicate: int = 0
     malformed: int = 0
     foreign: int = 0
+    stale: int = 0
 
 
 class Receiver:
@@ -51,10 +56,14 @@ class Receiver:
 
     Args:
         robot: The robot.
-        host: Address to listen at; only this machine is heard by default.
+        host: Address of IPv4 or IPv6 to listen at; only this machine is heard by default, all that
+            reach it by "0.0.0.0" or "::".
         port: UDP port; 0 takes any free one (see ``port``).
         late_s: Delay beyond which a datagram counts as late [s].
         patience_s: Silence after which another stream may take over [s].
+        key: What the sender must share, 16 bytes or more. Then nobody else is followed, and nothing
+            that is replayed: both wall clocks must agree within ``fresh_s``.
+        fresh_s: See there [s].
 
     Attributes:
         port: The port that is listened at.
@@ -72,14 +81,20 @@ class Receiver:
         *,
         late_s: float = 0.02,
         patience_s: float = 1.0,
+        key: bytes | None = None,
+        fresh_s: float = 30.0,
     ) -> None:
-        if not (late_s > 0 and patience_s > 0):
+        if not (late_s > 0 and patience_s > 0 and fresh_s > 0):
             raise InvalidValueError(
-                f"late_s and patience_s must be positive, not {late_s} and {patience_s}"
+                "late_s, patience_s and fresh_s must be positive, "
+                f"not {late_s}, {patience_s} and {fresh_s}"
             )
         self.robot, self.host = robot, host
         self.late_s, self.patience_s = late_s, patience_s
+        self.fresh_s = fresh_s
         self.counts = LinkCounts()
+        self._key = checked_key(key)
+        self._left: deque[int] = deque(maxlen=_REMEMBERED)
         self._code = robot_code([robot.joint_names[i] for i in robot.upper_joints])
         self._stream: int | None = None
         self._newest = -1
@@ -87,12 +102,7 @@ class Receiver:
         self._missing: OrderedDict[int, None] = OrderedDict()
         self._smallest_delay_s = np.inf
         self._heard_s = 0.0
-        self._socket = open_socket()
-        try:
-            self._socket.bind((host, port))
-        except OSError as error:
-            self._socket.close()
-            raise LinkError(f"cannot listen at {host}, port {port}: {error}") from error
+        self._socket, _ = open_socket(host, port, listen=True)
         self.port: int = self._socket.getsockname()[1]
 
     def receive(self, now_s: float) -> list[Datagram]:
@@ -116,18 +126,23 @@ class Receiver:
         """Judge one datagram; return it where it is the newest of the stream, else count it."""
         counts = self.counts
         try:
-            datagram = decode(data, self._code, len(self.robot.upper_joints))
+            datagram = decode(data, self._code, len(self.robot.upper_joints), self._key)
         except DatagramError as error:
             if error.fault == "foreign":
                 counts.foreign += 1
             else:
                 counts.malformed += 1
             return None
+        if self._is_stale(datagram):
+            counts.stale += 1
+            return None
         if datagram.stream != self._stream:
             silent = self._ended or now_s - self._heard_s > self.patience_s
             if self._stream is not None and not silent:
                 counts.foreign += 1
                 return None
+            if self._stream is not None:
+                self._left.append(self._stream)
             self._stream, self._newest = datagram.stream, datagram.sequence - 1
             self._missing.clear()
             self._smallest_delay_s = np.inf
@@ -142,6 +157,14 @@ class Receiver:
         counts.used += 1
         counts.late += int(delay_s - self._smallest_delay_s > self.late_s)
         return datagram
+
+    def _is_stale(self, datagram: Datagram) -> bool:
+        """Tell whether a keyed datagram may have been recorded and sent again."""
+        if datagram.sent_s is None:
+            return False
+        return not abs(time.time() - datagram.sent_s) <= self.fresh_s or (
+            datagram.stream in self._left
+        )
 
     def _count_old(self, sequence: int) -> None:
         if sequence in self._missing:

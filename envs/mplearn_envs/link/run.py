@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
+from mplearn.errors import InvalidValueError
 from mplearn.generation import retime
 from mplearn.generation.joins import drawn_from
 from mplearn.recording import FloatArray
@@ -21,7 +23,7 @@ from mplearn_envs.skills.skills import Skills
 from .disturbance import Disturbance, DisturbedSender
 from .lower_body import LowerBody
 from .receiver import LinkCounts, Receiver
-from .sender import HOST, PORT
+from .sockets import HOST, PORT
 from .upper_body import UpperBody
 
 PATH = ("both arms raise", "both arms lower", "bow down", "bow up", "squat down", "squat raise")
@@ -38,7 +40,8 @@ class LinkReport(NamedTuple):
         counts: What came of the datagrams.
         spent_s: Time spent waiting, following, holding and settling [s].
         fallen: Whether the robot fell.
-        outside: How many commands were outside the joints' limits.
+        outside: How many commands were outside the joints' limits of position.
+        hasty: How many were outside those of velocity or acceleration.
         slowest_period_s: Longest computation of one period [s].
     """
 
@@ -46,6 +49,7 @@ class LinkReport(NamedTuple):
     spent_s: dict[str, float]
     fallen: bool
     outside: int
+    hasty: int
     slowest_period_s: float
 
     def table(self) -> str:
@@ -54,6 +58,7 @@ class LinkReport(NamedTuple):
         lines += [f"{name:>12} {value:.2f} s" for name, value in self.spent_s.items()]
         lines.append(f"{'fallen':>12} {'yes' if self.fallen else 'no'}")
         lines.append(f"{'outside':>12} {self.outside}")
+        lines.append(f"{'hasty':>12} {self.hasty}")
         lines.append(f"{'period':>12} {1e3 * self.slowest_period_s:.1f} ms at most")
         return "\n".join(lines)
 
@@ -66,13 +71,14 @@ def run_upper(
     speed: float = 0.5,
     disturbance: Disturbance | None = None,
     seed: int = 0,
+    key: bytes | None = None,
 ) -> DisturbedSender:
     """Generate a path, track it and send it in real time; returns the closed sender."""
     robot = make_robot(robot_name)
     period_s = float(robot.model().opt.timestep)
     frames = path_frames(robot, path, speed, period_s)
     rng = np.random.default_rng(seed)
-    with DisturbedSender(robot, disturbance or Disturbance(), rng, host, port) as sender:
+    with DisturbedSender(robot, disturbance or Disturbance(), rng, host, port, key=key) as sender:
         upper = UpperBody(robot, sender, period_s)
         n_waiting = round(_START_S / period_s)
         for k, due_s in _periods(period_s, n_waiting + len(frames)):
@@ -87,27 +93,32 @@ def run_lower(
     port: int = PORT,
     seconds: float | None = None,
     on_ready: Callable[[], object] = lambda: None,
+    key: bytes | None = None,
 ) -> LinkReport:
     """Balance the simulated robot in real time until the stream is over, or time is up.
 
     ``on_ready`` is called when it begins to listen.
     """
+    if seconds is not None and not 0 < seconds < np.inf:
+        raise InvalidValueError(f"seconds must be positive, not {seconds}")
     robot = make_robot(robot_name)
     simulation = Simulation(robot)
     simulation.reset()
     model, data = simulation.model, simulation.data
     period_s = float(model.opt.timestep)
-    limits = robot.position_limits
-    outside, slowest_s, fallen = 0, 0.0, False
+    outside, hasty, slowest_s, fallen = 0, 0, 0.0, False
+    recent: deque[FloatArray] = deque(maxlen=3)
     n_periods = None if seconds is None else round(seconds / period_s)
-    with Receiver(robot, host, port) as receiver:
+    with Receiver(robot, host, port, key=key) as receiver:
         lower = LowerBody(robot, receiver, period_s)
         lower.update(time.monotonic())  # compiles, before it matters
         on_ready()
         for _ in _periods(period_s, n_periods):
             begin = time.perf_counter()
             commands = lower.update(time.monotonic())
-            outside += int(((commands < limits[:, 0]) | (commands > limits[:, 1])).sum())
+            recent.append(commands)
+            outside += _beyond(lower, recent, 0)
+            hasty += _beyond(lower, recent, 1) + _beyond(lower, recent, 2)
             data.ctrl[:] = commands
             mujoco.mj_step(model, data)
             slowest_s = max(slowest_s, time.perf_counter() - begin)
@@ -115,7 +126,13 @@ def run_lower(
             if lower.phase == "settling" and lower.spent_s["settling"] >= _REST_S:
                 break
     spent_s = {str(phase): spent for phase, spent in lower.spent_s.items()}
-    return LinkReport(receiver.counts, spent_s, fallen, outside, slowest_s)
+    return LinkReport(receiver.counts, spent_s, fallen, outside, hasty, slowest_s)
+
+
+def _beyond(lower: LowerBody, recent: Sequence[FloatArray], order: int) -> int:
+    """Return how many of the newest commands are outside the limits of a derivative."""
+    newest = np.array(recent)[-1 - order :]
+    return lower.limiter.use(newest).outside[order] if len(newest) > order else 0
 
 
 def path_frames(robot: Robot, path: Sequence[str], speed: float, period_s: float) -> FloatArray:

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import secrets
-import socket
+import time
 from typing import Self
 
-from mplearn.errors import InvalidValueError, MPLearnError
+from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray
 from mplearn_envs.robot import Robot
 
-from .datagram import Datagram, encode, robot_code
-
-HOST, PORT = "127.0.0.1", 47810
-
-
-class LinkError(MPLearnError, OSError):
-    """The link's socket cannot be opened."""
+from .datagram import Datagram, checked_key, encode, robot_code
+from .sockets import HOST, PORT, open_socket
 
 
 class Sender:
@@ -26,19 +21,35 @@ class Sender:
 
     Args:
         robot: The robot.
-        host: Where the lower body's computer is; this machine by default.
-        port: Its UDP port.
+        host: Where the lower body's computer is, a name or an address of IPv4 or IPv6; this machine
+            by default.
+        port: Its UDP port, 1 to 65535.
         stream: Number of the stream; drawn at random where not given.
+        key: What the lower body's computer must share to take the postures, 16 bytes or more.
+
+    Attributes:
+        unsent: How many datagrams the system refused to send.
+
+    Raises:
+        LinkError: No such host, or nothing can be sent there.
     """
 
     def __init__(
-        self, robot: Robot, host: str = HOST, port: int = PORT, *, stream: int | None = None
+        self,
+        robot: Robot,
+        host: str = HOST,
+        port: int = PORT,
+        *,
+        stream: int | None = None,
+        key: bytes | None = None,
     ) -> None:
         self.robot, self.host, self.port = robot, host, port
         self.stream = secrets.randbits(32) if stream is None else stream
         self.sequence = 0
+        self.unsent = 0
+        self._key = checked_key(key)
         self._code = robot_code([robot.joint_names[i] for i in robot.upper_joints])
-        self._socket = open_socket()
+        self._socket, self._to = open_socket(host, port)
 
     def datagram(
         self, base: FloatArray, angles: FloatArray, time_s: float, last: bool = False
@@ -49,9 +60,9 @@ class Sender:
             raise InvalidValueError(
                 f"a posture needs a frame (7,) and {n} angles, not {base.shape} and {angles.shape}"
             )
-        data = encode(Datagram(self.stream, self.sequence, time_s, base, angles, last), self._code)
+        told = Datagram(self.stream, self.sequence, time_s, base, angles, last, time.time())
         self.sequence += 1
-        return data
+        return encode(told, self._code, self._key)
 
     def send(self, base: FloatArray, angles: FloatArray, time_s: float, last: bool = False) -> None:
         """Send a posture: base frame (7,), angles of the upper joints (n,) [rad], the time [s]."""
@@ -60,9 +71,9 @@ class Sender:
     def send_bytes(self, data: bytes) -> None:
         """Send one datagram; a full or closed way out loses it."""
         try:
-            self._socket.sendto(data, (self.host, self.port))
-        except (BlockingIOError, ConnectionError):
-            return
+            self._socket.sendto(data, self._to)
+        except OSError:
+            self.unsent += 1
 
     def close(self) -> None:
         """Close the socket."""
@@ -75,10 +86,3 @@ class Sender:
     def __exit__(self, *error: object) -> None:
         """Close the socket."""
         self.close()
-
-
-def open_socket() -> socket.socket:
-    """Return a UDP socket that never waits."""
-    found = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    found.setblocking(False)
-    return found

@@ -31,6 +31,59 @@ def limit_velocity(path: FloatArray, start: FloatArray, largest_step: FloatArray
     return out
 
 
+@njit(cache=True)
+def approach(
+    wanted: FloatArray,
+    rate: FloatArray,
+    here: FloatArray,
+    velocity: FloatArray,
+    limits: FloatArray,
+    fastest: FloatArray,
+    strongest: FloatArray,
+    period_s: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Follow what moves within limits of position, velocity and acceleration, one period on.
+
+    What keeps within the limits is followed without lag. After a jump the gap closes at a speed
+    from which it can be closed in time: w with w dt + w^2 / 2a = gap. No limit of position is run
+    into for the same reason: the speed is never one from which a coordinate could not stop.
+
+    Args:
+        wanted: Where to be after the period, shape (U,).
+        rate: How fast what is wanted moves, shape (U,).
+        here: Where it is, within the limits, shape (U,).
+        velocity: How fast it moves, shape (U,): 0 at first, later what was returned.
+        limits: Smallest and largest position, shape (U, 2).
+        fastest: Velocity limits, shape (U,).
+        strongest: Acceleration limits, shape (U,).
+        period_s: The period [s].
+
+    Returns:
+        Position and velocity after the period, each of shape (U,).
+    """
+    position, speed = np.empty_like(here), np.empty_like(here)
+    for u in range(here.shape[0]):
+        most, top = strongest[u], fastest[u]
+        low, high = limits[u, 0], limits[u, 1]
+        up = min(top, _stoppable(high - here[u], most, period_s))
+        down = max(-top, -_stoppable(here[u] - low, most, period_s))
+        course = min(max(rate[u], -top), top)
+        gap = min(max(wanted[u], low), high) - (here[u] + course * period_s)
+        closing = _stoppable(abs(gap), most, period_s)
+        wish = min(max(course + (closing if gap > 0 else -closing), down), up)
+        step = most * period_s
+        speed[u] = min(max(wish, velocity[u] - step), velocity[u] + step)
+        position[u] = min(max(here[u] + speed[u] * period_s, low), high)
+    return position, speed
+
+
+@njit(cache=True)
+def _stoppable(distance: float, acceleration: float, period_s: float) -> float:
+    """Return the largest speed from which one can stop within a distance, a period from now."""
+    room = 2.0 * max(distance, 0.0) / acceleration
+    return float(acceleration * (np.sqrt(period_s * period_s + room) - period_s))
+
+
 def servo_commands(robot: Robot, q: FloatArray, dq: FloatArray) -> FloatArray:
     """Return position commands ``q + (kv/kp) dq``, shape (T, n), within the joints' limits [rad].
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mplearn.extras import require
+from mplearn_agents.console import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,6 +51,7 @@ def figure_style() -> Iterator[None]:
             "axes.spines.right": False,
             "axes.linewidth": 0.8,
             "text.color": INK,
+            "text.parse_math": False,  # a name may hold dollar signs
             "xtick.color": MUTED,
             "ytick.color": MUTED,
             "xtick.labelsize": 8,
@@ -89,5 +91,5 @@ def data_uri(content: bytes, mime: str) -> str:
 
 def readable(name: str, limit: int = 28) -> str:
     """Return a primitive's or a joint's name as words, shortened where it is long."""
-    words = name.replace("_", " ").strip()
+    words = printable(name).replace("_", " ").strip()
     return words if len(words) <= limit else words[: limit - 1].rstrip() + "…"

@@ -1,11 +1,14 @@
-"""``mplearn export``: episodes as a Minari data set."""
+"""``mplearn episodes``: episodes as a Minari data set."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
+from mplearn_agents.arguments import count, seed
+
 HELP = "Play episodes and write them as a Minari data set, for offline reinforcement learning."
+EXAMPLE = "mplearn episodes mplearn/goal-random-v0 --task goal --out out/data"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,8 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--task", default="free", help="task (default: free)")
     parser.add_argument("--dynamics", choices=["simulated", "kinematic"], default="simulated")
     parser.add_argument("--policy", choices=POLICIES, default="random", help="who chooses")
-    parser.add_argument("--episodes", type=int, default=10, help="how many (default: 10)")
-    parser.add_argument("--seed", type=int, default=0, help="of the episodes (default: 0)")
+    parser.add_argument("--episodes", type=count, default=10, help="how many (default: 10)")
+    parser.add_argument("--seed", type=seed, default=0, help="of the episodes (default: 0)")
 
 
 def run(args: argparse.Namespace) -> None:

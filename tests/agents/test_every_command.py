@@ -1,0 +1,276 @@
+"""What every command owes: an example that parses, one line for bad values, inert names."""
+
+import io
+import json
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from rich.table import Table
+
+from mplearn.library import PrimitiveLibrary
+from mplearn_agents import console as consoles
+from mplearn_agents.cli import build_parser, command_modules, main
+from mplearn_agents.console import InertConsole, InertStream, inert_output, printable
+from mplearn_envs.data.library_source import LibrarySource
+
+COMMANDS = sorted(command_modules())
+HOSTILE = (
+    "[/red]", "[bold]", "\x1b[31mred\x1b]0;title\x07", "a\rb\x08c\x7f\x9b2J", "$\\frac{", "\udcff",
+    "\u202eevil\u2066", "\u2028line", "<script>alert(1)</script>", ":smile:", "=cmd()|x",
+)  # fmt: skip
+STEERS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\u2028\ud800-\udfff]")
+
+
+def said(capsys, *argv):
+    """Run a command and return its exit code, output and errors."""
+    try:
+        code = main([str(each) for each in argv])
+    except SystemExit as stop:
+        code = stop.code
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_help_has_an_example_that_parses(command, capsys):
+    code, out, _ = said(capsys, command, "--help")
+    example = command_modules()[command].EXAMPLE
+    assert code == 0 and f"example:\n  {example}" in out and "exit codes" in out
+    words = shlex.split(example.split(" > ")[0])
+    assert words[:2] == ["mplearn", command]
+    args = build_parser().parse_args(words[1:])
+    assert args.run is command_modules()[command].run
+
+
+def options_with(command, kinds):
+    parser = build_parser()
+    (choices,) = (a.choices for a in parser._actions if isinstance(a.choices, dict))
+    for action in choices[command]._actions:
+        kind = {getattr(action.type, "__name__", ""), type(action.type).__name__}
+        if action.option_strings and kind & kinds:
+            yield action.option_strings[0]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_bad_values_end_in_one_line_and_code_2(command, capsys):
+    bad = ["-5", "x", "9" * 5000, "nan", "\x1b[31m", "1e999", ""]
+    for option in options_with(command, {"WholeNumber", "positive", "pace"}):
+        for value in bad:
+            code, out, err = said(capsys, command, f"{option}={value}")
+            assert code == 2 and not out, (option, value)
+            assert err.count("\n") == 1 and err.startswith("mplearn"), err
+            assert not STEERS.search(err) and len(err) < 1000
+    code, _, err = said(capsys, command, "--no-such-option\x1b[31m", "[/red]", "\udcff")
+    assert code == 2 and err.count("\n") == 1 and not STEERS.search(err)
+
+
+def test_seeds_counts_and_rates_are_checked_by_their_options():
+    """Plain int and float take -5, 5,000 digits and NaN: no option of ours uses them."""
+    for command in COMMANDS:
+        assert not list(options_with(command, {"int", "float"}))
+
+
+@pytest.fixture(scope="module")
+def library():
+    return LibrarySource(None).now()
+
+
+@pytest.fixture
+def library_file(library, tmp_path):
+    return library.save(tmp_path / "library.mplearn")
+
+
+@pytest.fixture
+def hostile_library(library, tmp_path):
+    """A library whose names are as bad as a file may hold them; `rename` would refuse them."""
+    from dataclasses import replace
+
+    names = [*(n for n in HOSTILE if n != "\udcff"), *(f"p{k}\x1b[2J" for k in range(100))]
+    primitives = tuple(
+        replace(each, name=name) for each, name in zip(library.primitives, names, strict=False)
+    )
+    path = tmp_path / "[bold]\x1b[31m library.mplearn"
+    replace(library, primitives=primitives).save(path)
+    return path
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["show"], ["show", "--json"], ["predict", "0"], ["recognise", "none.csv"], ["rename", "0"]],
+)
+def test_hostile_names_are_inert(arguments, hostile_library, capsys):
+    command, *rest = arguments
+    library = PrimitiveLibrary.load(hostile_library)
+    first = str(library.ids[0])
+    rest = [first if each == "0" else each for each in rest]
+    if command == "rename":
+        rest.append("plain")
+    code, out, err = said(capsys, command, hostile_library, *rest)
+    assert code == (2 if command == "recognise" else 0), err
+    assert not STEERS.search(out) and not STEERS.search(err)
+    if arguments == ["show"]:
+        assert "[/red]" in out and "[bold]" in out and ":smile:" in out
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.parametrize("command", ["show", "rename", "predict", "generate", "recognise", "learn"])
+def test_hostile_file_names_and_words_end_in_one_line(command, name, tmp_path, capsys):
+    file = tmp_path / f"none{name.replace('/', '|')}"
+    rest = {"rename": [name, name], "predict": [name], "recognise": [file]}.get(command, [])
+    rest = [name, "--to", f"{file}.csv"] if command == "generate" else rest
+    rest = ["--out", file] if command == "learn" else rest
+    code, out, err = said(capsys, command, file, *rest)
+    assert code == 2 and not out and err.count("\n") == 1
+    assert not STEERS.search(err)
+
+
+def test_hostile_names_do_not_break_a_figure(hostile_library):
+    pytest.importorskip("matplotlib")
+    pytest.importorskip("jinja2")
+    from mplearn_agents.report import library_page, render_page
+
+    library = PrimitiveLibrary.load(hostile_library)
+    page = render_page(library_page(library, hostile_library.name))
+    assert "<script>alert(1)" not in page
+    assert not re.search(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\u202e\u2066]", page)
+
+
+def test_a_stream_spells_out_what_would_steer():
+    for encoding in ("utf-8", "ascii", "latin-1"):
+        raw = io.BytesIO()
+        stream = InertStream(io.TextIOWrapper(raw, encoding=encoding, newline=""))
+        for name in HOSTILE:
+            stream.write(f"{name}é中\n")
+        stream.flush()
+        text = raw.getvalue().decode(encoding)
+        assert text.count("\n") == len(HOSTILE) and not STEERS.search(text.replace("\n", ""))
+    assert printable("a\nb\tc") == "a\\nb\\tc" and printable("é中", "") == "é中"
+
+
+def wide_table():
+    table = Table(title="numbers")
+    for k in range(12):
+        table.add_column(f"column {k}")
+    for row in range(3):
+        table.add_row(*(f"{row + k + 0.123456789:.9f}" for k in range(12)))
+    return table
+
+
+@pytest.mark.parametrize("width", [26, 40, 80, 119, 400])
+def test_tables_are_turned_rather_than_cut(width):
+    file = io.StringIO()
+    console = InertConsole(file=file, width=width, force_terminal=True, color_system=None)
+    console.print(wide_table())
+    text = file.getvalue()
+    assert "\u2026" not in text
+    for row in range(3):
+        for k in range(12):
+            assert f"{row + k + 0.123456789:.9f}" in text
+    assert max(map(len, text.splitlines())) <= width
+
+
+def test_nothing_is_cut_where_the_output_is_no_terminal(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    file = io.StringIO()
+    with monkeypatch.context() as patch:
+        patch.setattr(sys, "stdout", file)
+        consoles.open_console().print(wide_table())
+        consoles.open_console().print("word " * 100)
+    lines = file.getvalue().splitlines()
+    assert ("\u2026" not in file.getvalue() and lines[-1] == ("word " * 100).rstrip()) or lines[-1]
+    assert any("0.123456789" in line and "11.123456789" in line for line in lines)
+
+
+def test_predict_and_generate_agree_with_the_library(library, library_file, tmp_path, capsys):
+    names = list(library.names)[:1]
+    code, out, _ = said(capsys, "predict", library_file, *names, "--json", "--most", 3)
+    assert code == 0
+    for row, wanted in zip(json.loads(out), library.predict_next(names, 3), strict=True):
+        assert row["primitive"] == wanted.id and row["probability"] == wanted.probability
+    path = [library.ids[0], *(p.id for p in library.predict_next([library.ids[0]], 1))]
+    wanted = library.generate(path).frames
+    for suffix in ("csv", "npz"):
+        file = tmp_path / f"deep/motion.{suffix}"
+        assert said(capsys, "generate", library_file, *path, "--to", file)[0] == 0
+        if suffix == "npz":
+            with np.load(file) as found:
+                np.testing.assert_array_equal(found["frames"], wanted)
+                assert tuple(found["channels"]) == library.channels
+        else:
+            head, *rows = file.read_text().splitlines()
+            assert head.split(",") == ["time_s", *library.channels]
+            found = np.array([row.split(",") for row in rows], float)
+            np.testing.assert_array_equal(found[:, 1:], wanted)
+            np.testing.assert_allclose(np.diff(found[:, 0]), 1 / library.rate_hz, atol=1e-8)
+    walk = ["generate", library_file, "--walk", 4, "--seed", 3, "--to", tmp_path / "walk.csv"]
+    assert "4 primitives" in said(capsys, *walk)[1]
+    for bad in ([], [99999], ["9" * 5000], [path[0], "--walk", 2, "--goal", path[1]]):
+        code, _, err = said(capsys, "generate", library_file, *bad, "--to", tmp_path / "x.csv")
+        assert code == 2 and err.count("\n") == 1 and len(err) < 20000
+
+
+def test_a_renamed_library_keeps_its_mode_and_its_link(library, library_file, tmp_path, capsys):
+    link = tmp_path / "link.mplearn"
+    link.symlink_to(library_file)
+    library_file.chmod(0o600)
+    assert said(capsys, "rename", link, library.ids[0], "another name")[0] == 0
+    assert link.is_symlink() and link.resolve() == library_file.resolve()
+    assert library_file.stat().st_mode & 0o777 == 0o600
+    assert "another name" in PrimitiveLibrary.load(library_file).names
+    circle = tmp_path / "circle.mplearn"
+    circle.symlink_to(circle)
+    from mplearn.errors import LibraryError
+
+    with pytest.raises(LibraryError, match="cannot write"):
+        library.save(circle)
+
+
+def test_the_doctor_says_what_to_do(capsys):
+    code, out, err = said(capsys, "doctor", "--json")
+    found = {each["what"]: each for each in json.loads(out)}
+    assert code == int(any(each["state"] == "wrong" for each in found.values())) and not err
+    assert found["library"]["state"] == "ok" and "primitives" in found["library"]["found"]
+    for each in found.values():
+        assert each["state"] == "ok" or each["advice"]
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "tcsh"])
+def test_completion_knows_every_command(shell, capsys):
+    code, out, _ = said(capsys, "completion", shell)
+    assert code == 0 and all(command in out for command in COMMANDS)
+
+
+def test_interrupted_there_is_no_traceback(library_file):
+    program = (
+        "import sys, mplearn_agents.cli as cli\nprint('on', flush=True)\n"
+        "argv = ['perform', sys.argv[1], '--steps', '100000', '--dynamics', 'kinematic']\n"
+        "sys.exit(cli.main(argv))"
+    )
+    for wait_s in (0.05, 1.5):
+        with subprocess.Popen(
+            [sys.executable, "-c", program, str(library_file)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"PYTHONUNBUFFERED": "1"},
+        ) as process:
+            process.stdout.readline()
+            time.sleep(wait_s)
+            process.send_signal(signal.SIGINT)
+            _, err = process.communicate(timeout=60)
+        assert process.returncode == 130, err
+        assert err == "mplearn: interrupted\n"
+
+
+def test_streams_are_put_back():
+    before = sys.stdout, sys.stderr
+    with inert_output():
+        assert sys.stdout is not before[0]
+    assert (sys.stdout, sys.stderr) == before
