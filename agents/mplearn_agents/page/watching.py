@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 import queue
@@ -34,6 +35,7 @@ from .watched_figure import WatchedFigure
 MOST_WAITING = 3_000  # blocks of the stream that may wait for the learner
 STATUS_S, KNOWLEDGE_S = 0.25, 0.2
 _WARM_UP = ("BAR", "BAL") * 4
+_TEACHERS, _STREAM = 0, 1  # who comes first
 _DELAYS = 500  # frames over which the delay is measured
 
 
@@ -77,7 +79,9 @@ class Watcher:
 
     def __init__(self, settings: Watch, connection: Connection, outbox: Outbox) -> None:
         self._settings, self._connection, self._outbox = settings, connection, outbox
-        self._inbox: queue.Queue[tuple[str, Any]] = queue.Queue(MOST_WAITING)
+        self._inbox: queue.PriorityQueue[tuple[int, int, str, Any]] = queue.PriorityQueue()
+        self._numbers = itertools.count()
+        self._room = threading.Semaphore(MOST_WAITING)
         self._lifelong: LifelongLearner | None = None
         self._figure: WatchedFigure | None = None
         self._source: Source | None = None
@@ -136,26 +140,33 @@ class Watcher:
     def _read_source(self, source: Source) -> None:
         try:
             for item in source:
-                self._inbox.put(("stream", item))
-            self._inbox.put(("ended", None))
+                self._room.acquire()
+                self._put(_STREAM, "stream", item)
+            self._put(_STREAM, "ended")
         except Exception as error:  # of a source of somebody else
-            self._inbox.put(("broken", error))
+            self._put(_STREAM, "broken", error)
 
     def _read_requests(self, _: Source) -> None:
         try:
             while True:
-                self._inbox.put(("request", unpack(self._connection.recv_bytes())[0]))
+                self._put(_TEACHERS, "request", unpack(self._connection.recv_bytes())[0])
         except (EOFError, OSError):
-            self._inbox.put(("closed", None))
+            self._put(_TEACHERS, "closed")
+
+    def _put(self, before: int, what: str, item: Any = None) -> None:
+        """Let something wait its turn; what teachers ask comes before the stream."""
+        self._inbox.put((before, next(self._numbers), what, item))
 
     # ---- one thing after the other
 
     def _step(self) -> bool:
         """Do the next thing; say whether to go on."""
         try:
-            what, item = self._inbox.get(timeout=STATUS_S)
+            _, _, what, item = self._inbox.get(timeout=STATUS_S)
         except queue.Empty:
             what, item = "", None
+        if what == "stream":
+            self._room.release()
         match what:
             case "closed":
                 return False
@@ -352,7 +363,7 @@ class Watcher:
 
     def _answer(self, asked: Header) -> None:
         if asked["do"] == "end":
-            self._inbox.put(("closed", None))
+            self._put(_TEACHERS, "closed")
             return
         if asked["do"] == "forget-deliveries":  # who performs begins anew
             self._sender.forget()

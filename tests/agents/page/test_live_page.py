@@ -144,20 +144,32 @@ def test_experiment_4_1_of_the_paper(chromium):
     assert len(found["edges"]) == 6 and len(sure) == 2  # raise, lower; bend, return: then any
 
 
-def test_a_learner_that_was_killed_is_started_again_and_all_end_together(new_page):
-    with live("demonstrator", "--no-robot") as (url, process):
-        page = new_page(url)
-        state = page.locator("#state")
-        until(lambda: state.get_attribute("data-live") == "yes", STARTED_S)
+def test_a_learner_that_was_killed_goes_on_and_all_end_together(new_page, tmp_path):
+    store = ("--store", str(tmp_path / "life.db"))
+    with live("demonstrator:3", "--speed", "4", "--no-robot", *store) as (url, process):
+        page = known(new_page(url), 3)
+        state, id = page.locator("#state"), rows(page).first.get_attribute("data-id")
+        rows(page).first.click()
+        page.keyboard.press("n")
+        page.keyboard.insert_text("mine")
+        page.keyboard.press("Enter")
+        name = page.locator(f'#tree [data-id="{id}"] text.name')
+        until(lambda: name.text_content() == "mine", 20)
         learner = until(lambda: [p for p in _children(process.pid) if "spawn_main" in _line(p)], 9)
         os.kill(learner[0], signal.SIGKILL)
-        until(lambda: "SIGKILL" in page.locator("#log").inner_text(), 20)
+        until(lambda: "SIGKILL" in page.locator("#log").text_content(), 20)
         until(lambda: state.get_attribute("data-live") == "no", 10)
         until(lambda: state.get_attribute("data-live") == "yes", STARTED_S)
+        assert name.text_content() == "mine"
+        n = rows(page).count()
+        until(lambda: rows(page).count() > n or page.locator("#log .learned").count(), 60)
         children = _children(process.pid)
         process.send_signal(signal.SIGINT)
         assert process.wait(30) == 0
         until(lambda: not any(_runs(pid) for pid in children), 10)
+    with live("demonstrator:4", "--no-robot", *store) as (url, _):  # the next day
+        page = known(new_page(url), 3)
+        assert page.locator(f'#tree [data-id="{id}"] text.name').text_content() == "mine"
 
 
 def _children(pid):
