@@ -171,6 +171,8 @@ def run(times: int, folder: Path) -> int:
                 step(whole, frames, CHUNK)
             assert life.state() == whole.state(), f"another state after kill {k}, at {target}"
             assert life.n_frames % CHUNK == 0
+        if k % 20 == 19:
+            print(f"{k + 1} kills, {whole.n_frames / RATE_HZ:.0f} s of stream", flush=True)
     return whole.n_frames
 
 

@@ -22,6 +22,7 @@ from mplearn.store import (
     info,
     library_of,
 )
+from mplearn_envs.data.library_source import LibrarySource
 
 FRAMES = stream(90)
 
@@ -147,6 +148,18 @@ def test_others_read_it_while_it_grows(tmp_path: Path) -> None:
     with LifelongLearner.open(copy) as life:  # a backup is a store
         feed(life, 4500)
         assert life.learner.state() == reader.life.learner.state()
+
+
+def test_an_environment_reads_it_at_each_reset(tmp_path: Path) -> None:
+    path = tmp_path / "life.db"
+    with LifelongLearner.open(path, learner) as life:
+        assert life.store is not None
+        source = LibrarySource(str(path))
+        assert source.live
+        for upto in (1000, 2000):
+            feed(life, upto)
+            assert life.store.flush()
+            assert source.now().version == StoreReader(path).life.snapshot().version
 
 
 def test_reading_and_writing_do_not_hold_each_other_up(tmp_path: Path) -> None:
