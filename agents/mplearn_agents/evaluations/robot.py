@@ -40,10 +40,21 @@ def other_robots(setting: Setting) -> Iterator[Table]:
 
 
 def pushes(_: Setting) -> Iterator[Table]:
-    """The largest impulse at the chest that the robot survives."""
-    from mplearn_envs.experiments import push_table
+    """The largest impulse at the chest without a step, and what is survived by steps."""
+    from mplearn_envs.data.library_source import LibrarySource
+    from mplearn_envs.experiments import push_table, survival_table
 
     yield push_table()
+    library = LibrarySource(None).now()
+    for error in (0.0, 0.1):
+        yield survival_table(library, error=error)
 
 
-EVALUATIONS = {"walks": walks, "other-robots": other_robots, "pushes": pushes}
+def bodies(_: Setting) -> Iterator[Table]:
+    """Random walks in bodies that are not as the robot believes, and pushed."""
+    from mplearn_envs.experiments import soak_table
+
+    yield soak_table()
+
+
+EVALUATIONS = {"walks": walks, "other-robots": other_robots, "pushes": pushes, "bodies": bodies}

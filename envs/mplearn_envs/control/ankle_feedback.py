@@ -145,8 +145,8 @@ def correct(
     left_turn: FloatArray,
     right_turn: FloatArray,
     axes: FloatArray,
-) -> None:
-    """Change the ankles' commands in place.
+) -> float:
+    """Change the ankles' commands in place; return how far the DCM is from where it shall be [m].
 
     Args:
         law: What is wanted.
@@ -181,3 +181,4 @@ def correct(
         change = carried * law.softness[k] * (axis[1] * x - axis[0] * y)
         low, high = law.limits[k]
         command[j] = min(max(command[j] + change, low), high)
+    return float(size / law.gain)

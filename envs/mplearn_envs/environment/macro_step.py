@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from mplearn.errors import InvalidValueError
 from mplearn.library import PrimitiveLibrary
 from mplearn_envs.data.library_source import LibrarySource
-from mplearn_envs.execution.modes import Dynamics, make_performer
+from mplearn_envs.execution.bodies import Body, make_body
+from mplearn_envs.execution.modes import Dynamics, make_performer, require_simulated
 from mplearn_envs.execution.performer import Performer
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.rendering.screen import RENDER_MODES, Screen
@@ -86,6 +87,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         actions: ActionOptions | Mapping[str, Any] | None,
         pictures: PictureOptions | Mapping[str, Any] | None,
         render_mode: Literal["human", "rgb_array"] | None,
+        body: Body | str | Mapping[str, Any] = "nominal",
     ) -> None:
         require_one_of("dynamics", dynamics, get_args(Dynamics))
         require_one_of("flat", flat, (False, True))
@@ -99,6 +101,8 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         self.motion = MotionOptions.of(from_plain(motion), "motion")
         self.actions = ActionOptions.of(from_plain(actions), "actions")
         self.pictures = PictureOptions.of(from_plain(pictures), "pictures")
+        self.body = make_body(from_plain(body))
+        require_simulated(dynamics, self.body)
         self.repertoire = self._made_repertoire()
         self.capacity = self.repertoire.capacity
         self.action_space = spaces.Discrete(self.capacity)
@@ -128,7 +132,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
     @cached_property
     def performer(self) -> Performer:
         """Who performs; made when it is first needed."""
-        return make_performer(self.dynamics, self.repertoire, self.actions.hold_s)
+        return make_performer(self.dynamics, self.repertoire, self.actions.hold_s, self.body)
 
     @cached_property
     def _frame_steps(self) -> int:
@@ -164,7 +168,8 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
             self._streams = RandomStreams.of(own)
         self._episode = None
         self._begin()
-        measured = self.performer.reset()
+        draw = 0 if self.body.certain else int(self.streams.body.integers(2**63))
+        measured = self.performer.reset(draw)
         episode = Episode(measured, self.repertoire.entries(self.performer.reference))
         self.task.reset(self._scene(episode, options or {}))
         self._episode = episode

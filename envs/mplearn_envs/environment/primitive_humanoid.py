@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from mplearn_envs.data.library_source import LibrarySource, Source
+from mplearn_envs.execution.bodies import Body
 from mplearn_envs.execution.modes import Dynamics
 from mplearn_envs.robot import Robot
 from mplearn_envs.tasks import Task
@@ -150,6 +151,9 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
         pictures: How pictures are drawn (size, balance, rate): `PictureOptions`, or a mapping of
             some of them.
         render_mode: None, "rgb_array" or "human".
+        body: How the body differs from what the robot believes, and what happens to it: "nominal"
+            (nothing), "randomised" or "harsh"; or a `Body`, or a mapping of some of its values
+            (and a ``level`` to start from). Each episode draws one.
 
     All of these but what is live are kept in ``env.spec``, objects too, as JSON holds them:
     ``gym.make(EnvSpec.from_json(env.spec.to_json()))`` makes the same environment.
@@ -193,10 +197,21 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
         actions: ActionOptions | Mapping[str, Any] | None = None,
         pictures: PictureOptions | Mapping[str, Any] | None = None,
         render_mode: Literal["human", "rgb_array"] | None = None,
+        body: Body | str | Mapping[str, Any] = "nominal",
     ) -> None:
         source = LibrarySource(from_plain(library))
         super().__init__(
-            source, robot, task, dynamics, discount, flat, motion, actions, pictures, render_mode
+            source,
+            robot,
+            task,
+            dynamics,
+            discount,
+            flat,
+            motion,
+            actions,
+            pictures,
+            render_mode,
+            body,
         )
 
     def _begin(self) -> None:

@@ -17,10 +17,12 @@ class RandomStreams(NamedTuple):
     Attributes:
         task: What a task draws: goals, requests, its demonstrator.
         demonstrator: What a demonstrator draws who goes on while the robot acts.
+        body: Which body an episode has, and what happens to it.
     """
 
     task: np.random.Generator
     demonstrator: np.random.Generator
+    body: np.random.Generator
 
     @classmethod
     def of(cls, seed: int) -> RandomStreams:

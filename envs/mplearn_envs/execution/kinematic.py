@@ -47,7 +47,7 @@ class KinematicPerformer(Performer):
         self._rest = self._arrive(rest_reference(self.simulation.robot))
         self._here = self._rest
 
-    def reset(self) -> Measured:
+    def reset(self, draw: int = 0) -> Measured:
         """Stand upright at rest, arms hanging; return how the robot stands."""
         self._here = self._rest
         self.reference = self._rest.reference

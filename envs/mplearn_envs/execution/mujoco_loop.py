@@ -14,7 +14,7 @@ from mplearn.errors import RobotError
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.control.ankle_feedback import AnkleFeedback, correct
 
-from .tracking_report import has_fallen
+from .tracking_report import FALL_DROP_M, has_fallen
 
 
 def _of_mujoco(name: str) -> Any:
@@ -31,9 +31,10 @@ def _of_mujoco(name: str) -> Any:
 
 
 _mj_step = _of_mujoco("mj_step")
-_mj_step1 = _of_mujoco("mj_step1")  # poses and velocities of the state
-_mj_step2 = _of_mujoco("mj_step2")  # what follows from them and the commands
-_mj_subtree_velocity = _of_mujoco("mj_subtreeVel")
+mj_step1 = _of_mujoco("mj_step1")  # poses and velocities of the state
+mj_step2 = _of_mujoco("mj_step2")  # what follows from them and the commands
+mj_subtree_velocity = _of_mujoco("mj_subtreeVel")
+mj_inverse = _of_mujoco("mj_inverse")  # the forces that make an acceleration
 
 
 class Views(NamedTuple):
@@ -47,6 +48,7 @@ class Views(NamedTuple):
     xpos: FloatArray
     xmat: FloatArray
     xaxis: FloatArray
+    xfrc_applied: FloatArray
 
     @classmethod
     def of(cls, data: mujoco.MjData) -> Views:
@@ -92,8 +94,8 @@ def send(
         for step in range((knot - 1) * n_steps, knot * n_steps):
             views.ctrl[:] = commands[step]
             if guided:  # by how the robot stands now: what is performed depends on its state alone
-                _mj_step1(model, data)
-                _mj_subtree_velocity(model, data)
+                mj_step1(model, data)
+                mj_subtree_velocity(model, data)
                 correct(
                     law,
                     step,
@@ -106,10 +108,10 @@ def send(
                     views.xmat[feet[1]],
                     views.xaxis,
                 )
-                _mj_step2(model, data)
+                mj_step2(model, data)
             else:
                 _mj_step(model, data)
         q[knot], v[knot] = views.qpos, views.qvel
-        if has_fallen(q[knot], wanted[knot]):
+        if has_fallen(q[knot], wanted[knot], FALL_DROP_M):
             return knot, True
     return last, False

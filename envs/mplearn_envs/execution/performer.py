@@ -13,6 +13,7 @@ from mplearn_envs.mechanics.reference import Reference, rest_reference
 from mplearn_envs.planning.plan import Plan
 from mplearn_envs.skills.repertoire import Repertoire
 
+from .bodies import NOMINAL, Body
 from .sensors import Measured
 from .simulation import Simulation
 from .tracking_report import TrackingReport
@@ -51,10 +52,14 @@ class PerformerState(NamedTuple):
     Attributes:
         reference: Where the reference robot is.
         simulated: State of the simulation; None where nothing is simulated.
+        draw: Which body was drawn.
+        count: How many macro steps it has performed.
     """
 
     reference: Reference
     simulated: FloatArray | None
+    draw: int = 0
+    count: int = 0
 
 
 class Performer(ABC):
@@ -63,21 +68,26 @@ class Performer(ABC):
     Args:
         repertoire: What can be performed.
         hold_s: Duration of holding [s].
+        body: What the body may be like.
 
     Attributes:
         simulation: The robot; what is drawn.
         reference: Where the reference robot is, from which the next motion starts.
     """
 
-    def __init__(self, repertoire: Repertoire, hold_s: float) -> None:
+    def __init__(self, repertoire: Repertoire, hold_s: float, body: Body = NOMINAL) -> None:
         self.repertoire = repertoire
         self.hold_s = hold_s
-        self.simulation = Simulation(repertoire.robot)
+        self.simulation = Simulation(repertoire.robot, body=body)
         self.reference: Reference = rest_reference(self.simulation.robot)
 
     @abstractmethod
-    def reset(self) -> Measured:
-        """Stand upright at rest, arms hanging; return how the robot stands."""
+    def reset(self, draw: int = 0) -> Measured:
+        """Stand upright at rest, arms hanging; return how the robot stands.
+
+        Args:
+            draw: Which body is drawn.
+        """
 
     @abstractmethod
     def perform(

@@ -9,6 +9,7 @@ from mplearn.errors import InvalidValueError
 from mplearn_envs.mechanics.reference import rest_reference
 from mplearn_envs.skills.repertoire import Repertoire
 
+from .bodies import NOMINAL, Body
 from .performer import Outcome, Performer, PerformerState
 from .sensors import Measured, Sensors
 
@@ -16,12 +17,15 @@ from .sensors import Measured, Sensors
 class SimulatedPerformer(Performer):
     """Sends plans to the servos of the simulated robot; see `Performer`."""
 
-    def __init__(self, repertoire: Repertoire, hold_s: float) -> None:
-        super().__init__(repertoire, hold_s)
+    def __init__(self, repertoire: Repertoire, hold_s: float, body: Body = NOMINAL) -> None:
+        super().__init__(repertoire, hold_s, body)
         self._sensors = Sensors(self.simulation)
+        self._count = 0
 
-    def reset(self) -> Measured:
+    def reset(self, draw: int = 0) -> Measured:
         """Stand upright at rest, arms hanging; return how the robot stands."""
+        self._count = 0
+        self.simulation.embody(draw)
         self.simulation.reset()
         self.reference = rest_reference(self.simulation.robot)
         return self._sensors.read()
@@ -31,18 +35,26 @@ class SimulatedPerformer(Performer):
     ) -> Outcome:
         """Perform a primitive; None holds. See `Performer.perform`."""
         plan = self._plan(id)
-        report = self.simulation.perform(plan, on_frame, frame_steps)
-        self.reference = plan.end
+        simulation = self.simulation
+        pushes = simulation.draw_pushes(self._count, plan.duration_s)
+        self._count += 1
+        report = simulation.perform(plan, on_frame, frame_steps, pushes)
+        self.reference = report.end or plan.end
         return Outcome.of(report, self._sensors.read(), plan.speed)
 
     def state(self) -> PerformerState:
         """Return all that the future depends on."""
-        return PerformerState(self.reference, self.simulation.state())
+        return PerformerState(
+            self.reference, self.simulation.state(), self.simulation.draw, self._count
+        )
 
     def load_state(self, state: PerformerState) -> Measured:
         """Go on from there; see `Performer.load_state`."""
         if state.simulated is None:
             raise InvalidValueError("a kinematic state cannot be loaded into a simulation")
+        if state.draw != self.simulation.draw:
+            self.simulation.embody(state.draw)
+        self._count = state.count
         self.simulation.load_state(state.simulated)
         self.reference = state.reference
         return self._sensors.read()

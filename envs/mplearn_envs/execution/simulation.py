@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any, Literal, TypeAlias, get_args
@@ -18,9 +19,11 @@ from mplearn_envs.planning.plan import Plan
 from mplearn_envs.robot import Robot
 from mplearn_envs.robot.feet import sole_corners
 
+from .bodies import NOMINAL, Body, body_model, draw_pushes, embody
 from .mujoco_loop import Views, send
+from .reflexes import LONGEST_S, NO_PUSHES, Pushes, Reflexes, new_progress, send_watchful
+from .tracking_report import FALL_DROP_M, assess, has_fallen
 from .tracking_report import TrackingReport as TrackingReport
-from .tracking_report import assess
 
 Feedback: TypeAlias = Literal["steps", "always", "never"]
 SETTLE_S = 1.0
@@ -34,24 +37,52 @@ class Simulation:
         robot: The robot.
         feedback: When the ankles correct the balance (`AnkleFeedback`): in plans in which a foot is
             lifted or the weight moves, always, or never.
+        body: What its body may be like, and whether it takes steps to survive where it would fall
+            otherwise (`Reflexes`); the ankles correct the balance always, then.
 
     Attributes:
         model: The compiled model.
         data: Its state.
+        draw: Which body was drawn, see `embody`.
     """
 
-    def __init__(self, robot: Robot, feedback: Feedback = "steps") -> None:
+    def __init__(self, robot: Robot, feedback: Feedback = "steps", body: Body = NOMINAL) -> None:
         if feedback not in get_args(Feedback):
             raise InvalidValueError(
                 f"feedback must be one of {get_args(Feedback)}, not {feedback!r}"
             )
         self.robot = robot
         self.feedback = feedback
-        self.model = mujoco.MjModel.from_xml_string(robot.xml)
+        self.body = body
+        self.model = body_model(robot, body)
         self.data = mujoco.MjData(self.model)
+        self.embody(0)
         self._corners = sole_corners(self.model)
         self._feet = np.array([self.model.body(name).id for name in robot.feet])
         self._views = Views.of(self.data)
+
+    def embody(self, draw: int) -> None:
+        """Draw a body; `reset` makes it stand.
+
+        Args:
+            draw: Which; the same number gives the same body.
+        """
+        self.draw = draw
+        self._drawn = embody(self.model, self.robot, self.body, draw)
+        self.__dict__.pop("_settled", None)
+
+    def draw_pushes(self, count: int, duration_s: float) -> Pushes:
+        """Return what pushes the robot that was drawn in a macro step; see `draw_pushes`.
+
+        Args:
+            count: Which macro step of the episode, from 0.
+            duration_s: How long it is planned to take [s].
+        """
+        return draw_pushes(self.model, self.robot, self.body, self.draw, count, duration_s)
+
+    @cached_property
+    def _reflexes(self) -> Reflexes:
+        return Reflexes(self.robot)
 
     @cached_property
     def _settled(self) -> FloatArray:
@@ -63,6 +94,7 @@ class Simulation:
         for _ in range(round(SETTLE_S / self.model.opt.timestep)):
             mujoco.mj_step(self.model, data)
         data.time = 0.0
+        data.qpos[7:] += self._drawn.off
         return self._state_of(data)
 
     def reset(self) -> None:
@@ -79,7 +111,11 @@ class Simulation:
         self._update_positions()
 
     def perform(
-        self, plan: Plan, on_frame: Callable[[], None] | None = None, frame_steps: int = 10
+        self,
+        plan: Plan,
+        on_frame: Callable[[], None] | None = None,
+        frame_steps: int = 10,
+        pushes: Pushes = NO_PUSHES,
     ) -> TrackingReport:
         """Send a plan's commands to the servos and simulate, until the end or a fall.
 
@@ -90,7 +126,15 @@ class Simulation:
             on_frame: Called at the first reference posture after every ``frame_steps`` steps, to
                 take pictures; without it all is simulated in one go, with the same result.
             frame_steps: See there.
+            pushes: What pushes the robot meanwhile; only one that takes steps can be pushed so.
+
+        Raises:
+            InvalidValueError: The robot is pushed, and it takes no steps.
         """
+        if self.body.steps:
+            return self._perform_watchful(plan, on_frame, frame_steps, pushes)
+        if len(pushes.steps):
+            raise InvalidValueError("pushes need a body with steps=True")
         n_knots = len(plan.q) - 1
         n_steps = len(plan.commands) // n_knots
         at_once = n_knots if on_frame is None else -(-frame_steps // n_steps)
@@ -109,6 +153,66 @@ class Simulation:
             if on_frame is not None:
                 on_frame()
         return assess(self.robot, plan, q[: done + 1], v[: done + 1], fallen)
+
+    def _perform_watchful(
+        self, plan: Plan, on_frame: Callable[[], None] | None, frame_steps: int, pushes: Pushes
+    ) -> TrackingReport:
+        """Perform a plan, and steps where the robot would fall; see `perform`."""
+        reflexes = self._reflexes
+        n_knots = len(plan.q) - 1
+        n_steps = len(plan.commands) // n_knots
+        longest = n_knots + round(LONGEST_S / plan.knot_s)
+        at_once = longest if on_frame is None else -(-frame_steps // n_steps)
+        progress = new_progress(self.data.ctrl, self._drawn.lag)
+        course = reflexes.course(plan)
+        addresses = (
+            self.model._address,
+            self.data._address,
+            reflexes.model._address,
+            reflexes.data._address,
+        )
+        fixed = (
+            addresses,
+            self._views,
+            reflexes.own,
+            self._feet,
+            reflexes.reference,
+            make_ankle_feedback(self.robot, plan),
+            reflexes.law,
+            reflexes.body,
+            course,
+            pushes,
+            progress,
+        )
+        q, v = np.empty((n_knots + 1, self.model.nq)), np.empty((n_knots + 1, self.model.nv))
+        q[0], v[0] = self.data.qpos, self.data.qvel
+        done, fallen, over = 0, False, False
+        while not over and done < longest:
+            last = min(done + at_once, longest)
+            done, fallen, over = send_watchful(*fixed, done, last, q, v)
+            self._update_positions()
+            if on_frame is not None:
+                on_frame()
+        self.data.xfrc_applied[:] = 0.0
+        known = min(done, n_knots) + 1
+        report = assess(self.robot, plan, q[:known], v[:known], fallen)
+        if fallen or not progress.awake[0]:
+            return report
+        end = reflexes.arrival(plan, self.data.qpos)
+        back = reflexes.return_commands(end, progress.command)
+        for i, command in enumerate(back):
+            self.data.ctrl[:] = command
+            mujoco.mj_step(self.model, self.data)
+            if on_frame is not None and (i + 1) % frame_steps == 0:
+                self._update_positions()
+                on_frame()
+        self._update_positions()
+        return report._replace(
+            fallen=has_fallen(self.data.qpos, end.q, FALL_DROP_M),
+            duration_s=done * plan.knot_s + len(back) * reflexes.law.period_s,
+            n_steps=int(progress.mind.phase[3]),
+            end=end,
+        )
 
     def soles(self) -> FloatArray:
         """Return the lower corners of both soles, shape (2, 4, 3) [m]."""
@@ -130,18 +234,27 @@ class Simulation:
         return out
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Simulation:
-        """Return a copy that shares the model."""
+        """Return a copy that shares the model where no other body is drawn in it."""
         copied = object.__new__(Simulation)
         memo[id(self)] = copied
         copied.__dict__.update(self.__dict__)
-        copied.data = mujoco.MjData(self.model)
+        if not self.body.certain:  # it draws others
+            copied.model = copy.copy(self.model)
+        copied.data = mujoco.MjData(copied.model)
         copied._views = Views.of(copied.data)
         copied.load_state(self.state())
         return copied
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"robot": self.robot, "feedback": self.feedback, "state": self.state()}
+        return {
+            "robot": self.robot,
+            "feedback": self.feedback,
+            "body": self.body,
+            "draw": self.draw,
+            "state": self.state(),
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        Simulation.__init__(self, state["robot"], state["feedback"])
+        Simulation.__init__(self, state["robot"], state["feedback"], state["body"])
+        self.embody(state["draw"])
         self.load_state(state["state"])

@@ -10,7 +10,7 @@ from numba import njit
 from mplearn.recording import FloatArray
 from mplearn_envs.control.ankle_feedback import support
 from mplearn_envs.mechanics.momentum import ground_reaction, momenta
-from mplearn_envs.mechanics.reference import reference_robot, sole_middles
+from mplearn_envs.mechanics.reference import Reference, reference_robot, sole_middles
 from mplearn_envs.mechanics.support import margins_along
 from mplearn_envs.planning.plan import Plan
 from mplearn_envs.robot import Robot
@@ -33,6 +33,8 @@ class TrackingReport(NamedTuple):
             [m].
         fallen: Whether the robot fell; the last sample is when.
         duration_s: How long it took [s].
+        n_steps: How many steps the robot took to survive.
+        end: Where the reference robot is at the end if not where it was planned.
     """
 
     time_s: FloatArray
@@ -41,6 +43,8 @@ class TrackingReport(NamedTuple):
     zmp_margin_m: FloatArray
     fallen: bool
     duration_s: float
+    n_steps: int = 0
+    end: Reference | None = None
 
 
 def assess(robot: Robot, plan: Plan, q: FloatArray, v: FloatArray, fallen: bool) -> TrackingReport:
@@ -85,16 +89,17 @@ def _feet(soles: FloatArray) -> FloatArray:
 
 
 @njit(cache=True, nogil=True)
-def has_fallen(q: FloatArray, wanted: FloatArray) -> bool:
+def has_fallen(q: FloatArray, wanted: FloatArray, drop_m: float) -> bool:
     """Return whether the base is far from upright, from its height, or not finite.
 
     Args:
         q: Actual posture, shape (7 + n,).
         wanted: Wanted posture, shape (7 + n,).
+        drop_m: By how much it may be lower than wanted [m].
     """
     up, wanted_up = _up(q), _up(wanted)
     cosine = up[0] * wanted_up[0] + up[1] * wanted_up[1] + up[2] * wanted_up[2]
-    return not (cosine > np.cos(FALL_TILT_RAD) and q[2] > wanted[2] - FALL_DROP_M)
+    return not (cosine > np.cos(FALL_TILT_RAD) and q[2] > wanted[2] - drop_m)
 
 
 @njit(cache=True, nogil=True)

@@ -2,6 +2,8 @@
 
 from .learned import learned_table as learned_table
 from .pushes import push_table as push_table
+from .soak import soak_table as soak_table
+from .survival import survival_table as survival_table
 from .walk_tables import primitive_table as primitive_table
 from .walk_tables import speed_table as speed_table
 from .walk_tables import walk_table as walk_table

@@ -49,6 +49,20 @@ def _chain(points: FloatArray) -> FloatArray:
     return hull[:size].copy()
 
 
+@njit(cache=True, nogil=True)
+def hull_of(points: FloatArray) -> FloatArray:
+    """Return `convex_hull` for compiled code, which must give points that span a polygon."""
+    return _chain(points)
+
+
+@njit(cache=True, nogil=True)
+def hull_margin(hull: FloatArray, x: float, y: float) -> float:
+    """Return `support_margin` of one point, for compiled code [m]."""
+    point = np.empty((1, 2))
+    point[0, 0], point[0, 1] = x, y
+    return float(_margins(hull, point)[0])
+
+
 @njit(cache=True)
 def _left_turn(a: FloatArray, b: FloatArray, c: FloatArray) -> bool:
     area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

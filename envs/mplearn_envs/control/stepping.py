@@ -1,0 +1,277 @@
+"""Balance by steps: which foot goes where, and where the zero-moment point shall be meanwhile.
+
+On both feet the zero-moment point is beyond the divergent component of motion (DCM), so that it
+returns between the feet [Englsberger2015]. Where the DCM leaves the soles, a foot steps to where it
+will be (`choose_step`), its place corrected until it lands. Then, the weight at rest, the feet step
+back beside each other.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mplearn.maths.plane import turn_in_plane, wrap_angle
+from mplearn.recording import FloatArray
+from mplearn_envs.mechanics.reference import ReferenceRobot
+from mplearn_envs.mechanics.support import hull_margin
+
+from .capture import Reach, choose_step, landing_place, nearest_inside, support_hull
+from .senses import Now, sole_middle
+
+STANDS, SHIFTS, SWINGS = 0, 1, 2
+TOUCHES_M = 0.002  # so low a sole has landed
+ASTRAY_M = 0.025  # feet so near to their places beside each other are there
+_LEAVES_M = 0.005  # a DCM so near the edge of the soles needs a step
+_INSET_M = 0.01  # where the zero-moment point may be
+_LIFTS_M = 0.015  # so far inside a sole the DCM must be before the other foot is lifted
+_LOST_M = 0.01  # so far outside of it a step back becomes a step that catches
+_FIXED_S = 0.04  # before it lands the place is not changed any more
+_RESTS_M, _RESTS_S = 0.02, 0.1  # a DCM so near to its goal for so long rests
+_SHIFT_M_S = 0.5  # speed of the goal
+_BACK_S = 0.45  # duration of a step back
+_LATE_S = 0.15  # a foot that has not landed so late is taken to stand
+_INWARDS = 0.25  # where the DCM is to be when a step back lands, from the standing foot
+_DOWN_M = 0.004  # a foot aims so far into the floor
+_LEAST_S = 0.03
+_TURN_M = 0.2  # a foot that is turned by 1 rad is as astray as one off by this
+
+
+class StepLaw(NamedTuple):
+    """What stepping goes by.
+
+    Attributes:
+        period_s: Control period [s].
+        gain: How fast the DCM returns [1/s].
+        reach: Where feet can land, and how soon.
+        apart: The left foot in the right one's frame, standing: x, y [m] and yaw [rad], shape (3,).
+        lift_m: How high a foot is raised [m].
+    """
+
+    period_s: float
+    gain: float
+    reach: Reach
+    apart: FloatArray
+    lift_m: float
+
+
+class Mind(NamedTuple):
+    """What is remembered from one moment to the next; arrays, changed in place.
+
+    Attributes:
+        phase: What is going on (`STANDS`, `SHIFTS`: the weight goes to one foot, `SWINGS`); which
+            foot steps, 0 left, 1 right; whether it steps back and not to catch; and how many steps
+            were taken; shape (4,).
+        time: Time in this phase, how long the step lasts, and for how long the weight has rested,
+            shape (3,) [s].
+        place: Where the foot lands: x, y [m] and yaw [rad], shape (3,).
+        goal: Where the DCM shall be, on its way, shape (2,) [m].
+        foot: Where the foot that steps shall be now: x, y, z [m] and yaw [rad], shape (4,).
+        foot_rate: Its velocity, shape (4,).
+        foot_change: Its acceleration, shape (4,).
+    """
+
+    phase: FloatArray
+    time: FloatArray
+    place: FloatArray
+    goal: FloatArray
+    foot: FloatArray
+    foot_rate: FloatArray
+    foot_change: FloatArray
+
+
+def new_mind() -> Mind:
+    """Return what is remembered at first: nothing."""
+    return Mind(*(np.zeros(n) for n in (4, 3, 3, 2, 4, 4, 4)))
+
+
+@njit(cache=True, nogil=True)
+def swinging(mind: Mind) -> int:
+    """Return the side of the foot that is on its way, -1 for none."""
+    return int(mind.phase[1]) if mind.phase[0] == SWINGS else -1
+
+
+@njit(cache=True, nogil=True)
+def wake(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now, up: int) -> None:
+    """Start to balance by steps.
+
+    Args:
+        law: What stepping goes by.
+        robot: The reference robot.
+        mind: What is remembered; forgotten.
+        now: The moment.
+        up: Side of the foot that is in the air, -1 for none.
+    """
+    for part in (mind.phase, mind.time, mind.place, mind.goal, mind.foot, mind.foot_rate):
+        part[:] = 0.0
+    mind.goal[:] = now.dcm
+    if up >= 0:
+        step = choose_step(robot.corners, now.feet, now.dcm, now.rate, law.reach, up)
+        _lift(robot, mind, now, up, step.time_s, step.place, False)
+
+
+@njit(cache=True, nogil=True)
+def settled(law: StepLaw, mind: Mind, now: Now, for_s: float) -> bool:
+    """Return whether both feet stand beside each other and the weight has rested between them."""
+    rests = mind.phase[0] == STANDS and mind.time[2] >= for_s
+    return bool(rests and _astray(law, now.feet) < ASTRAY_M)
+
+
+@njit(cache=True, nogil=True)
+def decide(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> tuple[float, float]:
+    """Think on by one control period; return where the zero-moment point shall be [m].
+
+    Args:
+        law: What stepping goes by.
+        robot: The reference robot.
+        mind: What is remembered.
+        now: The moment.
+    """
+    mind.time[0] += law.period_s
+    if mind.phase[0] == SWINGS:
+        side, left = int(mind.phase[1]), mind.time[1] - mind.time[0]
+        low = now.soles[side, :, 2].min() - now.floor
+        if (mind.time[0] > 0.6 * mind.time[1] and low < TOUCHES_M) or left < -_LATE_S:
+            mind.phase[0], mind.time[0], mind.time[2] = STANDS, 0.0, 0.0
+            mind.goal[:] = now.dcm
+    if mind.phase[0] != SWINGS:
+        hull = support_hull(robot.corners, now.feet, -1, 0.0)
+        landed = mind.phase[3] == 0.0 or mind.phase[0] == SHIFTS or mind.time[0] > 0.02
+        if landed and hull_margin(hull, now.dcm[0], now.dcm[1]) < _LEAVES_M:
+            step = choose_step(robot.corners, now.feet, now.dcm, now.rate, law.reach, -1)
+            _lift(robot, mind, now, step.side, step.time_s, step.place, False)
+    if mind.phase[0] == SHIFTS:
+        side = int(mind.phase[1])
+        over = support_hull(robot.corners, now.feet, side, _LIFTS_M)
+        if hull_margin(over, now.dcm[0], now.dcm[1]) > 0.0:
+            _lift(robot, mind, now, side, _BACK_S, _beside(law, now.feet, side), True)
+    if mind.phase[0] == SWINGS:
+        return _on_one_foot(law, robot, mind, now)
+    return _on_both_feet(law, robot, mind, now)
+
+
+@njit(cache=True, nogil=True)
+def _lift(
+    robot: ReferenceRobot,
+    mind: Mind,
+    now: Now,
+    side: int,
+    time_s: float,
+    place: FloatArray,
+    back: bool,
+) -> None:
+    """Begin a step."""
+    mind.phase[0], mind.phase[1], mind.phase[2] = SWINGS, side, 1.0 if back else 0.0
+    mind.phase[3] += 1.0
+    mind.time[0], mind.time[1] = 0.0, time_s
+    mind.place[:] = place
+    mind.foot[:3], mind.foot[3] = now.pose.position[robot.stance.feet[side]], now.feet[side, 2]
+    mind.foot_rate[:3], mind.foot_rate[3] = now.foot_rate[side, :3], now.foot_rate[side, 5]
+
+
+@njit(cache=True, nogil=True)
+def _on_one_foot(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> tuple[float, float]:
+    """Move the foot on; return where in the standing sole the zero-moment point shall be."""
+    side = int(mind.phase[1])
+    left = max(mind.time[1] - mind.time[0], 0.0)
+    sole = support_hull(robot.corners, now.feet, side, 0.5 * _INSET_M)
+    if mind.phase[2] == 1.0 and hull_margin(sole, now.dcm[0], now.dcm[1]) < -_LOST_M:
+        mind.phase[2] = 0.0
+    if mind.phase[2] == 0.0:
+        if left > _FIXED_S:
+            place, _ = landing_place(
+                robot.corners, now.feet[1 - side], side, now.dcm, now.rate, left, law.reach
+            )
+            mind.place[:] = place
+        x, y = now.dcm
+    else:
+        mind.place[:] = _beside(law, now.feet, side)
+        landing = now.feet.copy()
+        landing[side] = mind.place
+        here_x, here_y = sole_middle(robot, now.feet, 1 - side)
+        there_x, there_y = sole_middle(robot, landing, side)
+        growth = np.exp(now.rate * max(left, 0.1))
+        wanted_x = (1.0 - _INWARDS) * here_x + _INWARDS * there_x
+        wanted_y = (1.0 - _INWARDS) * here_y + _INWARDS * there_y
+        x = (wanted_x - growth * now.dcm[0]) / (1.0 - growth)
+        y = (wanted_y - growth * now.dcm[1]) / (1.0 - growth)
+    _swing(law, robot, mind, now.floor)
+    return nearest_inside(sole, x, y)
+
+
+@njit(cache=True, nogil=True)
+def _on_both_feet(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> tuple[float, float]:
+    """Bring the weight between the feet or over one; return the wanted zero-moment point."""
+    left_x, left_y = sole_middle(robot, now.feet, 0)
+    right_x, right_y = sole_middle(robot, now.feet, 1)
+    share = 0.5
+    if mind.phase[0] == SHIFTS:
+        share = 0.0 if mind.phase[1] == 0.0 else 1.0
+    x = share * left_x + (1.0 - share) * right_x
+    y = share * left_y + (1.0 - share) * right_y
+    dx, dy = x - mind.goal[0], y - mind.goal[1]
+    far = np.hypot(dx, dy)
+    if far > 0.0:
+        go = min(_SHIFT_M_S * law.period_s, far) / far
+        mind.goal[0] += go * dx
+        mind.goal[1] += go * dy
+    near = np.hypot(now.dcm[0] - x, now.dcm[1] - y) < _RESTS_M
+    mind.time[2] = mind.time[2] + law.period_s if near else 0.0
+    if mind.phase[0] == STANDS and mind.time[2] > _RESTS_S and _astray(law, now.feet) > ASTRAY_M:
+        mind.phase[0], mind.time[0], mind.time[2] = SHIFTS, 0.0, 0.0
+        if mind.phase[2] == 0.0:  # after a step that caught, the other foot follows
+            mind.phase[1] = 1.0 - mind.phase[1]
+    hull = support_hull(robot.corners, now.feet, -1, _INSET_M)
+    strong = 1.0 + law.gain / now.rate
+    return nearest_inside(
+        hull,
+        mind.goal[0] + strong * (now.dcm[0] - mind.goal[0]),
+        mind.goal[1] + strong * (now.dcm[1] - mind.goal[1]),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _astray(law: StepLaw, feet: FloatArray) -> float:
+    """Return how far the left foot is from its place beside the right one [m]."""
+    x, y = turn_in_plane(feet[0, 0] - feet[1, 0], feet[0, 1] - feet[1, 1], -feet[1, 2])
+    turn = wrap_angle(feet[0, 2] - feet[1, 2] - law.apart[2])
+    return float(np.hypot(x - law.apart[0], y - law.apart[1]) + _TURN_M * abs(turn))
+
+
+@njit(cache=True, nogil=True)
+def _beside(law: StepLaw, feet: FloatArray, side: int) -> FloatArray:
+    """Return a foot's place beside the other: x, y [m] and yaw [rad], shape (3,)."""
+    x, y, turn = law.apart
+    if side == 1:
+        x, y = turn_in_plane(-x, -y, -turn)
+        turn = -turn
+    other = feet[1 - side]
+    dx, dy = turn_in_plane(x, y, other[2])
+    return np.array([other[0] + dx, other[1] + dy, other[2] + turn])
+
+
+@njit(cache=True, nogil=True)
+def _swing(law: StepLaw, robot: ReferenceRobot, mind: Mind, floor: float) -> None:
+    """Move the foot that steps on its way: up, and down to its place."""
+    h = law.period_s
+    left = max(mind.time[1] - mind.time[0], _FIXED_S)
+    at, rate, change = mind.foot, mind.foot_rate, mind.foot_change
+    for i in range(2):
+        change[i] = _towards(at[i], rate[i], mind.place[i], max(left - 0.02, _LEAST_S))
+    half = 0.45 * mind.time[1]
+    rises = mind.time[0] < half
+    height = floor + robot.stance.foot_position[int(mind.phase[1]), 2]
+    height += law.lift_m if rises else -_DOWN_M
+    until = max(half - mind.time[0] if rises else left, _FIXED_S)
+    change[2] = _towards(at[2], rate[2], height, until)
+    change[3] = _towards(0.0, rate[3], wrap_angle(mind.place[2] - at[3]), left)
+    rate += h * change
+    at += h * rate
+
+
+@njit(cache=True, nogil=True)
+def _towards(x: float, rate: float, goal: float, left: float) -> float:
+    """Return the acceleration with which a cubic comes to rest at a goal in the time left."""
+    return 6.0 * (goal - x) / (left * left) - 4.0 * rate / left

@@ -1,0 +1,311 @@
+"""Torques of the legs that make weight, base and feet move as wanted.
+
+Wanted accelerations of the feet, the weight (an inverted pendulum on the wanted zero-moment point)
+and the base give those of the legs, by the Jacobian of [Kulic2012] 4.2.1; inverse dynamics gives
+what the ground has to do for that, the soles do what is nearest to it (`contact_forces`), and the
+legs' torques follow. The servos get positions and velocities that make these torques.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mplearn.maths.plane import wrap_angle
+from mplearn.maths.rotation_kernels import rotation_error, turn_about_vertical
+from mplearn.maths.solvers import solve_damped
+from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix
+from mplearn.recording import FloatArray
+from mplearn_envs.mechanics.ground_forces import contact_forces
+from mplearn_envs.mechanics.kinematics import cross, forward
+from mplearn_envs.mechanics.reference import ReferenceRobot
+from mplearn_envs.mechanics.velocity_ik import (
+    COG,
+    HEIGHT,
+    ORIENTATION,
+    add_leg_columns,
+    jacobian_rows,
+)
+
+from .senses import Now, in_base
+from .stepping import SHIFTS, Mind, swinging
+
+# Gains [1/s^2, 1/s] and largest accelerations, of 30 rad/s for a foot on its way.
+_SWING = (900.0, 60.0)
+_STANDING = (200.0, 50.0)
+_HEIGHT = (250.0, 30.0)
+_BASE = (70.0, 17.0)
+_SWING_WEIGHT = 0.2  # of the foot on its way, where not all can be had
+_DAMPING = 0.05
+_AHEAD_S = 0.1  # the base is lowered for where it will be
+_REACH = 0.985  # of the leg
+_TOUCHES_M = 0.006
+_PROBE_S = 1e-3
+_COG, _TURN = COG.start, ORIENTATION.start  # rows of the Jacobian
+_FORGETS, _OWED = 0.97, 0.4  # a period; share of the torque limit
+_NEAR_LIMIT = 0.2  # share of the way to a joint's limit in one period
+
+
+class BodyLaw(NamedTuple):
+    """What the whole body's control goes by.
+
+    Attributes:
+        stiffness: Gain of each servo, shape (n,) [N m/rad].
+        damping: Its velocity gain, shape (n,) [N m s/rad].
+        torque: Torque limits, shape (n,) [N m].
+        limits: Limits of the joints' angles, shape (n, 2) [rad].
+        friction: Coefficient that is counted on.
+        moment: How much a moment about the COG [N m] counts against a force [N].
+        turn: Largest angular acceleration of the base [rad/s^2].
+        foot: Largest acceleration of a foot on its way [m/s^2].
+        foot_turn: Its largest angular acceleration [rad/s^2].
+        crouch_m: How much the base is lower as soon as steps are taken [m].
+        drop: Largest acceleration of the base downwards [m/s^2]: who drops has no weight to push
+            himself off with.
+        rise: And upwards [m/s^2].
+        ahead: Which share of its acceleration a foot on its way is given ahead.
+        watch: How much of what a joint's velocity misses in a period is made up for by torque in
+            the leg on its way, and in one that stands, shape (2,) [N m s/rad].
+    """
+
+    stiffness: FloatArray
+    damping: FloatArray
+    torque: FloatArray
+    limits: FloatArray
+    friction: float
+    moment: float
+    turn: float
+    foot: float
+    foot_turn: float
+    crouch_m: float
+    drop: float
+    rise: float
+    ahead: float
+    watch: FloatArray
+
+
+class Upper(NamedTuple):
+    """What the rest of the body does meanwhile.
+
+    Attributes:
+        base: Height [m], roll and pitch [rad] that the base shall have, shape (3,).
+        rate: Velocities of the tracked hinges, shape (U - 3,) [rad/s].
+        change: Their accelerations, shape (U - 3,) [rad/s^2].
+    """
+
+    base: FloatArray
+    rate: FloatArray
+    change: FloatArray
+
+
+@njit(cache=True, nogil=True)
+def wanted_acceleration(
+    law: BodyLaw,
+    robot: ReferenceRobot,
+    mind: Mind,
+    now: Now,
+    upper: Upper,
+    zmp_x: float,
+    zmp_y: float,
+    period_s: float,
+) -> FloatArray:
+    """Return the acceleration that the robot shall have, layout of qacc, shape (6 + n,).
+
+    Args:
+        law: What control goes by.
+        robot: The reference robot.
+        mind: Which foot is where on its way.
+        now: The moment.
+        upper: What the rest of the body does.
+        zmp_x: Where the zero-moment point shall be [m].
+        zmp_y: The same.
+        period_s: Control period [s].
+    """
+    stance = robot.stance
+    swings = swinging(mind)
+    change = np.empty(18)
+    for side in range(2):
+        _foot(law, robot, mind, now, side, side == swings, change[6 * side : 6 * side + 6])
+    push = now.rate * now.rate
+    change[_COG] = push * (now.cog[0] - zmp_x)
+    change[_COG + 1] = push * (now.cog[1] - zmp_y)
+    height = _height(law, robot, mind, now, upper.base[0], period_s)
+    lift = _HEIGHT[0] * (height + now.floor - now.q[2]) - _HEIGHT[1] * now.v[2]
+    change[HEIGHT] = min(max(lift, -law.drop), law.rise)
+    yaw = now.feet[0, 2] + 0.5 * wrap_angle(now.feet[1, 2] - now.feet[0, 2])
+    upright = turn_about_vertical(yaw, roll_pitch_matrix(upper.base[1], upper.base[2]))
+    turn = rotation_error(upright, now.pose.rotation[0])
+    for i in range(3):
+        a = _BASE[0] * turn[i] - _BASE[1] * now.spin[i]
+        change[_TURN + i] = min(max(a, -law.turn), law.turn)
+
+    # velocities that these make in one period, less those that there are
+    n_legs = stance.leg_joints.shape[0]
+    jacobian = jacobian_rows(stance, now.after)
+    add_leg_columns(robot.tree, stance, now.after, jacobian)
+    here = np.empty(6 + n_legs)
+    here[:3], here[3:6] = now.v[:3], now.spin
+    for k in range(n_legs):
+        here[6 + k] = now.v[6 + stance.leg_joints[k]]
+    rows = period_s * change - jacobian @ here
+    for side in range(2):
+        rows[6 * side : 6 * side + 6] += now.foot_rate[side]
+    by_upper = _cog_rate_of(robot, now, upper.rate)
+    rows[_COG : _COG + 2] += now.cog_rate[:2] - by_upper[:2]
+    rows[HEIGHT] += now.v[2]
+    rows[_TURN : _TURN + 3] += now.spin
+    if swings >= 0:
+        jacobian[6 * swings : 6 * swings + 6] *= _SWING_WEIGHT
+        rows[6 * swings : 6 * swings + 6] *= _SWING_WEIGHT
+    step = solve_damped(jacobian, rows, _DAMPING) / period_s
+    out = np.zeros(now.v.shape[0])
+    out[:3] = step[:3]
+    turned = in_base(now.q, now.spin + period_s * step[3:6])
+    out[3:6] = (turned - now.v[3:6]) / period_s
+    for k in range(n_legs):
+        out[6 + stance.leg_joints[k]] = step[6 + k]
+    for u in range(robot.upper.shape[0]):
+        out[6 + robot.upper[u]] = upper.change[u]
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _foot(
+    law: BodyLaw,
+    robot: ReferenceRobot,
+    mind: Mind,
+    now: Now,
+    side: int,
+    swings: bool,
+    out: FloatArray,
+) -> None:
+    """Write a foot's acceleration: on its way it follows that, otherwise it stays and lies flat."""
+    foot, rate = robot.stance.feet[side], now.foot_rate[side]
+    flat = robot.stance.foot_rotation[side]
+    if not swings:
+        turn = rotation_error(turn_about_vertical(now.feet[side, 2], flat), now.pose.rotation[foot])
+        for i in range(3):
+            out[i] = -_STANDING[1] * rate[i]
+            out[3 + i] = _STANDING[0] * turn[i] - _STANDING[1] * rate[3 + i]
+        up = now.pose.position[foot, 2] - now.floor - robot.stance.foot_position[side, 2]
+        out[2] -= _STANDING[0] * max(up, 0.0)
+        return
+    turn = rotation_error(turn_about_vertical(mind.foot[3], flat), now.pose.rotation[foot])
+    for i in range(3):
+        a = law.ahead * mind.foot_change[i]
+        a += _SWING[0] * (mind.foot[i] - now.pose.position[foot, i])
+        a += _SWING[1] * (mind.foot_rate[i] - rate[i])
+        out[i] = min(max(a, -law.foot), law.foot)
+        wanted = mind.foot_rate[3] if i == 2 else 0.0
+        a = _SWING[0] * turn[i] + _SWING[1] * (wanted - rate[3 + i])
+        out[3 + i] = min(max(a, -law.foot_turn), law.foot_turn)
+
+
+@njit(cache=True, nogil=True)
+def _height(
+    law: BodyLaw, robot: ReferenceRobot, mind: Mind, now: Now, wanted: float, period_s: float
+) -> float:
+    """Return how high the base shall be over the floor, so that both legs will reach [m]."""
+    stance, swings = robot.stance, swinging(mind)
+    out = wanted - (law.crouch_m if mind.phase[3] > 0.0 else 0.0)
+    for side in range(2):
+        foot, thigh = stance.feet[side], stance.thighs[side]
+        hip = now.pose.position[thigh]
+        ground = now.pose.position[foot, 2]
+        far = 0.0
+        for i in range(2):
+            speed = (now.after.position[thigh, i] - hip[i]) / period_s
+            if side == swings:
+                left = max(mind.time[1] - mind.time[0], 0.0)
+                d = hip[i] + left * speed - mind.place[i]
+            elif mind.phase[0] == SHIFTS:
+                d = hip[i] + mind.goal[i] - now.cog[i] - now.pose.position[foot, i]
+            else:
+                speed -= (now.after.position[foot, i] - now.pose.position[foot, i]) / period_s
+                d = hip[i] + _AHEAD_S * speed - now.pose.position[foot, i]
+            far += d * d
+        if side == swings:
+            ground = now.floor + stance.foot_position[side, 2]
+        flat = (_REACH * stance.reach[side]) ** 2 - far
+        most = np.sqrt(max(flat, 0.05)) + ground - hip[2] + now.q[2] - now.floor
+        out = min(out, most)
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _cog_rate_of(robot: ReferenceRobot, now: Now, rate: FloatArray) -> FloatArray:
+    """Return the COG's velocity that comes of the tracked hinges alone, shape (3,) [m/s]."""
+    q = now.q.copy()
+    for u in range(robot.upper.shape[0]):
+        q[7 + robot.upper[u]] += _PROBE_S * rate[u]
+    moved = forward(robot.tree, q).moment[0] - now.pose.moment[0]
+    return moved / (_PROBE_S * now.pose.carried[0])
+
+
+@njit(cache=True, nogil=True)
+def command_legs(
+    law: BodyLaw,
+    robot: ReferenceRobot,
+    mind: Mind,
+    now: Now,
+    change: FloatArray,
+    needed: FloatArray,
+    period_s: float,
+    command: FloatArray,
+    owed: FloatArray,
+) -> None:
+    """Write the legs' servo commands.
+
+    A servo's force at the end of a period is stiffness (command - angle) - damping rate: so the
+    command leads by where the joint will be, and by the torque.
+
+    Args:
+        law: What control goes by.
+        robot: The reference robot.
+        mind: Which foot is on its way.
+        now: The moment.
+        change: Wanted acceleration, layout of qacc, shape (6 + n,).
+        needed: Generalised forces that make it without the ground's, same layout.
+        period_s: Control period [s].
+        command: Commands of all servos, shape (n,) [rad], in which the legs' are written.
+        owed: Of each joint, the velocity wanted for now [rad/s] and the torque by which what the
+            robot believes of itself is wrong [N m], shape (2, n); brought up to date.
+    """
+    stance, swings = robot.stance, swinging(mind)
+    points, sides = np.empty((8, 3)), np.empty(8, np.int64)
+    n = 0
+    for side in range(2):
+        for k in range(4):
+            if side != swings and now.soles[side, k, 2] < now.floor + _TOUCHES_M:
+                points[n], sides[n] = now.soles[side, k] - now.cog, side
+                n += 1
+    wrench, base = np.empty(6), now.pose.rotation[0]
+    wrench[:3] = needed[:3]
+    moment = cross(now.pose.position[0] - now.cog, needed[:3])
+    for i in range(3):
+        wrench[3 + i] = moment[i]
+        for j in range(3):
+            wrench[3 + i] += base[i, j] * needed[3 + j]
+    weight = np.array([1.0, 1.0, 0.7, law.moment, law.moment, law.moment])
+    forces = contact_forces(points[:n].copy(), wrench, weight, law.friction)
+    for k in range(stance.leg_joints.shape[0]):
+        j = stance.leg_joints[k]
+        torque = needed[6 + j]
+        for p in range(n):
+            if sides[p] == stance.leg_side[k]:
+                turning = cross(points[p] + now.cog - now.pose.anchor[j], forces[p])
+                for i in range(3):
+                    torque -= now.pose.axis[j, i] * turning[i]
+        watch = law.watch[0 if stance.leg_side[k] == swings else 1]
+        owed[1, j] = _FORGETS * owed[1, j] + watch * (owed[0, j] - now.v[6 + j])
+        owed[1, j] = min(max(owed[1, j], -_OWED * law.torque[j]), _OWED * law.torque[j])
+        torque = min(max(torque + owed[1, j], -law.torque[j]), law.torque[j])
+        angle = now.q[7 + j]
+        rate = now.v[6 + j] + period_s * change[6 + j]
+        rate = max(rate, _NEAR_LIMIT * (law.limits[j, 0] - angle) / period_s)
+        rate = min(rate, _NEAR_LIMIT * (law.limits[j, 1] - angle) / period_s)
+        owed[0, j] = rate
+        lead = (torque + law.damping[j] * rate) / law.stiffness[j]
+        command[j] = angle + period_s * rate + lead

@@ -1,0 +1,350 @@
+"""A plan is performed by a robot that may be pushed: it steps where it would fall otherwise."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numba import njit
+
+from mplearn.maths.easing import minimum_jerk
+from mplearn.maths.rotation_kernels import turn_about_vertical
+from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix, roll_pitch_of
+from mplearn.recording import FloatArray, IntArray
+from mplearn_envs.control.ankle_feedback import AnkleFeedback, correct
+from mplearn_envs.control.capture import Reach
+from mplearn_envs.control.senses import sense
+from mplearn_envs.control.stepping import Mind, StepLaw, decide, new_mind, settled, swinging, wake
+from mplearn_envs.control.whole_body import BodyLaw, Upper, command_legs, wanted_acceleration
+from mplearn_envs.mechanics.gravity import holding_torques
+from mplearn_envs.mechanics.reference import (
+    Reference,
+    ReferenceRobot,
+    reference_robot,
+    rest_reference,
+    sole_middles,
+)
+from mplearn_envs.mechanics.velocity_ik import settle
+from mplearn_envs.planning.plan import Plan
+from mplearn_envs.planning.planner import GRID_DECIMALS
+from mplearn_envs.planning.stride import recentred
+from mplearn_envs.robot import Robot
+
+from .mujoco_loop import Views, mj_inverse, mj_step1, mj_step2, mj_subtree_velocity
+from .tracking_report import FALL_DROP_M, has_fallen
+
+ASTRAY_M = 0.06  # a DCM so far from its plan wakes the reflexes
+TILTED = 0.99  # as does a base so tilted against its plan (cosine)
+_REACHED = 1e-3  # [m, rad]
+LONGEST_S = 8.0  # after the end of a plan for which the robot may still be on its way back
+RESTS_S = 0.3
+_BLEND_S = 0.5
+_DROP_M = 0.35  # who steps may be so much lower
+_TUNED = {
+    "reach": Reach(0.5, 0.4, 0.16, 0.62, 1.9, 0.24),
+    "gain": 4.0,
+    "lift_m": 0.035,
+    "friction": 0.6,
+    "moment": 1.0,
+    "turn": 30.0,
+    "foot": 80.0,
+    "foot_turn": 200.0,
+    "crouch_m": 0.08,
+    "drop": 3.0,
+    "rise": 8.0,
+    "ahead": 0.0,
+    "watch": np.array([60.0, 0.0]),
+}
+
+
+class Pushes(NamedTuple):
+    """Forces on one body while a plan is performed.
+
+    Attributes:
+        body: Which body, at its centre of mass.
+        steps: First and last step (excluded) of each push, shape (P, 2).
+        force: Its force, shape (P, 3) [N].
+    """
+
+    body: int
+    steps: IntArray
+    force: FloatArray
+
+
+NO_PUSHES = Pushes(0, np.empty((0, 2), np.int64), np.empty((0, 3)))
+
+
+class Course(NamedTuple):
+    """What a plan of K knots and N commands wants, as the loop needs it.
+
+    Attributes:
+        commands: Servo commands, shape (N, n) [rad].
+        q: Reference postures, shape (K + 1, 7 + n).
+        base: Height [m], roll and pitch [rad] of the base, shape (K + 1, 3).
+        rate: Velocities of the tracked hinges, shape (K + 1, U - 3) [rad/s].
+        change: Their accelerations, shape (K + 1, U - 3) [rad/s^2].
+        up: Side of the foot in the air, -1 for none, shape (K + 1,).
+    """
+
+    commands: FloatArray
+    q: FloatArray
+    base: FloatArray
+    rate: FloatArray
+    change: FloatArray
+    up: IntArray
+
+
+class Own(NamedTuple):
+    """What the robot reckons with: its own model of itself, without the ground."""
+
+    qpos: FloatArray
+    qvel: FloatArray
+    qacc: FloatArray
+    qfrc_inverse: FloatArray
+
+
+class Reflexes:
+    """What a robot needs to balance by steps.
+
+    Args:
+        robot: The robot.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.reference = reference_robot(robot)
+        self.model = mujoco.MjModel.from_xml_string(robot.xml)
+        off = mujoco.mjtDisableBit
+        self.model.opt.disableflags |= (
+            off.mjDSBL_CONSTRAINT | off.mjDSBL_ACTUATION | off.mjDSBL_SENSOR
+        )
+        self.data = mujoco.MjData(self.model)
+        self.own = Own(*(getattr(self.data, name) for name in Own._fields))
+        limits = robot.position_limits.copy()
+        for knee in robot.knees:
+            j = robot.joint_names.index(knee)
+            limits[j, 0] = max(limits[j, 0], 0.5 * robot.guard_knee_rad)
+        ground = self.reference.ground
+        period_s = float(self.model.opt.timestep)
+        self.law = StepLaw(
+            period_s,
+            _TUNED["gain"],
+            _TUNED["reach"],
+            np.append(ground[0, :2] - ground[1, :2], 0.0),
+            _TUNED["lift_m"],
+        )
+        self.body = BodyLaw(
+            robot.per_joint("stiffness"),
+            robot.per_joint("damping"),
+            robot.per_joint("torque"),
+            limits,
+            *(
+                _TUNED[name]
+                for name in (
+                    "friction",
+                    "moment",
+                    "turn",
+                    "foot",
+                    "foot_turn",
+                    "crouch_m",
+                    "drop",
+                    "rise",
+                    "ahead",
+                    "watch",
+                )
+            ),
+        )
+
+    def course(self, plan: Plan) -> Course:
+        """Return what a plan wants."""
+        q = plan.q
+        roll, pitch = np.array([roll_pitch_of(row) for row in q[:, 3:7]]).T
+        hinges = q[:, 7 + self.reference.upper]
+        rate = np.gradient(hinges, plan.knot_s, axis=0)
+        change = np.gradient(rate, plan.knot_s, axis=0)
+        base = np.column_stack((q[:, 2], roll, pitch))
+        return Course(plan.commands, q, base, rate, change, plan.up.astype(np.int64))
+
+    def arrival(self, plan: Plan, q: FloatArray) -> Reference:
+        """Return the reference robot at rest where a robot that has stepped stands.
+
+        Args:
+            plan: What it performed meanwhile: the upper body is as at its end.
+            q: How it stands, shape (7 + n,).
+        """
+        ref = self.reference
+        now = sense(ref, q, np.zeros(len(q) - 1), self.law.period_s, -1)
+        posture, ground = recentred(q, now.feet)
+        rest = rest_reference(self.robot)
+        end = plan.end.target
+        for target in (end, np.concatenate((rest.target[:3], end[3:]))):
+            stance = ref.stance._replace(
+                foot_position=np.column_stack((ground[:, :2], ref.stance.foot_position[:, 2])),
+                foot_rotation=np.stack(
+                    [
+                        turn_about_vertical(float(yaw), flat)
+                        for yaw, flat in zip(ground[:, 2], ref.stance.foot_rotation, strict=True)
+                    ]
+                ),
+                cog=sole_middles(ref, ground).mean(axis=0),
+            )
+            guess = posture.copy()
+            guess[7 + ref.upper] = target[3:]
+            height = float(target[0]) + ref.stance_height - ref.standing_height
+            upright = roll_pitch_matrix(float(target[1]), float(target[2]))
+            found, worst = settle(ref.tree, stance, guess, height, upright, 1e-8, 50)
+            if worst < _REACHED:
+                break
+        still, swing = np.zeros_like(target), np.zeros_like(rest.swing)
+        parts = (target, still, found, rest.swing, swing, np.zeros(2), ground)
+        return Reference(*(np.round(part, GRID_DECIMALS) for part in parts))
+
+    def return_commands(self, arrival: Reference, commands: FloatArray) -> FloatArray:
+        """Return the commands that bring the robot from what it is commanded to the reference."""
+        ref = self.reference
+        middles = sole_middles(ref, arrival.ground)[None]
+        share = np.array([0.5])
+        torque = holding_torques(ref, arrival.q[None], share, middles.mean(axis=1), middles)[0]
+        there = arrival.q[7:] + torque / self.robot.per_joint("stiffness")
+        n = round(_BLEND_S / self.law.period_s)
+        x = minimum_jerk((np.arange(n) + 1.0) / n)[:, None]
+        return np.asarray(commands * (1.0 - x) + there * x)
+
+
+class Progress(NamedTuple):
+    """Where a robot is in a plan; arrays, changed in place.
+
+    Attributes:
+        mind: What stepping remembers.
+        awake: 1 once the robot balances by steps, shape (1,).
+        command: What the servos got last, shape (n,) [rad].
+        owed: What joints miss, see `command_legs`, shape (2, n).
+        late: Commands that have not reached the servos yet, shape (lag, n) [rad].
+    """
+
+    mind: Mind
+    awake: IntArray
+    command: FloatArray
+    owed: FloatArray
+    late: FloatArray
+
+
+def new_progress(command: FloatArray, lag: int) -> Progress:
+    """Return the start of a plan.
+
+    Args:
+        command: What the servos got last, shape (n,) [rad].
+        lag: By how many control periods commands come late.
+    """
+    late = np.repeat(command[None], lag, axis=0)
+    owed = np.zeros((2, len(command)))
+    return Progress(new_mind(), np.zeros(1, np.int64), command.copy(), owed, late)
+
+
+@njit(cache=True, nogil=True)
+def send_watchful(
+    addresses: tuple[int, int, int, int],
+    views: Views,
+    own: Own,
+    feet: IntArray,
+    robot: ReferenceRobot,
+    ankles: AnkleFeedback,
+    law: StepLaw,
+    body: BodyLaw,
+    course: Course,
+    pushes: Pushes,
+    progress: Progress,
+    first: int,
+    last: int,
+    q: FloatArray,
+    v: FloatArray,
+) -> tuple[int, bool, bool]:
+    """Send the commands of a plan of K knots between two of its knots, or until a fall.
+
+    Knots beyond the last are those of a robot that is still stepping back.
+
+    Args:
+        addresses: Of the model, its state, the robot's own model, and its state.
+        views: Views of the state.
+        own: Views of its own model's state.
+        feet: Bodies of the feet, shape (2,).
+        robot: The reference robot.
+        ankles: What corrects the commands as long as no step is needed.
+        law: What stepping goes by.
+        body: What the whole body's control goes by.
+        course: What the plan wants.
+        pushes: What pushes the robot.
+        progress: Where the robot is in the plan.
+        first: Knot at which the robot is.
+        last: Where to stop.
+        q: Filled with the postures at the plan's knots after the first, (K + 1, 7 + n).
+        v: Filled with the velocities there, (K + 1, 6 + n).
+
+    Returns:
+        Where it stopped, whether it had fallen there, and whether all is over.
+    """
+    model, data, own_model, own_data = addresses
+    mind, owed, h = progress.mind, progress.owed, law.period_s
+    n_knots = course.q.shape[0] - 1
+    n_steps = course.commands.shape[0] // n_knots
+    still = np.zeros(course.rate.shape[1])
+    for knot in range(first + 1, last + 1):
+        at = min(knot, n_knots)
+        for step in range((knot - 1) * n_steps, knot * n_steps):
+            views.ctrl[:] = course.commands[min(step, n_knots * n_steps - 1)]
+            views.xfrc_applied[pushes.body, :3] = 0.0
+            for p in range(pushes.steps.shape[0]):
+                if pushes.steps[p, 0] <= step < pushes.steps[p, 1]:
+                    views.xfrc_applied[pushes.body, :3] += pushes.force[p]
+            mj_step1(model, data)
+            if progress.awake[0] == 0:
+                mj_subtree_velocity(model, data)
+                off = correct(
+                    ankles,
+                    step,
+                    views.ctrl,
+                    views.subtree_com[1],
+                    views.subtree_linvel[1],
+                    views.xpos[feet[0]],
+                    views.xpos[feet[1]],
+                    views.xmat[feet[0]],
+                    views.xmat[feet[1]],
+                    views.xaxis,
+                )
+                if off > ASTRAY_M:
+                    progress.awake[0] = 1
+                    now = sense(robot, views.qpos.copy(), views.qvel.copy(), h, course.up[at])
+                    wake(law, robot, mind, now, course.up[at])
+                    owed[0], owed[1] = views.qvel[6:], 0.0
+            if progress.awake[0] == 1:
+                now = sense(robot, views.qpos.copy(), views.qvel.copy(), h, swinging(mind))
+                zmp_x, zmp_y = decide(law, robot, mind, now)
+                over = knot > n_knots
+                upper = Upper(
+                    course.base[at],
+                    still if over else course.rate[at],
+                    still if over else course.change[at],
+                )
+                change = wanted_acceleration(body, robot, mind, now, upper, zmp_x, zmp_y, h)
+                own.qpos[:], own.qvel[:], own.qacc[:] = views.qpos, views.qvel, change
+                mj_inverse(own_model, own_data)
+                command_legs(body, robot, mind, now, change, own.qfrc_inverse, h, views.ctrl, owed)
+            progress.command[:] = views.ctrl
+            if progress.late.shape[0] > 0:
+                slot = step % progress.late.shape[0]
+                views.ctrl[:] = progress.late[slot]
+                progress.late[slot] = progress.command
+            mj_step2(model, data)
+        if knot <= n_knots:
+            q[knot], v[knot] = views.qpos, views.qvel
+        drop = _DROP_M if progress.awake[0] == 1 else FALL_DROP_M
+        if has_fallen(views.qpos, course.q[at], drop):
+            return knot, True, True
+        if knot >= n_knots:
+            if progress.awake[0] == 0:
+                return knot, False, True
+            now = sense(robot, views.qpos.copy(), views.qvel.copy(), h, swinging(mind))
+            if settled(law, mind, now, RESTS_S):
+                return knot, False, True
+    return last, False, False

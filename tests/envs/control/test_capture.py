@@ -1,0 +1,82 @@
+"""Where to step: closed forms and brute force."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from mplearn_envs.control.capture import (
+    Reach,
+    choose_step,
+    landing_place,
+    nearest_inside,
+    support_hull,
+)
+from mplearn_envs.mechanics import reference_robot
+from mplearn_envs.mechanics.support import convex_hull, support_margin
+from mplearn_envs.robot import humanoid
+
+RATE = 3.2
+REACH = Reach(0.5, 0.4, 0.16, 0.62, 1.9, 0.24)
+
+
+@pytest.fixture(scope="module")
+def corners():
+    return reference_robot(humanoid()).corners
+
+
+FEET = np.array([[0.0, 0.09, 0.0], [0.0, -0.09, 0.0]])
+
+
+def test_nearest_point_of_a_polygon_is_that_of_many():
+    rng = np.random.default_rng(0)
+    hull = convex_hull(rng.normal(size=(12, 2)))
+    x = np.linspace(0.0, 1.0, 2001)[:, None]
+    edges = np.concatenate(
+        [a * (1 - x) + b * x for a, b in zip(hull, np.roll(hull, 1, 0), strict=True)]
+    )
+    for point in 3.0 * rng.normal(size=(50, 2)):
+        found = np.array(nearest_inside(hull, *point))
+        if support_margin(hull, point) >= 0.0:
+            assert np.array_equal(found, point)
+        else:
+            least = np.linalg.norm(edges - point, axis=1).min()
+            assert np.linalg.norm(found - point) == pytest.approx(least, abs=1e-4)
+
+
+def test_support_hull_is_that_of_all_corners(corners):
+    hull = support_hull(corners, FEET, -1, 0.0)
+    points = np.concatenate([corners[s, :, :2] + FEET[s, :2] for s in (0, 1)])
+    assert support_margin(hull, points).min() == pytest.approx(0.0, abs=1e-12)
+    assert np.ptp(hull, axis=0) == pytest.approx(np.ptp(points, axis=0))
+    one = support_hull(corners, FEET, 0, 0.01)
+    assert np.ptp(one, axis=0) == pytest.approx(np.ptp(corners[1, :, :2], axis=0) - 0.02)
+
+
+@pytest.mark.parametrize("dcm", [(0.2, 0.0), (0.17, 0.1), (-0.15, 0.05)])
+def test_foot_lands_where_the_pendulum_will_be(corners, dcm):
+    """The DCM's differential equation, integrated, ends over the new soles."""
+    dcm, time_s, side = np.array(dcm), 0.3, 0
+    sole = support_hull(corners, FEET, side, 0.008)
+    zmp = np.array(nearest_inside(sole, *dcm))
+    end = solve_ivp(lambda _, x: RATE * (x - zmp), (0.0, time_s), dcm, rtol=1e-10).y[:, -1]
+    place, missing = landing_place(corners, FEET[1], side, dcm, RATE, time_s, REACH)
+    both = support_hull(corners, np.stack((place, FEET[1])), -1, 0.008)
+    assert max(0.0, -support_margin(both, end)) == pytest.approx(missing, abs=1e-6)
+    assert missing < 0.05
+
+
+@pytest.mark.parametrize("angle", np.arange(8) * np.pi / 4)
+def test_step_goes_where_the_push_goes_and_legs_do_not_cross(corners, angle):
+    dcm = np.array([0.03, 0.0]) + 0.2 * np.array([np.cos(angle), np.sin(angle)])
+    step = choose_step(corners, FEET, dcm, RATE, REACH, -1)
+    moved = step.place[:2] - FEET[step.side, :2]
+    assert moved @ [np.cos(angle), np.sin(angle)] > 0.0
+    aside = (step.place[1] - FEET[1 - step.side, 1]) * (1 if step.side == 0 else -1)
+    assert aside >= REACH.narrow - 1e-12
+    if abs(np.sin(angle)) > 0.5:  # to the side that foot steps
+        assert step.side == (0 if np.sin(angle) > 0 else 1)
+
+
+def test_only_one_foot_may_step(corners):
+    for side in (0, 1):
+        assert choose_step(corners, FEET, np.array([0.2, 0.0]), RATE, REACH, side).side == side

@@ -1,0 +1,84 @@
+"""Steps that save a robot that was pushed."""
+
+import numpy as np
+import pytest
+
+from mplearn.errors import InvalidValueError
+from mplearn_envs.execution.bodies import Body
+from mplearn_envs.execution.reflexes import Pushes
+from mplearn_envs.execution.simulation import Simulation
+from mplearn_envs.mechanics import rest_reference
+from mplearn_envs.planning import Planner
+from mplearn_envs.robot import humanoid
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return humanoid()
+
+
+@pytest.fixture(scope="module")
+def planner(robot):
+    return Planner(robot)
+
+
+@pytest.fixture(scope="module")
+def simulation(robot):
+    return Simulation(robot, body=Body(steps=True))
+
+
+def _push(simulation, angle, impulse_ns):
+    force = impulse_ns / 0.1 * np.array([[np.cos(angle), np.sin(angle), 0.0]])
+    return Pushes(simulation.model.body("chest").id, np.array([[25, 50]]), force)
+
+
+def test_a_robot_that_is_not_pushed_performs_as_if_it_could_not_step(robot, planner, simulation):
+    plan = planner.hold(rest_reference(robot), 0.6)
+    other = Simulation(robot, feedback="always")
+    simulation.reset()
+    other.reset()
+    report, expected = simulation.perform(plan), other.perform(plan)
+    assert np.array_equal(simulation.data.qpos, other.data.qpos)
+    assert np.array_equal(simulation.data.qvel, other.data.qvel)
+    assert report.n_steps == 0 and report.end is None
+    assert report.duration_s == expected.duration_s
+
+
+@pytest.mark.parametrize("angle", np.arange(8) * np.pi / 4)
+def test_push_of_36_ns_is_survived_in_eight_directions(robot, planner, simulation, angle):
+    simulation.reset()
+    plan = planner.hold(rest_reference(robot), 1.0)
+    report = simulation.perform(plan, pushes=_push(simulation, angle, 36.0))
+    assert not report.fallen
+    assert report.n_steps >= 1
+    assert report.duration_s > plan.duration_s
+    feet = report.end.ground  # beside each other again
+    assert np.linalg.norm(feet[0, :2] - feet[1, :2] - [0.0, 0.18]) < 0.04
+    after = simulation.perform(planner.hold(report.end, 1.0))
+    assert not after.fallen and after.n_steps == 0
+
+
+def test_small_push_needs_no_step(robot, planner, simulation):
+    simulation.reset()
+    report = simulation.perform(
+        planner.hold(rest_reference(robot), 1.0), pushes=_push(simulation, 0.0, 10.0)
+    )
+    assert not report.fallen and report.n_steps == 0
+
+
+def test_pictures_change_nothing(robot, planner, simulation):
+    plan, states = planner.hold(rest_reference(robot), 0.6), []
+    for on_frame in (None, lambda: None):
+        simulation.reset()
+        report = simulation.perform(plan, on_frame, 7, _push(simulation, 1.0, 30.0))
+        states.append((simulation.state(), report.duration_s, report.end.q))
+    for one, other in zip(*states, strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_who_takes_no_steps_cannot_be_pushed(robot, planner):
+    simulation = Simulation(robot)
+    simulation.reset()
+    plan = planner.hold(rest_reference(robot), 0.2)
+    with pytest.raises(InvalidValueError, match="steps=True"):
+        simulation.perform(plan, pushes=_push(simulation, 0.0, 5.0))
