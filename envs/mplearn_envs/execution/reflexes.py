@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -41,7 +41,7 @@ LONGEST_S = 8.0  # after the end of a plan for which the robot may still be on i
 RESTS_S = 0.3
 _BLEND_S = 0.5
 _DROP_M = 0.35  # who steps may be so much lower
-_TUNED = {
+_TUNED: dict[str, Any] = {  # on pushes at the chest of the humanoid
     "reach": Reach(0.5, 0.4, 0.16, 0.62, 1.9, 0.24),
     "gain": 4.0,
     "lift_m": 0.035,
