@@ -240,8 +240,9 @@ def _cog_rate_of(robot: ReferenceRobot, now: Now, rate: FloatArray) -> FloatArra
     q = now.q.copy()
     for u in range(robot.upper.shape[0]):
         q[7 + robot.upper[u]] += _PROBE_S * rate[u]
-    moved = forward(robot.tree, q).moment[0] - now.pose.moment[0]
-    return moved / (_PROBE_S * now.pose.carried[0])
+    moved: FloatArray = forward(robot.tree, q).moment[0] - now.pose.moment[0]
+    moved /= _PROBE_S * now.pose.carried[0]
+    return moved
 
 
 @njit(cache=True, nogil=True)

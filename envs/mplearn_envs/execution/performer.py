@@ -53,13 +53,13 @@ class PerformerState(NamedTuple):
         reference: Where the reference robot is.
         simulated: State of the simulation; None where nothing is simulated.
         draw: Which body was drawn.
-        count: How many macro steps it has performed.
+        n_performed: How many macro steps it has performed.
     """
 
     reference: Reference
     simulated: FloatArray | None
     draw: int = 0
-    count: int = 0
+    n_performed: int = 0
 
 
 class Performer(ABC):

@@ -54,7 +54,7 @@ class SimulatedPerformer(Performer):
             raise InvalidValueError("a kinematic state cannot be loaded into a simulation")
         if state.draw != self.simulation.draw:
             self.simulation.embody(state.draw)
-        self._count = state.count
+        self._count = state.n_performed
         self.simulation.load_state(state.simulated)
         self.reference = state.reference
         return self._sensors.read()
