@@ -21,10 +21,10 @@ def test_the_ten_lines_run(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_commands_exist() -> None:
-    from mplearn_agents.cli import _commands
+    from mplearn_agents.cli import command_modules
 
     shown = set(re.findall(r"^mplearn (\w+)", README, flags=re.MULTILINE))
-    assert shown <= set(_commands())
+    assert shown <= set(command_modules())
     assert len(shown) >= 5
 
 
