@@ -194,7 +194,7 @@ def test_a_light_robot_stands_through_postures_in_bunches():
 
 @pytest.mark.xfail(
     reason="arms that stop from 3.75 rad/s now take longer than the 0.04 s that this asks for: "
-    "the limits of acceleration on what arrives are wider than arms need"
+    "the limits of acceleration on what arrives are tighter than arms need"
 )
 def test_silence_is_held_and_then_settled_without_a_jump():
     commands, phases, _, lower = performed(n=1700, silence=range(120, 1000))
