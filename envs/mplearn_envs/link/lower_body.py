@@ -79,6 +79,7 @@ class LowerBody:
         self.limiter = CommandLimiter(robot, period_s, held)
         self._playback = Playback(period_s)
         self._plays = False
+        self._held: FloatArray | None = None
         self._fade: Iterator[FloatArray] = iter(())
         self._heard_s = -np.inf
 
@@ -101,6 +102,11 @@ class LowerBody:
         self.spent_s[self.phase] += self.period_s
         plays = self.phase in ("following", "holding")
         source = self._playback.advance() if plays else self._rest
+        if self.phase == "holding":  # braking passes the last posture; no motion back to it
+            self._held = self.restraint.stop if self._held is None else self._held
+            source = self._held
+        else:
+            self._held = None
         if anew or plays != self._plays:
             self._fade = self._fading(source)
         self._plays = plays

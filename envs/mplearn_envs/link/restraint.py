@@ -68,6 +68,11 @@ class Restraint:
         """Its velocity, shape (U,) [m/s, rad/s]."""
         return self._velocity
 
+    @property
+    def stop(self) -> FloatArray:
+        """Where it comes to rest if it brakes now, shape (U,) [m, rad]."""
+        return self._stop
+
     def update(self, wanted: FloatArray) -> FloatArray:
         """Return what to do instead of a wanted posture, one period on; both of shape (U,)."""
         wanted = self._part(wanted, self.share)
