@@ -70,7 +70,7 @@ def test_a_table_of_policies_and_agents_and_what_is_kept_of_it(tmp_path, capsys,
         (["--tasks", "goal", "fly"], "tasks must be among"),
         (["--policies", "mirrored"], "policies must be among"),
         (["--seeds", "1"], "at least 2 seeds"),
-        (["--jobs", "0"], "at least 1 job, not 0"),
+        (["--jobs", "0"], "--jobs must be at least 1, not 0"),
         (["--algorithms", "sarsa"], "algorithm must be one of"),
     ],
 )
