@@ -133,6 +133,8 @@ def test_the_demo_without_a_renderer_does_the_rest(tmp_path, capsys, monkeypatch
 
 def test_the_demo_refuses_a_length_that_is_none(tmp_path, capsys):
     assert main(["demo", "--out", str(tmp_path), "--minutes", "0"]) == 2
+    assert "--minutes must be positive, not 0" in capsys.readouterr().err
+    assert main(["demo", "--out", str(tmp_path), "--minutes", "61"]) == 2
     assert "minutes must lie in (0, 60]" in capsys.readouterr().err
 
 

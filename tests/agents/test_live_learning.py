@@ -121,7 +121,7 @@ def test_the_help_names_all_sources_and_imports_none() -> None:
     assert {each.partition(":")[0].partition("[")[0] for each in SOURCES.split(", ")} == {
         kind for kind in source_kinds() if kind != "mine"
     }
-    code = "import sys; from mplearn_agents import cli; cli._parser(); "
+    code = "import sys; from mplearn_agents import cli; cli.build_parser(); "
     code += "sys.exit('mplearn.sources' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], env=ENV).returncode == 0
 
