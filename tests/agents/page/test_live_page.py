@@ -49,7 +49,7 @@ def test_what_is_known_grows_and_everything_moves(address, new_page):
 def test_a_click_shows_figure_and_robot(address, new_page):
     page = known(new_page(address))
     rows(page).nth(1).click()
-    until(lambda: page.get_attribute("html", "data-shown"), 60, "the figure")
+    until(lambda: page.get_attribute("html", "data-shown"), STARTED_S, "the figure")
     until(lambda: page.get_attribute("html", "data-robot"), STARTED_S, "the robot")
 
 
