@@ -1,9 +1,8 @@
 """``mplearn live`` as a user runs it: its processes, and a real browser."""
 
-import os
 import signal
-import subprocess
 
+import psutil
 import pytest
 
 pytest.importorskip("uvicorn", reason="needs the extra 'ui'")
@@ -154,32 +153,20 @@ def test_a_learner_that_was_killed_goes_on_and_all_end_together(new_page, tmp_pa
         page.keyboard.press("Enter")
         name = page.locator(f'#tree [data-id="{id}"] text.name')
         until(lambda: name.text_content() == "mine", 20)
-        learner = until(lambda: [p for p in _children(process.pid) if "spawn_main" in _line(p)], 9)
-        os.kill(learner[0], signal.SIGKILL)
+        until(lambda: _learners(process.pid), 20, "the learner's process")[0].kill()
         until(lambda: "SIGKILL" in page.locator("#log").text_content(), 20)
         until(lambda: state.get_attribute("data-live") == "no", 10)
         until(lambda: state.get_attribute("data-live") == "yes", STARTED_S)
         assert name.text_content() == "mine"
         n = rows(page).count()
         until(lambda: rows(page).count() > n or page.locator("#log .learned").count(), 60)
-        children = _children(process.pid)
+        children = psutil.Process(process.pid).children(recursive=True)
         process.send_signal(signal.SIGINT)
         assert process.wait(30) == 0
-        until(lambda: not any(_runs(pid) for pid in children), 10)
+        assert not psutil.wait_procs(children, timeout=10)[1]
 
 
-def _children(pid):
-    """Return the processes that a process started, and those that they did."""
-    done = subprocess.run(["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True)
-    own = [int(word) for word in done.stdout.split()]
-    return own + [each for child in own for each in _children(child)]
-
-
-def _line(pid):
-    done = subprocess.run(["ps", "-o", "args=", "-p", str(pid)], capture_output=True, text=True)
-    return done.stdout
-
-
-def _runs(pid):
-    done = subprocess.run(["ps", "-o", "stat=", "-p", str(pid)], capture_output=True, text=True)
-    return done.stdout.strip() not in ("", "Z")
+def _learners(pid):
+    """Return the processes in which a server learns."""
+    children = psutil.Process(pid).children(recursive=True)
+    return [child for child in children if any("spawn_main" in word for word in child.cmdline())]
