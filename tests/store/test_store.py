@@ -3,6 +3,7 @@
 import shutil
 import sqlite3
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -180,12 +181,15 @@ def test_reading_and_writing_do_not_hold_each_other_up(tmp_path: Path) -> None:
 
         thread = threading.Thread(target=look)
         thread.start()
-        feed(life, 2500)
         still = np.zeros((37, len(CHANNELS)))
-        for _ in range(5000):  # goes on for as long as a slow machine reads
-            if read[0] > 3 or not thread.is_alive():
+        for turn in range(5000):  # with the gaps of a live stream, until a slow machine read
+            if turn < 65:
+                feed(life, 200 + 37 * turn)
+            elif read[0] > 3 or not thread.is_alive():
                 break
-            life.learn_many(still)
+            else:
+                life.learn_many(still)
+            time.sleep(0.005)
         ended.set()
         thread.join()
         assert not problems
