@@ -252,6 +252,67 @@ def test_bad_input_is_said(folder, config, agent, capsys, tmp_path):
     assert "task must be a Task or one of" in capsys.readouterr().err
 
 
+OWN_TASK = """
+from __future__ import annotations
+from dataclasses import dataclass
+import numpy as np
+from mplearn_envs.tasks import Task
+
+@dataclass
+class Waving(Task):
+    worth: float = 0.5
+    def bonuses(self, choice):
+        return {"waved": self.worth * (choice.primitive is not None)}
+    def rates(self, report):
+        return {}
+    @property
+    def done(self):
+        return False
+
+class Nothing:
+    pass
+"""
+
+
+def test_a_training_takes_settings_and_a_task_of_ones_own(folder, capsys, tmp_path):
+    own = tmp_path / "waving.py"
+    own.write_text(OWN_TASK, "utf-8")
+    task, library = f"{own}:Waving", str(folder / "small.mplearn")
+    out = ["--library", library, "--steps", "1", "--round-steps", "1", "--episodes", "1"]
+    settings = ["--learning-rate", "0.002", "--network", "16", "8", "--envs", "2"]
+    where = ["--out", str(tmp_path / "agent"), "--task", task, "--discount", "0.8"]
+    assert main(["train", *out, *settings, *where]) == 0
+    agent = TrainedPolicy.load(tmp_path / "agent")
+    assert agent.config.task == task and agent.config.network == (16, 8)
+    assert agent.model.learning_rate == 0.002 and agent.model.n_envs == 2
+    layers = agent.model.policy.mlp_extractor.mlp.policy_net[::2]
+    assert [layer.out_features for layer in layers] == [16, 8]
+    env = make_environment(agent.config)
+    assert env.unwrapped.discount == 0.8
+    _, info = env.reset(seed=0)
+    *_, info = env.step(int(np.flatnonzero(info["action_mask"])[1]))
+    assert info["reward_terms"]["waved"] == 0.5
+    capsys.readouterr()
+    for wrong, said in (("Nothing", "is a Nothing, not a Task"), ("Missing", "cannot be made")):
+        assert main(["train", *out, "--out", str(tmp_path / "x"), "--task", f"{own}:{wrong}"]) == 2
+        assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"learning_rate": 0.0}, "learning_rate must be positive"),
+        ({"network": ()}, "network must be widths"),
+        ({"discount": 1.5}, r"discount must be in \(0, 1\]"),
+        ({"n_envs": 0}, "n_envs must be at least 1"),
+        ({"algorithm": "dqn", "n_envs": 4}, "1 environment at once, not 4"),
+    ],
+)
+def test_settings_that_cannot_be_are_refused(wrong, said):
+    with pytest.raises(InvalidValueError, match=said):
+        TrainingConfig(**wrong)
+
+
 def test_the_commands(folder, capsys):
     library, out = str(folder / "small.mplearn"), str(folder / "by command")
     small = ["--steps", "1", "--round-steps", "1", "--episodes", "2"]

@@ -7,7 +7,7 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from mplearn_agents.arguments import count, seed
+from mplearn_agents.arguments import count, positive, seed
 from mplearn_agents.suited import suited
 
 if TYPE_CHECKING:
@@ -24,7 +24,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     default = {f.name: f.default for f in fields(TrainingConfig) if f.default is not MISSING}
     parser.add_argument("--out", type=Path, required=True, help="folder for the agent and its log")
     parser.add_argument("--library", type=Path, help="library file (default: the built-in one)")
-    parser.add_argument("--task", default="goal", help="task (default: goal)")
+    parser.add_argument(
+        "--task",
+        default="goal",
+        help="task (default: goal); your own is file.py:Class or module:Class",
+    )
     parser.add_argument(
         "--dynamics", choices=["kinematic", "simulated"], default=default["dynamics"]
     )
@@ -50,6 +54,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             help=f"{what} (default: {default[name]})",
         )
     parser.add_argument(
+        "--discount",
+        type=positive,
+        default=default["discount"],
+        help=f"what a reward in a second's time is worth (default: {default['discount']})",
+    )
+    parser.add_argument(
+        "--learning-rate", type=positive, help="of the optimiser (default: by algorithm)"
+    )
+    parser.add_argument(
+        "--network",
+        type=count,
+        nargs="+",
+        metavar="WIDTH",
+        default=default["network"],
+        help="widths of the hidden layers (default: 128 128)",
+    )
+    parser.add_argument(
+        "--envs",
+        dest="n_envs",
+        type=count,
+        help="environments to learn from at once (default: 16; dqn has 1)",
+    )
+    parser.add_argument(
         "--resume", action="store_true", help="go on from the last checkpoint in the folder"
     )
     parser.add_argument(
@@ -67,6 +94,8 @@ def run(args: argparse.Namespace) -> None:
     from mplearn_agents.rl.train import train
 
     given = {f.name: getattr(args, f.name) for f in fields(TrainingConfig) if hasattr(args, f.name)}
+    if ".py:" in args.task:
+        given["task"] = str(Path(args.task).absolute())
     given["library"] = None if args.library is None else str(args.library)
     usual = suited(args.task)
     given["prior"] = args.prior or usual.prior

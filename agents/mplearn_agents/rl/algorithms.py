@@ -22,7 +22,6 @@ from .semi_markov import (
     MaskedMacroStepBuffer,
 )
 
-WIDTHS = [128, 128]
 ON_POLICY = {
     "n_steps": 128,
     "batch_size": 256,
@@ -50,7 +49,7 @@ class Recipe(NamedTuple):
         cls: Its class.
         policy: The class, or name, of its network.
         buffer: Keyword and class of its memory.
-        n_envs: How many environments it learns from at once.
+        n_envs: How many environments it learns from at once, unless told otherwise.
         settings: Its hyperparameters.
     """
 
@@ -76,22 +75,29 @@ RECIPES: dict[AlgorithmName, Recipe] = {
 }
 
 
-def rollout_steps(algorithm: AlgorithmName) -> int:
-    """Return how many macro steps an algorithm makes before it may stop."""
-    recipe = RECIPES[algorithm]
-    return int(recipe.settings.get("n_steps", 1)) * recipe.n_envs
+def n_envs(config: TrainingConfig) -> int:
+    """Return from how many environments a training learns at once."""
+    return RECIPES[config.algorithm].n_envs if config.n_envs is None else config.n_envs
+
+
+def rollout_steps(config: TrainingConfig) -> int:
+    """Return how many macro steps a training makes before it may stop."""
+    return int(RECIPES[config.algorithm].settings.get("n_steps", 1)) * n_envs(config)
 
 
 def new_model(config: TrainingConfig, envs: VecEnv, scaling: Scaling) -> BaseAlgorithm:
     """Return an untrained model, which scales what it sees."""
     recipe = RECIPES[config.algorithm]
     network: dict[str, Any] = {
-        "net_arch": WIDTHS,
+        "net_arch": list(config.network),
         "features_extractor_class": PrimitiveFeatures,
         "features_extractor_kwargs": {"scaling": scaling},
     }
     if config.algorithm != "dqn":
         network |= {"activation_fn": nn.Tanh, "prior": config.prior}
+    settings = dict(recipe.settings)
+    if config.learning_rate is not None:
+        settings["learning_rate"] = config.learning_rate
     return recipe.cls(
         recipe.policy,
         envs,
@@ -99,7 +105,7 @@ def new_model(config: TrainingConfig, envs: VecEnv, scaling: Scaling) -> BaseAlg
         seed=config.seed,
         device="cpu",
         **recipe.buffer,
-        **recipe.settings,
+        **settings,
     )
 
 

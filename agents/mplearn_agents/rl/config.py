@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from math import inf
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
 
 from mplearn.errors import InvalidValueError, MPLearnError
 from mplearn_agents.suited import PriorUse as PriorUse
 
-VERSION = 2  # of agents: changes with networks, what they see, and what tasks show
+VERSION = 3  # of agents: changes with networks, what they see, and what tasks show
 Ends: TypeAlias = list[list[float]]  # the tracked coordinates where a motion begins and ends
 AlgorithmName: TypeAlias = Literal["maskable-ppo", "ppo", "dqn"]
 
@@ -26,7 +27,8 @@ class TrainingConfig:
     nothing had happened, bit for bit (but for DQN, whose replay memory starts empty again).
 
     Attributes:
-        task: Name of the environment's task.
+        task: Name of the environment's task, or where one's own is: "module:Class" or
+            "file.py:Class".
         algorithm: "maskable-ppo"; or "ppo" or "dqn", which know no masks, with illegal actions
             projected to legal ones (`ProjectIllegal`).
         steps: Macro steps to train for, rounded up to whole rounds.
@@ -36,6 +38,10 @@ class TrainingConfig:
         prior: What the transition prior is to the policy (not to DQN's, where it is a feature).
         round_steps: Macro steps a round, rounded up to whole rollouts.
         episodes: Episodes of an evaluation.
+        learning_rate: Of the optimiser; None is the algorithm's own.
+        network: Widths of the hidden layers, of actor and critic each.
+        n_envs: Environments that it learns from at once; None is the algorithm's own. DQN has one.
+        discount: What a reward in a second's time is worth, in (0, 1].
         environment: Further arguments of the environment.
     """
 
@@ -48,6 +54,10 @@ class TrainingConfig:
     prior: PriorUse = "logits"
     round_steps: int = 5_000
     episodes: int = 50
+    learning_rate: float | None = None
+    network: tuple[int, ...] = (128, 128)
+    n_envs: int | None = None
+    discount: float = 0.95
     environment: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -61,6 +71,19 @@ class TrainingConfig:
                 raise InvalidValueError(f"{name} must be at least 1, not {getattr(self, name)}")
         if self.seed < 0:
             raise InvalidValueError(f"seed must not be negative, but is {self.seed}")
+        object.__setattr__(self, "network", tuple(self.network))  # JSON has lists
+        if not self.network or min(self.network) < 1:
+            raise InvalidValueError(
+                f"network must be widths of hidden layers from 1, not {self.network}"
+            )
+        if self.learning_rate is not None and not 0.0 < self.learning_rate < inf:
+            raise InvalidValueError(f"learning_rate must be positive, not {self.learning_rate}")
+        if not 0.0 < self.discount <= 1.0:
+            raise InvalidValueError(f"discount must be in (0, 1], not {self.discount}")
+        if self.n_envs is not None and self.n_envs < 1:
+            raise InvalidValueError(f"n_envs must be at least 1, not {self.n_envs}")
+        if self.algorithm == "dqn" and self.n_envs not in (None, 1):
+            raise InvalidValueError(f"dqn learns from 1 environment at once, not {self.n_envs}")
 
     def save(self, path: Path, slots: Mapping[int, int], ends: Mapping[int, Ends]) -> None:
         """Write this as JSON, with the slot and the ends of each primitive that the agent knows."""

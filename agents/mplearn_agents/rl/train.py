@@ -41,7 +41,7 @@ def make_environment(config: TrainingConfig) -> gymnasium.Env[Any, Any]:
         task=config.task,
         dynamics=config.dynamics,
         disable_env_checker=True,
-        **config.environment,
+        **{"discount": config.discount, **config.environment},
     )
 
 
@@ -83,19 +83,18 @@ def train(
     from stable_baselines3.common.utils import set_random_seed
     from stable_baselines3.common.vec_env import DummyVecEnv
 
-    from .algorithms import RECIPES, load_model, new_model, rollout_steps
+    from .algorithms import load_model, n_envs, new_model, rollout_steps
     from .callbacks import Evaluation, ShowProgress
 
     out = Path(out)
     done = _steps_done(config, out, resume)
-    recipe = RECIPES[config.algorithm]
 
     def make() -> gymnasium.Env[Any, Any]:
         env = make_environment(config)
         return Monitor(env if config.algorithm == "maskable-ppo" else ProjectIllegal(env))
 
     torch.set_num_threads(1)  # these networks are small: threads cost more than they bring
-    envs = DummyVecEnv([make] * recipe.n_envs)
+    envs = DummyVecEnv([make] * n_envs(config))
     tested = make_environment(config)
     slots = dict(tested.unwrapped.repertoire.slots)  # type: ignore[attr-defined]
     out.mkdir(parents=True, exist_ok=True)
@@ -113,7 +112,7 @@ def train(
     policy = TrainedPolicy(model, config, slots, ends=ends)
     progress = ShowProgress(config, console)
     evaluation = Evaluation(policy, tested, config, out / "evaluation.csv")
-    rollout = rollout_steps(config.algorithm)
+    rollout = rollout_steps(config)
     round_steps = -(-config.round_steps // rollout) * rollout
     with progress.shown():
         while done < config.steps:

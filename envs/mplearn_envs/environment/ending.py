@@ -29,6 +29,8 @@ class EndInsteadOfDiscount(
         env: An environment whose ``info`` has ``discount``.
     """
 
+    ends_instead_of_discount = True
+
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
         gymnasium.utils.RecordConstructorArgs.__init__(self)
         gymnasium.Wrapper.__init__(self, env)

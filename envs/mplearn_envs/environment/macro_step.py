@@ -32,6 +32,7 @@ from .options import ActionOptions, MotionOptions, PictureOptions, require_numbe
 from .plain import PlainSpec, from_plain
 from .random_streams import RandomStreams
 from .rewards import add, earned_meanwhile
+from .step_discount import warn_of_step_discount
 
 #: Terms of the reward that are the environment's own.
 TERMS = ("fall", "illegal", "novel")
@@ -118,6 +119,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         self._episode: Episode | None = None
         self._streams: RandomStreams | None = None
         self._terms: dict[str, float] = {}
+        self._stepped = False
 
     def _made_repertoire(self) -> Repertoire:
         library, motion = self.source.now(), self.motion
@@ -187,6 +189,9 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
                 ``illegal="raise"``; or the episode has not begun or is over.
         """
         before = self._running()
+        if not self._stepped and self.discount < 1.0:
+            self._stepped = True
+            warn_of_step_discount(self.discount)
         slot = self._slot(action, before.choices.mask)
         legal = bool(before.choices.mask[slot])
         novel = bool(before.choices.novel[slot])

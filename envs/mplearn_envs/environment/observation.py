@@ -44,7 +44,7 @@ class ObservationBuilder:
             for key, high in self._high.items()
         }
         parts["current_primitive"] = spaces.Discrete(capacity)
-        parts["action_mask"] = spaces.MultiBinary(capacity)
+        parts["action_mask"] = spaces.Box(0, 1, (capacity,), np.int8)  # all clients know boxes
         parts["transition_prior"] = spaces.Box(0.0, 1.0, (capacity,), np.float64)
         if task is not None:
             parts["task"] = task

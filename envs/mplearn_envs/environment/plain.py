@@ -42,9 +42,12 @@ class PlainSpec:
         if spec is not None:
             spec = copy.copy(spec)
             spec.kwargs = to_plain(spec.kwargs)
-            library = spec.kwargs.get("library")
+            library, task = spec.kwargs.get("library"), spec.kwargs.get("task")
             if isinstance(library, str):
                 spec.kwargs["library"] = str(Path(library).absolute())
+            if isinstance(task, str) and ".py:" in task:
+                spec.kwargs["task"] = str(Path(task).absolute())
+            spec.max_episode_steps = spec.kwargs.get("max_episode_steps", spec.max_episode_steps)
         self._spec = spec
 
 

@@ -84,7 +84,7 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
     default), `GoalTask`, `FollowTask`, `ReciteTask`, or your own `Task`. ``info["discount"]`` is
     discount^T, for whoever bootstraps.
     A learner with one discount a step needs `EndInsteadOfDiscount`: without it, holding (short
-    steps) seems better than it is.
+    steps) seems better than it is. A `StepDiscountWarning` says so where such a learner is seen.
 
     ## Start, end
 

@@ -86,3 +86,9 @@ def test_an_error_in_a_thread_is_raised():
 def test_bad_numbers_are_refused(options):
     with pytest.raises(InvalidValueError, match="from 1"):
         PrimitiveHumanoidVectorEnv(**options)
+
+
+def test_the_spec_says_when_episodes_are_truncated():
+    assert make(2).spec.max_episode_steps == 4
+    assert gymnasium.make_vec(ID, num_envs=1).spec.max_episode_steps == 100
+    assert gymnasium.make(ID, max_episode_steps=7).spec.max_episode_steps == 7

@@ -116,3 +116,14 @@ def test_what_could_not_be_drawn_is_not_tried_again(monkeypatch):
         with pytest.raises(MissingDependencyError, match=r"install libegl1.*no graphics library"):
             env.render()
     assert len(tried) == 1
+
+
+def test_gymnasium_records_videos_of_it(pictured, tmp_path):
+    pytest.importorskip("moviepy", reason="the extra 'video' is not installed")
+    film = gymnasium.wrappers.RecordVideo(pictured, str(tmp_path / "films"), disable_logger=True)
+    _, info = film.reset(seed=0)
+    for _ in range(2):
+        *_, info = film.step(int(np.flatnonzero(info["action_mask"])[-1]))
+    film.stop_recording()
+    (written,) = tmp_path.glob("films/*.mp4")
+    assert written.stat().st_size > 1000
