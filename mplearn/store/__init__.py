@@ -5,6 +5,7 @@ from .commands import Delete as Delete
 from .commands import Freeze as Freeze
 from .commands import Merge as Merge
 from .commands import Note as Note
+from .commands import Operation as Operation
 from .commands import Pause as Pause
 from .commands import Redo as Redo
 from .commands import Rename as Rename

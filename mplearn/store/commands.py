@@ -1,11 +1,12 @@
 """What a person can ask of what was learned: each command is a value, and can be undone.
 
-A command of one's own is a frozen dataclass with a ``do``, made known by `register_command`; undo
-and redo come with it, for they go by what has changed.
+A command of one's own is a frozen dataclass, an `Operation` with a ``do``, made known by
+`register_command`; undo and redo come with it, for they go by what has changed.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, TypeVar
@@ -40,14 +41,30 @@ class Command:
 
     kind: ClassVar[str] = ""
 
-    def do(self, hands: Hands) -> None:
-        """Do what is asked, or raise an `MPLearnError` before anything has changed."""
-        raise NotImplementedError
-
     @property
     def about(self) -> tuple[int, ...]:
         """Ids of the primitives that it names."""
         return ()
+
+
+@dataclass(frozen=True)
+class Operation(Command, ABC):
+    """Base of the commands that change what was learned."""
+
+    @abstractmethod
+    def do(self, hands: Hands) -> None:
+        """Do what is asked, or raise an `MPLearnError` before anything has changed."""
+
+
+@dataclass(frozen=True)
+class Reversal(Command):
+    """Base of the commands that are about another one.
+
+    Attributes:
+        entry: Its number in the log.
+    """
+
+    entry: Count
 
 
 C = TypeVar("C", bound=type[Command])
@@ -93,7 +110,7 @@ def from_record(record: dict[str, Any]) -> Command:
 
 @register_command("rename")
 @dataclass(frozen=True)
-class Rename(Command):
+class Rename(Operation):
     """Give a primitive a name."""
 
     primitive: Count
@@ -112,7 +129,7 @@ class Rename(Command):
 
 @register_command("merge")
 @dataclass(frozen=True)
-class Merge(Command):
+class Merge(Operation):
     """Say that two primitives are one; the older one stays, and keeps its name."""
 
     first: Count
@@ -131,7 +148,7 @@ class Merge(Command):
 
 @register_command("split")
 @dataclass(frozen=True)
-class Split(Command):
+class Split(Operation):
     """Say that a primitive is two or more.
 
     Attributes:
@@ -154,7 +171,7 @@ class Split(Command):
 
 @register_command("delete")
 @dataclass(frozen=True)
-class Delete(Command):
+class Delete(Operation):
     """Forget a primitive and its demonstrations; shown again, it is learned anew."""
 
     primitive: Count
@@ -171,7 +188,7 @@ class Delete(Command):
 
 @register_command("freeze")
 @dataclass(frozen=True)
-class Freeze(Command):
+class Freeze(Operation):
     """Let a primitive stay as it is, whatever comes."""
 
     primitive: Count
@@ -188,7 +205,7 @@ class Freeze(Command):
 
 @register_command("unfreeze")
 @dataclass(frozen=True)
-class Unfreeze(Command):
+class Unfreeze(Operation):
     """Let a frozen primitive change again."""
 
     primitive: Count
@@ -205,7 +222,7 @@ class Unfreeze(Command):
 
 @register_command("note")
 @dataclass(frozen=True)
-class Note(Command):
+class Note(Operation):
     """Write something down, about a primitive or about all."""
 
     text: str
@@ -229,7 +246,7 @@ class Note(Command):
 
 @register_command("pause")
 @dataclass(frozen=True)
-class Pause(Command):
+class Pause(Operation):
     """Stop learning; motions are recognised only."""
 
     def do(self, hands: Hands) -> None:
@@ -239,7 +256,7 @@ class Pause(Command):
 
 @register_command("resume")
 @dataclass(frozen=True)
-class Resume(Command):
+class Resume(Operation):
     """Go on learning."""
 
     def do(self, hands: Hands) -> None:
@@ -249,18 +266,14 @@ class Resume(Command):
 
 @register_command("undo")
 @dataclass(frozen=True)
-class Undo(Command):
+class Undo(Reversal):
     """Take a command back; `LifelongLearner.undo`."""
-
-    entry: Count
 
 
 @register_command("redo")
 @dataclass(frozen=True)
-class Redo(Command):
+class Redo(Reversal):
     """Do a command again that was taken back; `LifelongLearner.redo`."""
-
-    entry: Count
 
 
 def _require(hands: Hands, id: int) -> None:

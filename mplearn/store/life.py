@@ -23,7 +23,7 @@ from ..learner.events import PrimitiveMerged
 from ..library import PrimitiveLibrary
 from ..recording import FloatArray, Recording
 from ..state import Blob, key_of, validated, within
-from .commands import Command, Redo, Undo
+from .commands import Command, Operation, Redo, Reversal, Undo
 from .effects import Effect, Moment
 from .journal import Entry, Happening, Journal, happenings_of
 from .labels import Labels, named
@@ -257,14 +257,17 @@ class LifelongLearner:
         self._close_chunk()
         number, frame = self._journal.next_number, self.learner.n_frames
         entry = Entry(number, command, str(by), when, frame)
-        if isinstance(command, (Undo, Redo)):
-            self._toggle(entry, command)
-        else:
-            before = Moment.of(self.learner, self.labels)
-            command.do(self)
-            effect = before.until(Moment.of(self.learner, self.labels))
-            self._journal.add(entry, None if effect.is_empty else effect)
-            self._note_command(entry, effect)
+        match command:
+            case Operation():
+                before = Moment.of(self.learner, self.labels)
+                command.do(self)
+                effect = before.until(Moment.of(self.learner, self.labels))
+                self._journal.add(entry, None if effect.is_empty else effect)
+                self._note_command(entry, effect)
+            case Reversal():
+                self._toggle(entry, command)
+            case _:
+                raise InvalidValueError(f"{command!r} is neither an operation, nor undo, nor redo")
         self._revision += 1
         self._record(entry)
         return entry
@@ -416,7 +419,7 @@ class LifelongLearner:
         self._revision += len(events)
         return events
 
-    def _toggle(self, entry: Entry, command: Undo | Redo) -> None:
+    def _toggle(self, entry: Entry, command: Reversal) -> None:
         undo = isinstance(command, Undo)
         self._chosen(command.entry, undone=not undo)
         kept = self._journal.kept(command.entry)
