@@ -14,8 +14,8 @@ export MPLEARN_DATA ?= $(abspath $(DATA))
 demo: $(VENV)/.demo                 ## learn from the demonstrator, perform a walk, write out/demo/report.html
 	$(BIN)/mplearn demo --out $(OUT)/demo
 
-test: setup                         ## all tests
-	$(BIN)/python -m pytest
+test: setup                         ## all tests, by two processes
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 
 setup: $(VENV)/.dev                 ## .venv with everything that tests, checks and benchmarks need
 
