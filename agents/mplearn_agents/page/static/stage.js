@@ -9,6 +9,7 @@ const TURN = 0.42;         // first azimuth of the camera [rad]
 const ELEVATION = 0.1;
 const BETWEEN = 30;        // ms over which a pose goes over to the next
 const FOLLOW = 0.02;       // how fast the place below a figure follows it
+const PLAIN = 3;           // px: what is narrower has neither edge nor light
 
 const LOOKS = {
   light: {
@@ -31,7 +32,7 @@ const LIGHT = [-0.34, 0.44]; // towards the light, on the screen, in radii
 export class Stage {
   constructor(canvas) {
     this.canvas = canvas;
-    this.context = canvas.getContext("2d");
+    this.context = canvas.getContext("2d", { alpha: false }); // cheaper to put on the page
     this.turn = TURN;
     this.elevation = ELEVATION;
     this.figures = { person: null, robot: null };
@@ -75,7 +76,8 @@ export class Stage {
   draw(theme, style) {
     const { context: c, canvas } = this;
     const { width, height } = fitted(canvas, c);
-    c.clearRect(0, 0, width, height);
+    c.fillStyle = style.panel;
+    c.fillRect(0, 0, width, height);
     const looks = { ...LOOKS[theme], light: [style.accent, style.accent] };
     const places = this.shown ? { person: 0.2, shown: 0.5, robot: 0.8 } : { person: 0.29, robot: 0.71 };
     const font = Math.max(12, Math.min(height * 0.045, parseFloat(style.size) * 1.05));
@@ -156,9 +158,10 @@ export class Stage {
       const h = shape.kind === "capsule" ? s[1] : Math.max(0.001, s[1] - 0.35 * s[0]);
       const dx = scale * h * dot(camera.right, axis), dy = -scale * h * dot(camera.up, axis);
       c.lineCap = "round";
-      if (looks.edge) this.stroke(px, py, dx, dy, 2 * r + 1.6, looks.edge);
+      const plain = r < PLAIN;
+      if (looks.edge && !plain) this.stroke(px, py, dx, dy, 2 * r + 1.6, looks.edge);
       this.stroke(px, py, dx, dy, 2 * r, dark);
-      if (bright !== dark) this.stroke(px + LIGHT[0] * 0.5 * r, py - LIGHT[1] * 0.5 * r, dx, dy, 1.15 * r, bright);
+      if (bright !== dark && !plain) this.stroke(px + LIGHT[0] * 0.5 * r, py - LIGHT[1] * 0.5 * r, dx, dy, 1.15 * r, bright);
       return;
     }
     const radii = shape.kind === "sphere" ? [s[0], s[0], s[0]] : s;

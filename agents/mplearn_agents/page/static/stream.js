@@ -5,6 +5,7 @@ import { clipped, fitted } from "./stage.js";
 
 const PAST = 10, COMING = 2.2;   // seconds
 const ROWS = 2048;
+const TOGETHER = 3;              // rows that are drawn at once
 const LANES = [
   ["trunk", (n) => /^(base|lumbar|thorax|neck|waist)/.test(n)],
   ["left arm", (n) => /^(clavicle|shoulder|elbow|forearm|wrist).*_l$/.test(n)],
@@ -16,7 +17,7 @@ const LANES = [
 export class Stream {
   constructor(canvas) {
     this.canvas = canvas;
-    this.context = canvas.getContext("2d");
+    this.context = canvas.getContext("2d", { alpha: false }); // cheaper to put on the page
     this.ring = document.createElement("canvas");
     this.ink = this.ring.getContext("2d");
     this.segments = [];
@@ -88,7 +89,8 @@ export class Stream {
 
   draw(style, label) {
     const c = this.context, { width, height, ratio } = fitted(this.canvas, c);
-    c.clearRect(0, 0, width, height);
+    c.fillStyle = style.panel;
+    c.fillRect(0, 0, width, height);
     if (!this.width || width < 50) return;
     const font = parseFloat(style.size), strip = Math.round(font * 2.5), left = 0;
     const perSecond = (width - left) / (PAST + COMING);
@@ -171,7 +173,7 @@ export class Stream {
       this.ink.clearRect(0, 0, w, h);
       this.drawn = Math.max(this.from, this.n - Math.floor((PAST + 1) * this.rate), this.n - ROWS + 1);
     }
-    if (this.n - this.drawn < 2) return;
+    if (this.n - this.drawn < TOGETHER) return;
     const c = this.ink, laneHeight = h / this.lanes.length;
     const begin = Math.max(this.drawn - 1, this.from), x0 = (begin * step) % w;
     const span = (this.n - 1 - begin) * step;
@@ -203,19 +205,21 @@ export class Stream {
     this.drawn = this.n;
   }
 
-  // Copy the ring so that its newest row lies at x, and nothing beyond `limit`.
+  // Copy the ring so that its newest row lies at x, and nothing beyond `limit`; pixel by pixel,
+  // for anything between them would be worked out anew in every frame.
   blit(c, x, limit, height, ratio) {
     const w = this.ring.width, h = this.ring.height;
-    const at = (Math.max(this.drawn - 1, 0) * this.step) % w; // of the newest row
-    const long = Math.min(x, PAST * 2000) * ratio;
+    const newest = (Math.max(this.drawn - 1, 0) * this.step) % w, at = Math.min(Math.ceil(newest), w);
+    const end = at + Math.round(x * ratio - newest), long = Math.max(Math.min(end, w), 0);
     c.save();
     c.beginPath();
     c.rect(0, 0, limit, height);
     c.clip();
     const first = Math.min(at, long);
-    if (first > 0) c.drawImage(this.ring, at - first, 0, first, h, x - first / ratio, 0, first / ratio, height);
-    const rest = Math.min(long - first, w - at - 0.3 * this.step * this.rate);
-    if (rest > 0) c.drawImage(this.ring, w - rest, 0, rest, h, x - (first + rest) / ratio, 0, rest / ratio, height);
+    c.setTransform(1, 0, 0, 1, 0, 0);
+    if (first > 0) c.drawImage(this.ring, at - first, 0, first, h, end - first, 0, first, h);
+    const rest = Math.floor(Math.min(long - first, w - at - 0.3 * this.step * this.rate));
+    if (rest > 0) c.drawImage(this.ring, w - rest, 0, rest, h, end - first - rest, 0, rest, h);
     c.restore();
   }
 
