@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from mplearn.body import KinematicTree
 
-SMALLEST_M = 0.012  # shapes with a smaller radius (fingers' details) are not worth their drawing
 _SEEN_GROUPS = 3  # geoms from this group on are for contact, not to be seen
 _KINDS = {2: "sphere", 3: "capsule", 4: "ellipsoid", 5: "cylinder", 6: "box"}
 #: Bodies of the human that the robot lacks, and which of its turn as they do.
@@ -85,24 +84,33 @@ def human_poses(features: FloatArray, channels: Sequence[str]) -> Poses:
     """
     robot, human = robot_body().tree, human_body().tree
     order = [list(channels).index(name) for name in feature_channels()]
+    postures = posture_of(features[:, order])
     larger = human.offset[0, 2] / robot.offset[0, 2]
-    like = [robot.body(_LIKE.get(name, name)) for name in human.body_names]
-    soles = [i for i, name in enumerate(human.site_names) if name.startswith("sole_")]
+    turns, soles_z = _turns_and_soles(robot, postures)
+    turns = turns[:, [robot.body(_LIKE.get(name, name)) for name in human.body_names]]
+    places = np.empty(turns.shape[:3])
+    places[:, 0] = postures[:, :3] * larger
+    for body, parent in enumerate(human.parent):
+        if parent >= 0:
+            places[:, body] = places[:, parent] + turns[:, parent] @ human.offset[body]
+    soles = _soles(human)
     at, under = human.site_body[soles], human.site_offset[soles]
-    poses = np.empty((len(features), len(like), 7), np.float32)
-    for t, posture in enumerate(posture_of(features[:, order])):
-        turns = robot.forward(posture)[1][like]
-        places = np.zeros((len(like), 3))
-        places[0] = posture[:3] * larger
-        for body, parent in enumerate(human.parent):
-            if parent >= 0:
-                places[body] = places[parent] + turns[parent] @ human.offset[body]
-        lowest = (places[at] + np.einsum("sij,sj->si", turns[at], under))[:, 2].min()
-        places[:, 2] += larger * _lowest_sole(robot, posture) - lowest
-        poses[t, :, :3], poses[t, :, 3:] = places, matrix_to_quaternion(turns)
-    return poses
+    lowest = (places[:, at] + np.einsum("tsij,sj->tsi", turns[:, at], under))[..., 2].min(axis=1)
+    places[..., 2] += (larger * soles_z - lowest)[:, None]
+    return np.concatenate((places, matrix_to_quaternion(turns)), axis=2, dtype=np.float32)
 
 
-def _lowest_sole(tree: KinematicTree, posture: FloatArray) -> float:
-    soles = [i for i, name in enumerate(tree.site_names) if name.startswith("sole_")]
-    return float(tree.site_positions(posture)[soles, 2].min())
+def _turns_and_soles(tree: KinematicTree, postures: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the bodies' orientations, (T, B, 3, 3), and how high the lowest sole is, (T,) [m]."""
+    soles = _soles(tree)
+    at, under = tree.site_body[soles], tree.site_offset[soles]
+    turns = np.empty((len(postures), len(tree.body_names), 3, 3))
+    heights = np.empty(len(postures))
+    for t, posture in enumerate(postures):
+        places, turns[t] = tree.forward(posture)
+        heights[t] = (places[at, 2] + np.einsum("sj,sj->s", turns[t, at, 2], under)).min()
+    return turns, heights
+
+
+def _soles(tree: KinematicTree) -> list[int]:
+    return [i for i, name in enumerate(tree.site_names) if name.startswith("sole_")]

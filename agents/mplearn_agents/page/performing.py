@@ -1,7 +1,7 @@
 """The process that performs: the humanoid in MuJoCo, and the figures of primitives.
 
-The robot simulates a primitive faster than it takes; what was simulated is then played at the
-robot's own pace, while the next one is simulated.
+A figure is worked out at once when a teacher asks for it; what the robot does takes longer, and is
+done in a thread of its own (`robot`), while the robot's poses are shown at its own pace.
 """
 
 from __future__ import annotations
@@ -9,52 +9,29 @@ from __future__ import annotations
 import signal
 import time
 from collections import deque
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from concurrent.futures import Future
 from multiprocessing.connection import Connection
 
 import numpy as np
 
 from mplearn.body import human_body
-from mplearn.errors import InvalidValueError, MPLearnError, NoPathError
+from mplearn.errors import InvalidValueError, MPLearnError
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import FloatArray
-from mplearn_envs.execution.modes import make_performer
-from mplearn_envs.execution.performer import Performer
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.robot import humanoid
-from mplearn_envs.skills.action_choices import HOLD
-from mplearn_envs.skills.repertoire import Repertoire
 
 from .figures import has_figure, human_poses, shapes_of
 from .happenings import happening
 from .messages import Header, Poses, clip, unpack
 from .outbox import Outbox
+from .robot import SHOWN_HZ, SPEED, PageRobot, Performed, pose_of
 from .shelf import Receiver
 
-SHOWN_HZ = 50.0
 CLIP_HZ = 30.0
-SPEED = 0.5  # of the human's: the paper's [Kulic2012, 4.2]
 MOST_ASKED = 64  # primitives that wait to be performed
-_HOLD_S = 1.0
+_AHEAD = 5  # frames that are simulated before they are shown
 _STATUS_S = 0.25
-
-
-@dataclass(frozen=True)
-class Played:
-    """A primitive as the robot performed it.
-
-    Attributes:
-        id: The primitive.
-        poses: Where the robot's bodies were, shape (T, B, 7).
-        fallen: Whether it fell.
-        problem: Why it was not performed at all; empty where it was.
-    """
-
-    id: int
-    poses: Poses
-    fallen: bool = False
-    problem: str = ""
 
 
 def perform(connection: Connection) -> None:
@@ -79,28 +56,26 @@ class Stage:
         self._connection, self._outbox = connection, outbox
         self._receiver = Receiver()
         self._library: PrimitiveLibrary | None = None
-        self._robot = humanoid()
-        simulation = Simulation(self._robot)
+        body = humanoid()
+        simulation = Simulation(body)
         simulation.reset()
-        self._standing = _pose_of(simulation)
-        self._performer: Performer | None = None
-        self._cannot = ""  # why the robot can perform nothing of this library
+        self._standing = pose_of(simulation)
+        self._xml = body.xml
+        self._robot = PageRobot(body)
         self._asked: deque[int] = deque()
         self._steps_left = 0  # of a walk
-        self._rng = np.random.default_rng()
-        self._worker = ThreadPoolExecutor(1, thread_name_prefix="simulation")
-        self._next: Future[Played] | None = None
-        self._playing: Played | None = None
+        self._paths: list[tuple[Future[list[int]], Header]] = []  # that are looked for
+        self._next: Performed | None = None
+        self._playing: Performed | None = None
         self._frame = 0
-        self._last: int | None = None  # what the robot performs, or did last
-        self._chosen: int | None = None  # what was simulated last
         self._status_at = 0.0
         self._ended = False
 
     def run(self) -> None:
         """Perform until nobody listens any more."""
-        self._outbox.post({"kind": "bodies"} | _bodies(self._robot.xml))
-        self._stand()
+        self._outbox.post({"kind": "bodies"} | _bodies(self._xml))
+        self._pose(self._standing)
+        self._robot.warm_up()
         due = time.monotonic()
         while not (self._outbox.broken or self._ended):
             try:
@@ -111,7 +86,7 @@ class Stage:
                 break
             due = max(due + 1.0 / SHOWN_HZ, time.monotonic())
             self._tick()
-        self._worker.shutdown(wait=False, cancel_futures=True)
+        self._robot.close()
 
     # ---- what comes
 
@@ -122,68 +97,52 @@ class Stage:
         if header["kind"] == "library":
             try:
                 self._library = self._receiver.receive(header["content"], blob)
-                self._renew(self._library)
-            except MPLearnError as error:  # this process is newer than the learner
-                self._cannot = str(error)
+                self._robot.renew(self._library)
+            except MPLearnError:  # this process is newer than the learner
                 self._outbox.post({"kind": "undelivered"})
             return
         reply = {"kind": "reply", "client": header.get("client"), "ref": header.get("ref")}
         try:
-            self._outbox.post(reply | {"ok": True, "text": self._do(header)})
+            text = self._do(header, reply)
+            if text:
+                self._outbox.post(reply | {"ok": True, "text": text})
         except MPLearnError as error:
             self._outbox.post(reply | {"ok": False, "text": str(error)})
         self._status_at = 0.0
 
-    def _renew(self, library: PrimitiveLibrary) -> None:
-        """Let the robot know what is known now."""
-        if self._performer is None:
-            try:
-                repertoire = Repertoire(library, self._robot, 1024, SPEED, growing=True)
-            except MPLearnError as error:
-                self._cannot = str(error)
-                return
-            self._performer = make_performer("simulated", repertoire, _HOLD_S)
-            self._performer.reset()
-        else:
-            self._performer.repertoire.update(library)
-        self._cannot = ""
-
-    def _do(self, asked: Header) -> str:
-        """Do what a teacher asks, and return what will be done.
+    def _do(self, asked: Header, reply: Header) -> str:
+        """Do what a teacher asks, and return what will be done; nothing where that comes later.
 
         Raises:
             MPLearnError: It cannot be done.
         """
         library = self._library
         if asked["do"] == "stop":
-            self._asked.clear()
-            self._steps_left = 0
+            self._queue([])
             return "the robot stops after this"
         if library is None or not len(library):
             raise InvalidValueError("nothing is learned yet: there is nothing to perform")
+        if asked["do"] == "show":
+            primitive = library[_number(asked, "id")]
+            self._show(library, primitive.id, asked)
+            return f"{{{primitive.id}}}"
+        if self._robot.cannot:
+            raise InvalidValueError(f"the robot can perform nothing of this: {self._robot.cannot}")
         match asked["do"]:
-            case "show":
-                primitive = library[_number(asked, "id")]
-                self._show(library, primitive.id, asked)
-                return f"{{{primitive.id}}}"
             case "perform":
-                self._require_robot()
                 id = library[_number(asked, "id")].id
                 self._queue([id])
                 return f"the robot performs {{{id}}}"
             case "walk":
-                self._require_robot()
                 length = _number(asked, "length")
                 if not 1 <= length <= MOST_ASKED:
                     raise InvalidValueError(f"a walk has 1 to {MOST_ASKED} steps, not {length}")
-                self._asked.clear()
-                self._steps_left = length
+                self._queue([], length)
                 return f"the robot walks {length} steps"
             case "path":
-                performer = self._require_robot()
-                path = self._path(performer, library, library[_number(asked, "id")].id)
-                self._queue(path)
-                return "the robot goes " + " → ".join(f"{{{id}}}" for id in path)
+                goal = library[_number(asked, "id")].id
+                self._paths.append((self._robot.path(goal), reply))
+                return ""
             case other:
                 raise InvalidValueError(f"nobody knows how to {other[:40]!r}")
 
@@ -201,165 +160,95 @@ class Stage:
         header = {"kind": "clip", "client": asked.get("client")}
         self._outbox.post(header, clip(_number(asked, "ref"), CLIP_HZ, poses))
 
-    def _path(self, performer: Performer, library: PrimitiveLibrary, goal: int) -> list[int]:
-        """Return the way to a primitive from what the robot did last, or from where it stands."""
-        if self._last is not None and self._last in library and self._last != goal:
-            try:
-                return list(library.path(self._last, goal))[1:]
-            except NoPathError:
-                pass  # it has to begin anew
-        choices = performer.repertoire.entries(performer.reference)
-        starts = [performer.repertoire.primitive(int(k)) for k in np.flatnonzero(choices.mask)]
-        paths = []
-        for start in starts:
-            if start is None:
-                continue
-            try:
-                paths.append([start] if start == goal else list(library.path(start, goal)))
-            except NoPathError:
-                continue
-        if not paths:
-            raise NoPathError(f"no way leads to {{{goal}}} from where the robot stands")
-        return min(paths, key=len)
-
-    def _queue(self, ids: list[int]) -> None:
-        self._steps_left = 0
-        self._asked.clear()
-        self._asked.extend(ids[:MOST_ASKED])
-
-    def _require_robot(self) -> Performer:
-        if self._performer is None:
-            raise InvalidValueError(f"the robot can perform nothing of this: {self._cannot}")
-        return self._performer
+    def _queue(self, ids: list[int], steps: int = 0) -> None:
+        """Let the robot do this next, and nothing else of what it was asked."""
+        self._asked = deque(ids[:MOST_ASKED])
+        self._steps_left = steps
 
     # ---- what the robot does
 
     def _tick(self) -> None:
         """Show the next frame, and see that there is one after it."""
-        if self._playing is not None:
-            self._frame += 1
-            if self._frame >= len(self._playing.poses):
-                self._finished(self._playing)
-        if self._playing is None and self._next is not None and self._next.done():
-            self._start(self._next.result())
+        if self._robot.broken is not None:
+            raise self._robot.broken  # another process begins anew
+        self._take_paths()
+        playing = self._playing
+        if playing is not None:
+            if self._frame + 1 < len(playing.poses):
+                self._frame += 1
+            elif playing.done:
+                self._finished(playing)
+        if self._playing is None and self._next is not None:
+            self._start(self._next)
         if self._next is None:
             self._simulate()
         if self._playing is not None:
             self._pose(self._playing.poses[self._frame])
+        self._robot.prepare()
         now = time.monotonic()
         if now - self._status_at > _STATUS_S:
             self._status_at = now
             self._outbox.post(self._status(), key="status")
 
+    def _take_paths(self) -> None:
+        """Let the robot go where a way was found, and say so."""
+        while self._paths and self._paths[0][0].done():
+            found, reply = self._paths.pop(0)
+            try:
+                path = found.result()
+            except MPLearnError as error:
+                self._outbox.post(reply | {"ok": False, "text": str(error)})
+                continue
+            self._queue(path)
+            text = "the robot goes " + " → ".join(f"{{{id}}}" for id in path)
+            self._outbox.post(reply | {"ok": True, "text": text})
+
     def _pose(self, pose: Poses) -> None:
         self._outbox.post({"kind": "robot-pose", "bodies": len(pose)}, pose.tobytes(), "pose")
 
-    def _stand(self) -> None:
-        """Stand upright, and show it."""
-        if self._performer is not None:
-            self._performer.reset()
-        self._pose(self._standing)
-
-    def _start(self, played: Played) -> None:
-        self._next = None
-        if played.problem:
-            text = f"the robot cannot perform {{{played.id}}}: {played.problem}"
-            self._outbox.post(happening("robot", text, 0.0, played.id))
-            if not self._steps_left:
-                self._asked.clear()
+    def _start(self, performed: Performed) -> None:
+        """Begin to show what is simulated, if enough of it is there."""
+        if not performed.done and len(performed.poses) < _AHEAD:
             return
-        if len(played.poses):
-            self._playing, self._frame, self._last = played, 0, played.id
+        self._next = None
+        if performed.problem:
+            what = "walk on" if performed.id is None else f"perform {{{performed.id}}}"
+            text = f"the robot cannot {what}: {performed.problem}"
+            self._outbox.post(happening("robot", text, 0.0, performed.id))
+            self._queue([], 0 if performed.id is None else self._steps_left)
+            return
+        if performed.poses:
+            self._playing, self._frame = performed, 0
             self._status_at = 0.0
 
-    def _finished(self, played: Played) -> None:
+    def _finished(self, performed: Performed) -> None:
         self._playing = None
         self._status_at = 0.0
-        if played.fallen:
-            self._outbox.post(
-                happening("robot", f"the robot fell at {{{played.id}}}; it stands up", 0.0)
-            )
-            if self._next is not None:
-                self._next.result()
-                self._next = None
-            self._asked.clear()
-            self._steps_left, self._last, self._chosen = 0, None, None
-            self._stand()
+        if performed.fallen:
+            text = f"the robot fell at {{{performed.id}}}; it stands up"
+            self._outbox.post(happening("robot", text, 0.0))
+            self._queue([])
+            self._next = None  # it was simulated from where the robot lay
+            self._robot.reset()
+            self._pose(self._standing)
 
     def _simulate(self) -> None:
         """Begin to simulate what is asked next, if there is something."""
-        performer = self._performer
-        if performer is None:
-            return
         if self._asked:
-            id = self._asked.popleft()
+            self._next = self._robot.perform(self._asked.popleft())
         elif self._steps_left > 0:
             self._steps_left -= 1
-            chosen = self._step(performer)
-            if chosen is None:
-                return
-            id = chosen
-        else:
-            return
-        self._chosen = id
-        self._next = self._worker.submit(_simulated, performer, id)
-
-    def _step(self, performer: Performer) -> int | None:
-        """Draw what a walk performs next, as likely as the demonstrator does it."""
-        repertoire, last = performer.repertoire, self._chosen
-        try:
-            choices = None
-            if last is not None and last in repertoire.library:
-                choices = repertoire.after(last)
-            if choices is None or not choices.mask[HOLD + 1 :].any():  # a dead end: begin anew
-                choices = repertoire.entries(performer.reference)
-        except MPLearnError as error:
-            self._outbox.post(happening("robot", str(error), 0.0))
-            self._steps_left = 0
-            return None
-        weights = choices.prior * choices.mask
-        weights[HOLD] = 0.0
-        if not weights.sum() > 0:
-            self._outbox.post(happening("robot", "the walk ends: nothing can follow", 0.0))
-            self._steps_left = 0
-            return None
-        slot = int(self._rng.choice(len(weights), p=weights / weights.sum()))
-        return repertoire.primitive(slot)
+            self._next = self._robot.perform(None)
 
     def _status(self) -> Header:
         playing = self._playing
         return {
             "kind": "robot",
             "primitive": None if playing is None else playing.id,
-            "done": 0.0 if playing is None else round(self._frame / len(playing.poses), 3),
             "left": len(self._asked) + self._steps_left + (self._next is not None),
-            "cannot": self._cannot,
+            "cannot": self._robot.cannot,
             "speed": SPEED,
         }
-
-
-def _simulated(performer: Performer, id: int) -> Played:
-    """Perform a primitive, and return what came of it."""
-    nothing: Poses = np.empty((0, 0, 7), np.float32)
-    try:
-        verdict = performer.repertoire.skills.feasibility(id)
-        if not verdict.feasible:
-            return Played(id, nothing, problem=str(verdict.problems[0]))
-        poses: list[Poses] = []
-        step_s = performer.repertoire.skills.planner.config.period_s
-        outcome = performer.perform(
-            id,
-            lambda: poses.append(_pose_of(performer.simulation)),
-            max(1, round(1.0 / (SHOWN_HZ * step_s))),
-        )
-    except MPLearnError as error:
-        return Played(id, nothing, problem=str(error))
-    return Played(id, np.array(poses, np.float32), outcome.report.fallen)
-
-
-def _pose_of(simulation: Simulation) -> Poses:
-    data = simulation.data
-    return np.concatenate((data.xpos[1:], data.xquat[1:]), axis=1, dtype=np.float32)
 
 
 def _bodies(robot_xml: str) -> Header:

@@ -292,6 +292,10 @@ def test_the_robot_performs_what_it_is_asked(taught):
 
     until(performed, 200)  # compiling, the first time
     assert performed() == {library.ids[0]}
+    kinds = [h["kind"] for h, _ in kept.posted]  # the figure comes first
+    assert kinds.index("clip") < next(
+        k for k, (h, _) in enumerate(kept.posted) if h["kind"] == "robot" and h["primitive"]
+    )
     ask("path", id=library.ids[1], ref=11)
     until(lambda: library.ids[1] in performed(), 60)
     theirs.close()
