@@ -25,6 +25,8 @@ class Episode:
         duration_s: How long it took [s].
         steps: Number of macro steps.
         illegal: How many of them were illegal.
+        share: How good the return is: 0 what holding earns, 1 the best that is possible; NaN if the
+            task does not say.
     """
 
     return_: float
@@ -33,6 +35,7 @@ class Episode:
     duration_s: float
     steps: int
     illegal: int
+    share: float = np.nan
 
 
 def play(env: gymnasium.Env[Any, Any], policy: Policy, episodes: int, seed: int) -> list[Episode]:
@@ -57,6 +60,7 @@ def play(env: gymnasium.Env[Any, Any], policy: Policy, episodes: int, seed: int)
 def _episode(env: gymnasium.Env[Any, Any], policy: Policy, seed: int) -> Episode:
     observation, info = env.reset(seed=seed)
     policy.reset()
+    scale = info.get("task", {})
     total, discount, duration_s, steps, illegal = 0.0, 1.0, 0.0, 0, 0
     over = fallen = False
     while not over:
@@ -70,4 +74,6 @@ def _episode(env: gymnasium.Env[Any, Any], policy: Policy, seed: int) -> Episode
         fallen = bool(info["fallen"])
         over = terminated or truncated
     success = float(info.get("is_success", np.nan))
-    return Episode(total, success, fallen, duration_s, steps, illegal)
+    best, idle = (float(scale.get(f"{which}_return", np.nan)) for which in ("best", "idle"))
+    share = (total - idle) / (best - idle)
+    return Episode(total, success, fallen, duration_s, steps, illegal, share)

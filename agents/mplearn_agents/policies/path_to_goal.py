@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, Literal, TypeAlias, get_args
 
 import gymnasium
@@ -110,10 +110,18 @@ class PathToTask(Policy):
         graph: See `PathToGoal`.
         in_order: Whether the task wants one slot after the other, or any of them.
         prefer: See `PathToGoal`.
+        renew: Returns the graph of now, where the library may change from episode to episode.
     """
 
-    def __init__(self, graph: nx.DiGraph[int], in_order: bool, prefer: Prefer = "quick") -> None:
+    def __init__(
+        self,
+        graph: nx.DiGraph[int],
+        in_order: bool,
+        prefer: Prefer = "quick",
+        renew: Callable[[], nx.DiGraph[int]] | None = None,
+    ) -> None:
         self.graph, self.in_order, self.prefer = graph, in_order, prefer
+        self._renew, self._version = renew, ""
         self._ways: dict[tuple[int, ...], PathToGoal] = {}
 
     @classmethod
@@ -122,7 +130,12 @@ class PathToTask(Policy):
         from mplearn_envs.tasks import ReciteTask
 
         task = env.unwrapped.task  # type: ignore[attr-defined]
-        return cls(graph_of_actions(env), isinstance(task, ReciteTask), prefer)
+        return cls(
+            graph_of_actions(env),
+            isinstance(task, ReciteTask),
+            prefer,
+            lambda: graph_of_actions(env),
+        )
 
     def act(self, observation: Any, info: Mapping[str, Any]) -> int:
         """Return the first action of the best path to what the task wants next.
@@ -137,6 +150,9 @@ class PathToTask(Policy):
                 "this policy needs a task that names slots in info['task'], like 'goal' and "
                 f"'recite'; info['task'] is {info.get('task')}"
             )
+        version = info.get("library_version", "")
+        if self._renew is not None and version != self._version:
+            self.graph, self._version, self._ways = self._renew(), version, {}
         goals = slots[:1] if self.in_order else slots
         if goals not in self._ways:
             self._ways[goals] = PathToGoal(self.graph, goals, self.prefer)

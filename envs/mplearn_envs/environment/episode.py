@@ -69,3 +69,4 @@ class EpisodeState(NamedTuple):
     episode: Episode
     task: Task
     streams: RandomStreams
+    person: int = -1  # whose graph counts, where there are several

@@ -22,7 +22,7 @@ from mplearn_envs.execution.performer import Performer
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.rendering.screen import RENDER_MODES, Screen
 from mplearn_envs.robot import Robot, humanoid, make_robot
-from mplearn_envs.skills.action_choices import HOLD
+from mplearn_envs.skills.action_choices import HOLD, Choices
 from mplearn_envs.skills.repertoire import Repertoire, shared_repertoire
 from mplearn_envs.tasks import Choice, Scene, Task, make_task
 
@@ -143,8 +143,12 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
 
     # ---- what derived environments do besides
 
-    def _begin(self) -> None:
+    def _begin(self, options: Mapping[str, Any]) -> None:
         """Prepare an episode, before the robot is put upright."""
+
+    def _entries(self) -> Choices:
+        """Return what may be done first in an episode."""
+        return self.repertoire.entries(self.performer.reference)
 
     def _meanwhile(self, duration_s: float) -> None:
         """Let the world go on for the duration of a macro step."""
@@ -169,10 +173,10 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
             own = seed if seed is not None else int(self.np_random.integers(2**63))
             self._streams = RandomStreams.of(own)
         self._episode = None
-        self._begin()
+        self._begin(options or {})
         draw = 0 if self.body.certain else int(self.streams.body.integers(2**63))
         measured = self.performer.reset(draw)
-        episode = Episode(measured, self.repertoire.entries(self.performer.reference))
+        episode = Episode(measured, self._entries())
         self.task.reset(self._scene(episode, options or {}))
         self._episode = episode
         self._terms = dict.fromkeys((*self.task.terms, *TERMS), 0.0)
@@ -334,6 +338,9 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
             episode.time_s,
             self.streams.task,
             options,
+            episode.choices,
+            self.discount,
+            self.actions.hold_s,
         )
 
     def _observation(self) -> Observation:

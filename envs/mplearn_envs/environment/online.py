@@ -121,7 +121,7 @@ class OnlinePrimitiveHumanoidEnv(MacroStepEnv):
                 "choose another task in an online environment"
             )
 
-    def _begin(self) -> None:
+    def _begin(self, options: Mapping[str, Any]) -> None:
         known = self.carry_over and self.learner.n_frames > 0
         if known:
             self.learner.end_stream()

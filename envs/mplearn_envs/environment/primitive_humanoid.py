@@ -214,7 +214,7 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
             body,
         )
 
-    def _begin(self) -> None:
+    def _begin(self, options: Mapping[str, Any]) -> None:
         if self.source.live:
             library = self.source.now()
             self.repertoire.require_room(len(library))

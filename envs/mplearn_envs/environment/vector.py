@@ -6,7 +6,7 @@ import copy
 import os
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import gymnasium
 import numpy as np
@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 
 from mplearn.errors import InvalidValueError
 
+from .macro_step import MacroStepEnv
 from .plain import PlainSpec
 from .primitive_humanoid import PrimitiveHumanoidEnv
+from .varied_humanoid import VariedHumanoidEnv
 
 
 class PrimitiveHumanoidVectorEnv(PlainSpec, SyncVectorEnv):
@@ -36,6 +38,8 @@ class PrimitiveHumanoidVectorEnv(PlainSpec, SyncVectorEnv):
         **options: Of each environment, see `PrimitiveHumanoidEnv`. Each gets a copy of a task
             object.
     """
+
+    env_class: ClassVar[type[MacroStepEnv]] = PrimitiveHumanoidEnv
 
     def __init__(
         self,
@@ -57,7 +61,8 @@ class PrimitiveHumanoidVectorEnv(PlainSpec, SyncVectorEnv):
         self.n_threads = n_threads or _n_processors()
         self._pool: ThreadPoolExecutor | None = None
         super().__init__(
-            [_maker(options, max_episode_steps)] * num_envs, autoreset_mode=autoreset_mode
+            [_maker(self.env_class, options, max_episode_steps)] * num_envs,
+            autoreset_mode=autoreset_mode,
         )
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
@@ -90,6 +95,12 @@ class PrimitiveHumanoidVectorEnv(PlainSpec, SyncVectorEnv):
         super().close_extras(**kwargs)
 
 
+class VariedHumanoidVectorEnv(PrimitiveHumanoidVectorEnv):
+    """The same of `VariedHumanoidEnv`."""
+
+    env_class = VariedHumanoidEnv
+
+
 class _Begun(gymnasium.Wrapper[Any, Any, Any, Any]):
     """An environment whose next step may have begun already, in another thread."""
 
@@ -97,7 +108,7 @@ class _Begun(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def expected_s(self, action: np.int64) -> float:
         """Return how long what an action stands for takes the robot, legal or not [s]."""
-        env = cast(PrimitiveHumanoidEnv, self.unwrapped)
+        env = cast(MacroStepEnv, self.unwrapped)
         known = self.action_space.contains(action)
         id = env.repertoire.primitive(int(action)) if known else None
         return env.actions.hold_s if id is None else env.repertoire.skills.duration_s(id)
@@ -116,11 +127,11 @@ class _Begun(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 def _maker(
-    options: dict[str, Any], max_episode_steps: int | None
+    env_class: type[MacroStepEnv], options: dict[str, Any], max_episode_steps: int | None
 ) -> Callable[[], gymnasium.Env[Any, Any]]:
     def make() -> gymnasium.Env[Any, Any]:
         own = {"task": copy.deepcopy(options["task"])} if "task" in options else {}
-        env: gymnasium.Env[Any, Any] = PrimitiveHumanoidEnv(**(options | own))
+        env: gymnasium.Env[Any, Any] = env_class(**(options | own))
         if max_episode_steps is not None:
             env = TimeLimit(env, max_episode_steps)
         return _Begun(env)

@@ -19,7 +19,7 @@ from mplearn_envs.robot import Robot
 
 from .action_choices import Choices, choose_among
 from .feasibility import FeasibilityConfig
-from .skills import Skills
+from .skills import Foreknowledge, Skills
 from .slots import Slots
 
 ENTRY_GAP = 0.5  # largest difference of a tracked coordinate [rad]
@@ -42,6 +42,8 @@ class Repertoire:
         upper_body: Whether only the upper body performs, see `Skills`.
         novel: Whether transitions are allowed that were never observed.
         growing: Whether the library will be replaced by `update`; it may be empty then.
+        skills: Of the same primitives, robot, speed, style and limits; None makes them.
+        known: See `Skills`.
 
     Attributes:
         skills: What the robot makes of them: motions, verdicts and plans.
@@ -67,12 +69,16 @@ class Repertoire:
         upper_body: bool = False,
         novel: bool = False,
         growing: bool = False,
+        skills: Skills | None = None,
+        known: Foreknowledge | None = None,
     ) -> None:
         if not len(library) and not growing:
             raise LibraryError("the library is empty: there is nothing to perform")
         self._slots = Slots(capacity, len(library))
         self._slots.require_room(len(library))
-        self.skills = Skills(library, robot, speed, style, limits, upper_body=upper_body)
+        self.skills = skills or Skills(
+            library, robot, speed, style, limits, upper_body=upper_body, known=known
+        )
         self.capacity = self._slots.capacity
         self.novel = novel
         self.growing = growing
@@ -82,7 +88,7 @@ class Repertoire:
     @property
     def library(self) -> PrimitiveLibrary:
         """The primitives, as `update` had them last."""
-        return self.skills.library
+        return self._library
 
     @property
     def robot(self) -> Robot:
@@ -99,7 +105,9 @@ class Repertoire:
             LibraryError: The library is for another body.
         """
         with self.skills.lock:
-            self.skills.take(library)
+            if library.primitives != self.skills.library.primitives:
+                self.skills.take(library)
+            self._library = library
             left_out = self._slots.update(library.ids)
             self.slots = self._slots.of
             self.ids = tuple(sorted(self.slots))
@@ -247,15 +255,21 @@ def shared_repertoire(
     limits: FeasibilityConfig | None,
     upper_body: bool,
     novel: bool,
+    known: Foreknowledge | None = None,
+    like: Repertoire | None = None,
 ) -> Repertoire:
     """Return the repertoire of a library that will not change; arguments as `Repertoire`'s.
 
-    All environments of a process that ask for the same get the same.
+    All environments of a process that ask for the same get the same. It shares skills and memory
+    with the one that it is ``like``: of the same primitives, with other transitions.
     """
     key = (library.version, robot, capacity, speed, style, limits, upper_body, novel)
     found = _SHARED.get(key)
     if found is None:
+        skills = None if like is None else like.skills
         what = (library, robot, capacity, speed, style, limits)
-        found = Repertoire(*what, upper_body=upper_body, novel=novel)
+        found = Repertoire(*what, upper_body=upper_body, novel=novel, skills=skills, known=known)
+        if like is not None:
+            found.memory = like.memory
         _SHARED[key] = found
     return found

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from threading import RLock
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,21 @@ from mplearn_envs.planning import Motion, Plan, Planner
 from mplearn_envs.robot import Retargeting, Robot
 
 from .feasibility import Feasibility, FeasibilityCheck, FeasibilityConfig
+
+
+class Foreknowledge(NamedTuple):
+    """What was found out before of a library on one robot, at one speed and in one style.
+
+    Attributes:
+        verdicts: On primitives, by id.
+        durations_s: How long each takes from where it starts [s], by id.
+        transitions_s: How long one takes where another has just ended [s], by both ids; after None
+            it is the robot at rest.
+    """
+
+    verdicts: Mapping[int, Feasibility]
+    durations_s: Mapping[int, float]
+    transitions_s: Mapping[tuple[int | None, int], float]
 
 
 @dataclass
@@ -56,6 +72,7 @@ class Skills:
         limits: What counts as feasible.
         upper_body: Whether only arms, head and the trunk's turn are performed, by a robot that
             stands: for motions whose legs it cannot follow.
+        known: What was found out before, of this very library, robot, speed, style and limits.
 
     Attributes:
         library: The primitives, as `take` had them last.
@@ -75,6 +92,7 @@ class Skills:
         limits: FeasibilityConfig | None = None,
         *,
         upper_body: bool = False,
+        known: Foreknowledge | None = None,
     ) -> None:
         if not (np.isfinite(speed) and speed > 0):
             raise InvalidValueError(f"speed must be positive and finite, not {speed}")
@@ -84,6 +102,7 @@ class Skills:
         self.limits = limits
         self.upper_body = upper_body
         self.lock = RLock()
+        self._foreknown = known or Foreknowledge({}, {}, {})
         self._version: dict[int, int] = {}
         self.forget()
         self.take(library)
@@ -116,12 +135,15 @@ class Skills:
             self._retargeting = retargeting
             for id in self._known.keys() - set(library.ids):
                 del self._known[id]
-            self._fresh: set[int] = set()  # ids whose skill is known to be this library's
+            self._fresh.clear()
 
     def forget(self) -> None:
         """Forget all: what comes is another learner's, whose ids mean something else."""
         with self.lock:
             self._known: dict[int, Skill] = {}
+            self._fresh: set[int] = set()  # ids whose skill is known to be this library's
+            self._ends: dict[tuple[int, int], Reference] = {}
+            self._transitions_s: dict[Hashable, float] = {}
 
     def frames_of(self, generated: Trajectory) -> FloatArray:
         """Return a motion that the library generated, in the robot's channels, (T, 3 + n)."""
@@ -161,6 +183,8 @@ class Skills:
 
     def feasibility(self, id: int) -> Feasibility:
         """Return whether the robot can perform a primitive; judged once."""
+        if id in self._foreknown.verdicts:
+            return self._foreknown.verdicts[id]
         with self.lock:
             skill = self[id]
             if skill.verdict is None:
@@ -173,6 +197,8 @@ class Skills:
 
     def duration_s(self, id: int) -> float:
         """Return how long a primitive that it can perform takes the robot from where it starts."""
+        if id in self._foreknown.durations_s:
+            return self._foreknown.durations_s[id]
         return self[id].motion.duration_s / self.feasibility(id).tempo
 
     def plan(self, start: Reference, id: int) -> Plan:
@@ -180,6 +206,32 @@ class Skills:
         with self.lock:
             motion, speed, key = self[id].motion, self.feasibility(id).speed, self.key(id)
         return self._settled(self.planner.plan(start, motion, speed, key))
+
+    def transition_s(self, before: int | None, after: int) -> float:
+        """Return how long a primitive takes the robot where another has just ended [s].
+
+        Where it stands then does not depend on the way (see `plan`), so neither does this.
+
+        Args:
+            before: The one that has ended; None is the robot at rest, arms hanging.
+            after: The one that is performed.
+        """
+        known = self._foreknown.transitions_s
+        if (before, after) in known:
+            return known[before, after]
+        with self.lock:
+            key = (None if before is None else self.key(before), self.key(after))
+            if key not in self._transitions_s:
+                start = self._rest if before is None else self._end(before)
+                self._transitions_s[key] = self.plan(start, after).duration_s
+            return self._transitions_s[key]
+
+    def _end(self, id: int) -> Reference:
+        """Return where a primitive ends."""
+        key = self.key(id)
+        if key not in self._ends:
+            self._ends[key] = self.plan(self._check.posture(self[id].motion), id).end
+        return self._ends[key]
 
     def hold(self, start: Reference, duration_s: float) -> Plan:
         """Return the commands that come to rest in the present posture."""

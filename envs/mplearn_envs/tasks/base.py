@@ -13,6 +13,7 @@ from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.execution.sensors import Measured
 from mplearn_envs.execution.tracking_report import TrackingReport
 from mplearn_envs.mechanics.reference import Reference
+from mplearn_envs.skills.action_choices import Choices
 from mplearn_envs.skills.repertoire import Repertoire
 
 
@@ -44,6 +45,9 @@ class Scene(NamedTuple):
         time_s: Time since the start of the episode [s].
         rng: The environment's source of randomness.
         options: What was given to the environment's ``reset``.
+        choices: What may be done next.
+        discount: Per second.
+        hold_s: Duration of holding [s].
     """
 
     repertoire: Repertoire
@@ -54,6 +58,9 @@ class Scene(NamedTuple):
     time_s: float
     rng: np.random.Generator
     options: Mapping[str, Any]
+    choices: Choices
+    discount: float
+    hold_s: float
 
 
 class Task(ABC):

@@ -100,11 +100,13 @@ class FollowTask(Task):
         """
         repertoire = scene.repertoire
         self._repertoire, self._rng = repertoire, scene.rng
-        if self._library is not repertoire.library:
+        if scene.choices.dead_end:
+            raise NoPathError("the demonstrator can begin with nothing that the robot can do")
+        self._first = scene.choices
+        if self._library is repertoire.library:
+            self._predicted.pop((), None)
+        else:
             self._library = repertoire.library
-            self._first = repertoire.entries(scene.reference)
-            if self._first.dead_end:
-                raise NoPathError("the demonstrator can begin with nothing that the robot can do")
             self._predicted: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
             self._usual_s = {
                 id: repertoire.skills.duration_s(id) / self.pace for id in repertoire.feasible_ids

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, TypeAlias, get_args
 
@@ -11,11 +12,13 @@ from gymnasium import spaces
 from mplearn.errors import InvalidValueError, NoPathError
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import FloatArray
-from mplearn_envs.execution.earliest_arrival import earliest_arrivals
+from mplearn_envs.execution.earliest_arrival import Arrival, earliest_arrivals
 from mplearn_envs.execution.tracking_report import TrackingReport
 from mplearn_envs.skills.repertoire import Repertoire
+from mplearn_envs.skills.soonest import Way, soonest
 
 from .base import Choice, Scene, Task, padded
+from .best import Clock, Scale, time_held
 from .goals import Goal, GoalKind, HandGoals, PostureGoals, PrimitiveGoals
 
 KindName: TypeAlias = Literal["hand", "posture", "primitive"]
@@ -61,6 +64,8 @@ class GoalTask(Task):
             for a posture a mapping of some of the robot's channels to values [m, rad]; for a
             primitive its id or name. None draws goals. ``reset(options={"target": ...})`` gives one
             for an episode.
+        steps: Drawn goals have quickest ways of so many primitives, from the least to the most;
+            None: of any number.
         deadline_s: When the episode ends [s].
         tolerance_m: How near a hand must come [m].
         tolerance_rad: How near each coordinate of a posture must come [rad]; 0.2 m of height count
@@ -74,6 +79,7 @@ class GoalTask(Task):
 
     kind: KindName = "hand"
     target: Any = None
+    steps: tuple[int, int] | None = None
     deadline_s: float = 30.0
     tolerance_m: float = 0.05
     tolerance_rad: float = 0.2
@@ -90,7 +96,11 @@ class GoalTask(Task):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
                 raise InvalidValueError(f"{name} must be positive and finite, not {value}")
-        self._library: PrimitiveLibrary | None = None
+        if self.steps is not None:
+            self.steps = (int(self.steps[0]), int(self.steps[1]))
+            if not 1 <= self.steps[0] <= self.steps[1]:
+                raise InvalidValueError(f"steps must be from 1, the least first, not {self.steps}")
+        self._looked: tuple[PrimitiveLibrary, bytes] | None = None
 
     def space(self, repertoire: Repertoire) -> spaces.Box:
         """Return the bounds of the observation, see the table."""
@@ -106,16 +116,22 @@ class GoalTask(Task):
             InvalidValueError: The target is none of this kind.
         """
         repertoire = scene.repertoire
-        if self._library is not repertoire.library:
-            self._arrivals = earliest_arrivals(repertoire, repertoire.entries(scene.reference))
-            self._library = repertoire.library
-            self._kind = self._goals(repertoire)
+        looked = repertoire.library, scene.choices.mask.tobytes()
+        if self._looked is None or self._looked[0] is not looked[0] or self._looked[1] != looked[1]:
+            self._look(scene)
+            self._looked = looked
         target = scene.options.get("target", self.target)
         self.goal = self._drawn(scene) if target is None else self._kind.given(target)
         self._slots, self._least_time_s = self._ways(self.goal, repertoire)
         self._capacity = repertoire.capacity
         self._now, self._time_s = scene.measured, scene.time_s
         self._success = False
+        clock = Clock.of(repertoire, scene.discount)
+        soonest_s, wait_s = self._least_time_s, time_held(self.deadline_s, scene.hold_s)
+        self._scale = Scale(
+            self.reached * clock.worth(soonest_s) - self.hurry * clock.held(soonest_s),
+            -self.hurry * clock.held(wait_s),
+        )
 
     def observe(self) -> FloatArray:
         """Return goal, way left and time left, see the table."""
@@ -142,14 +158,28 @@ class GoalTask(Task):
         return self._success or self._time_s >= self.deadline_s
 
     def report(self) -> dict[str, Any]:
-        """Return success, the goal's slots, and in which time it can be reached at best."""
+        """Return success, the goal's slots, the time it takes at best, and the best return."""
         return {
             "success": self._success,
             "slots": padded(self._slots, self._capacity),
             "least_time_s": self._least_time_s,
+            **self._scale.report(),
         }
 
     # ---- which goal
+
+    def _look(self, scene: Scene) -> None:
+        """Find out what can be reached, and how soon."""
+        repertoire = scene.repertoire
+        self._kind = self._goals(repertoire)
+        self._far: Mapping[int, Way] = {}
+        if self.steps is not None:
+            self._far = soonest(repertoire, None, scene.choices)
+        if self.steps is not None and self.kind == "primitive":  # how it stands does not matter
+            here = scene.reference, scene.measured
+            self._arrivals = {id: Arrival(way.time_s, *here) for id, way in self._far.items()}
+        else:
+            self._arrivals = earliest_arrivals(repertoire, scene.choices)
 
     def _goals(self, repertoire: Repertoire) -> GoalKind:
         if self.kind == "hand":
@@ -163,15 +193,21 @@ class GoalTask(Task):
         goals = [
             goal
             for id, arrival in self._arrivals.items()
-            if arrival.time_s <= self.deadline_s
+            if arrival.time_s <= self.deadline_s and self._is_far_enough(id)
             for goal in self._kind.at(id, arrival.measured, scene.measured)
         ]
         if not goals:
             raise NoPathError(
-                f"the robot can reach no goal of kind {self.kind!r} within {self.deadline_s} s: "
+                f"the robot can reach no goal of kind {self.kind!r} within {self.deadline_s} s"
+                + ("" if self.steps is None else f", {self.steps} primitives away")
+                + ": "
                 f"{len(self._arrivals)} primitives can be reached at all"
             )
         return goals[int(scene.rng.integers(len(goals)))]
+
+    def _is_far_enough(self, id: int) -> bool:
+        least, most = self.steps or (0, 0)
+        return self.steps is None or least <= self._far[id].n_steps <= most
 
     def _ways(self, goal: Goal, repertoire: Repertoire) -> tuple[tuple[int, ...], float]:
         """Return the slots of the primitives at whose end a goal is reached, and how soon [s].

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -13,8 +14,10 @@ from mplearn.errors import InvalidValueError, NoPathError
 from mplearn.recording import FloatArray
 from mplearn_envs.execution.tracking_report import TrackingReport
 from mplearn_envs.skills.repertoire import Repertoire
+from mplearn_envs.skills.soonest import performed, soonest
 
 from .base import Choice, Scene, Task, padded
+from .best import Clock, Scale, time_held
 
 
 @dataclass
@@ -93,9 +96,9 @@ class ReciteTask(Task):
         self._slots = tuple(repertoire.slots[id] for id in self._ids)
         self._capacity = repertoire.capacity
         self._n_said = 0
-        self._n_performed = 0
         self._chosen: int | None = None
         self._time_s = scene.time_s
+        self._scale = self._computed_scale(scene)
 
     def observe(self) -> FloatArray:
         """Return what remains to be said, and the time left."""
@@ -139,7 +142,33 @@ class ReciteTask(Task):
         return {
             "success": self._complete,
             "slots": padded(self._slots[self._n_said :], self.length),
+            **self._scale.report(),
         }
+
+    def _computed_scale(self, scene: Scene) -> Scale:
+        """Return the returns of the quickest way, primitive by primitive, and of holding.
+
+        Who says each as soon as can be says all as soon as can be, for after each the robot stands
+        where it stands whatever the way.
+        """
+        clock, time_s, best = Clock.of(scene.repertoire, scene.discount), 0.0, 0.0
+        before, choices = None, scene.choices
+        for id in self._ids:
+            ways = soonest(scene.repertoire, before, choices)
+            if id not in ways:  # only by holding at a dead end
+                return Scale(math.nan, math.nan)
+            if time_s + ways[id].time_s > self.deadline_s:
+                break
+            time_s += ways[id].time_s
+            best += self.said * clock.worth(time_s)
+            before, choices = id, scene.repertoire.after(id)
+        else:
+            best += self.complete * clock.worth(time_s) - self.hurry * clock.held(time_s)
+            return Scale(best, self._idle(clock, scene))
+        return Scale(math.nan, self._idle(clock, scene))  # not all can be said in time
+
+    def _idle(self, clock: Clock, scene: Scene) -> float:
+        return -self.hurry * clock.held(time_held(self.deadline_s, scene.hold_s))
 
 
 def _drawn_request(scene: Scene, length: int) -> tuple[int, ...]:
@@ -150,41 +179,34 @@ def _drawn_request(scene: Scene, length: int) -> tuple[int, ...]:
     """
     repertoire = scene.repertoire
     ids: list[int] = []
-    direct = _direct(repertoire, None, scene)
+    direct = set(performed(repertoire, scene.choices))
     for _ in range(length):
         reached = _reachable(repertoire, direct)
         if not reached:
             where = f"after {repertoire.library[ids[-1]].name!r}" if ids else "at the start"
             raise NoPathError(f"no request of {length} primitives: nothing can follow {where}")
         # at a dead end nothing follows: it may only come last
-        open_ended = [id for id in sorted(reached) if _direct(repertoire, id, scene)] or sorted(
-            reached
-        )
+        open_ended = [
+            id for id in sorted(reached) if set(performed(repertoire, repertoire.after(id)))
+        ] or sorted(reached)
         last = len(ids) == length - 1
         options = sorted(reached) if last else open_ended
         indirect = [id for id in options if id not in direct] or options
         ids.append(indirect[int(scene.rng.integers(len(indirect)))])
-        direct = _direct(repertoire, ids[-1], scene)
+        direct = set(performed(repertoire, repertoire.after(ids[-1])))
     return tuple(ids)
 
 
 def _require_possible(ids: tuple[int, ...], scene: Scene) -> None:
     repertoire = scene.repertoire
     library = repertoire.library
-    direct = _direct(repertoire, None, scene)
+    direct = set(performed(repertoire, scene.choices))
     for id in ids:
         if id not in _reachable(repertoire, direct):
             problems = repertoire.skills.feasibility(id).problems
             why = "; ".join(map(str, problems)) or "no way leads there from what comes before"
             raise NoPathError(f"the request's {library[id].name!r} cannot be performed: {why}")
-        direct = _direct(repertoire, id, scene)
-
-
-def _direct(repertoire: Repertoire, id: int | None, scene: Scene) -> set[int]:
-    """Return what may follow directly; None is the start of the episode."""
-    choices = repertoire.entries(scene.reference) if id is None else repertoire.after(id)
-    following = (repertoire.primitive(slot) for slot in np.flatnonzero(choices.mask).tolist())
-    return {other for other in following if other is not None}
+        direct = set(performed(repertoire, repertoire.after(id)))
 
 
 def _reachable(repertoire: Repertoire, direct: set[int]) -> set[int]:
@@ -195,9 +217,5 @@ def _reachable(repertoire: Repertoire, direct: set[int]) -> set[int]:
         id = queue.pop()
         if id not in reached:
             reached.add(id)
-            queue.extend(
-                other
-                for slot in np.flatnonzero(repertoire.after(id).mask).tolist()
-                if (other := repertoire.primitive(slot)) is not None
-            )
+            queue.extend(performed(repertoire, repertoire.after(id)))
     return reached
