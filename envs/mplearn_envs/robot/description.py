@@ -46,6 +46,8 @@ class Robot:
             other bodies are retargeted.
         toes: Hinges within the feet: toes, or heels. They are held at zero, for a foot stands on
             one flat sole; motions that bend them are refused.
+        attention: Hinges that stand upright at another angle than 0 in the zero of the MJCF that
+            the robot came from, and that angle [rad]: there they are at ours plus this.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Robot:
     base_velocity: tuple[float, float, float]
     segments: tuple[tuple[str, str], ...]
     toes: tuple[str, ...] = ()
+    attention: tuple[tuple[str, float], ...] = ()
 
     @classmethod
     def from_mjcf(
@@ -114,6 +117,8 @@ class Robot:
                 f"robot {self.name!r}: the hinges within its feet are {toes}, and its toes are "
                 f"said to be {self.toes}"
             )
+        if unknown := {hinge for hinge, _ in self.attention} - set(hinges):
+            raise RobotError(f"robot {self.name!r} has no hinge {sorted(unknown)} at attention")
 
     def model(self) -> mujoco.MjModel:
         """Compile the simulation model."""
@@ -129,6 +134,12 @@ class Robot:
     def channels(self) -> tuple[str, ...]:
         """Names of the features that the robot can perform, length 3 + n."""
         return BASE_CHANNELS + self.joint_names
+
+    @cached_property
+    def attention_angles(self) -> FloatArray:
+        """Where each hinge is upright in the zero of the robot's MJCF, shape (n,) [rad]."""
+        angles = dict(self.attention)
+        return np.array([angles.get(name, 0.0) for name in self.joint_names])
 
     @cached_property
     def leg_joints(self) -> IntArray:

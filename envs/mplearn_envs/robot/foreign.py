@@ -61,12 +61,16 @@ def take_out_drives(spec: Any) -> None:
             spec.delete(element)
 
 
-def move_zero(spec: Any, attention: Mapping[str, float], name: str) -> None:
+def move_zero(spec: Any, attention: Mapping[str, float], name: str) -> dict[str, float]:
     """Shift the hinges' angles so that they are zero where they were ``attention`` [rad].
+
+    Returns:
+        By how much each hinge was shifted [rad], without those that were not.
 
     Raises:
         RobotError: An angle lies outside its limits, or cannot become zero.
     """
+    shifted: dict[str, float] = {}
     for body in spec.bodies[1:]:
         later = Rotation.identity()  # by the hinges nearer to the body than the present one
         for joint in reversed(body.joints):
@@ -85,6 +89,8 @@ def move_zero(spec: Any, attention: Mapping[str, float], name: str) -> None:
                     f"robot {name!r}: the zero of {joint.name!r} cannot be moved, for it does not "
                     f"turn about its body's origin"
                 )
+            if angle:
+                shifted[joint.name] = float(angle)
             joint.range = (low - angle, high - angle)
             joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
             joint.ref = joint.springref = 0.0
@@ -93,6 +99,7 @@ def move_zero(spec: Any, attention: Mapping[str, float], name: str) -> None:
             later = Rotation.from_rotvec(angle * axis) * later
         turned = Rotation.from_quat(body.quat, scalar_first=True) * later
         body.quat = turned.as_quat(scalar_first=True)
+    return shifted
 
 
 def add_soles(spec: Any, feet: tuple[str, str], name: str) -> None:

@@ -57,7 +57,7 @@ def described(
             raise RobotError(f"robot {name!r} has no hinge {hinge!r}; it has {sorted(hinges)}")
     _require_humanoid(compiled(spec, name), segments, name)
     take_out_drives(spec)
-    move_zero(spec, attention, name)
+    shifted = move_zero(spec, attention, name)
     feet = (segments["foot_l"], segments["foot_r"])
     add_soles(spec, feet, name)
     model = compiled(spec, name)
@@ -81,6 +81,7 @@ def described(
         "base_velocity": (float(size) * height, roll, pitch),
         "segments": tuple((role, segments[role]) for role in ROLES if role in segments),
         "toes": foot_hinges(model, feet),
+        "attention": tuple(shifted.items()),
     }
 
 

