@@ -104,6 +104,10 @@ class StoreWarning(UserWarning):
     """A store cannot be written for now, or was mended; what was learned is safe in memory."""
 
 
+class CorpusError(MPLearnError):
+    """A corpus cannot be learned: its workers die, whatever they are given."""
+
+
 class RobotError(MPLearnError):
     """A robot description is incomplete, or a motion does not fit the robot."""
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from ..errors import InvalidValueError
-from ..learner import LearnerConfig, MotionLearner
+from ..learner import LearnerConfig, LearnerState, MotionLearner
 from ..learner.chain import Chain
 from .graphs import merge_graphs
 from .people import merged_into
@@ -44,19 +44,43 @@ def merge_learners(learners: Sequence[MotionLearner]) -> MotionLearner:
         >>> len(merged.snapshot()), merged.n_frames
         (2, 2400)
     """
-    if not learners:
-        raise InvalidValueError("at least one learner is needed to merge")
     for other in learners[1:]:
-        if _rules(other) != _rules(learners[0]):
-            raise InvalidValueError(
-                f"learners must have the same configuration, not {learners[0].config} and "
-                f"{other.config}"
-            )
-    ended = map(_ended, learners)
-    merged = _Merged(next(ended))
-    for other in ended:
-        merged.take(other)
+        _check_rules(learners[0], other)
+    merged = _merged(_copied(each) for each in learners)
     return merged.learner()
+
+
+def merged_state(learners: Iterable[MotionLearner]) -> LearnerState:
+    """Return the state of what `merge_learners` makes of some, all of which are used up.
+
+    Nothing is copied, and two at a time are held, so that many fit into memory.
+
+    Raises:
+        InvalidValueError: As `merge_learners`; some are used up by then.
+    """
+    return _merged(learners).state()
+
+
+def _merged(learners: Iterable[MotionLearner]) -> _Merged:
+    merged: _Merged | None = None
+    for each in learners:
+        if merged is not None:
+            _check_rules(merged.first, each)
+        each.end_stream()
+        if merged is None:
+            merged = _Merged(each)
+        else:
+            merged.take(each)
+    if merged is None:
+        raise InvalidValueError("at least one learner is needed to merge")
+    return merged
+
+
+def _check_rules(one: MotionLearner, other: MotionLearner) -> None:
+    if _rules(one) != _rules(other):
+        raise InvalidValueError(
+            f"learners must have the same configuration, not {one.config} and {other.config}"
+        )
 
 
 def _rules(learner: MotionLearner) -> LearnerConfig:
@@ -65,11 +89,8 @@ def _rules(learner: MotionLearner) -> LearnerConfig:
     return config if learner.watching is None else replace(config, channels=learner.channels)
 
 
-def _ended(learner: MotionLearner) -> MotionLearner:
-    """Return a copy of a learner whose stream is over."""
-    copy = MotionLearner.from_state(learner.state())
-    copy.end_stream()
-    return copy
+def _copied(learner: MotionLearner) -> MotionLearner:
+    return MotionLearner.from_state(learner.state())
 
 
 class _Merged:
@@ -80,7 +101,7 @@ class _Merged:
     """
 
     def __init__(self, first: MotionLearner) -> None:
-        self._first = first
+        self.first = first
         self._state = first.state()
         self._tree, self._graph, self._chain = first.tree, first.graph, first.chain
         self._watching = first.watching
@@ -114,14 +135,16 @@ class _Merged:
 
     def learner(self) -> MotionLearner:
         """Return a learner that knows it all."""
-        if self._tree is self._first.tree and self._graph is self._first.graph:
-            return self._first
-        return MotionLearner.from_state(
-            replace(
-                self._state,
-                watches=() if self._watching is None else self._watching.state(),
-                tree=self._tree.state(),
-                graph=self._graph.state(),
-                chain=self._chain.state(),
-            )
+        if self._tree is self.first.tree and self._graph is self.first.graph:
+            return self.first
+        return MotionLearner.from_state(self.state())
+
+    def state(self) -> LearnerState:
+        """Return the state of a learner that knows it all."""
+        return replace(
+            self._state,
+            watches=() if self._watching is None else self._watching.state(),
+            tree=self._tree.state(),
+            graph=self._graph.state(),
+            chain=self._chain.state(),
         )

@@ -3,7 +3,10 @@
 from .gaps import GapConfig as GapConfig
 from .gaps import GapTracker as GapTracker
 from .joining import join_by_name as join_by_name
+from .open import FoundTakes as FoundTakes
+from .open import TakeFiles as TakeFiles
 from .open import Takes as Takes
+from .open import find_takes as find_takes
 from .open import open_recording as open_recording
 from .open import open_recordings as open_recordings
 from .open import open_takes as open_takes

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,6 +52,10 @@ for _reader in (
     UIPRMDReader(),
 ):
     register_reader(_reader)
+
+
+class NothingReadableError(RecordingError):
+    """A folder holds no file that any reader takes."""
 
 
 def open_recording(
@@ -96,7 +102,7 @@ def open_recording(
     name = next(iter(takes)) if take is None else take
     if name not in takes:
         raise RecordingError(f"{path}: no take {take!r}; expected one of {_listed(takes)}")
-    recording = _read(name, takes[name], rate_hz, positions, hints)
+    recording = _read(takes[name], rate_hz, positions, hints)
     _say(recording, takes[name].files[0])
     return recording
 
@@ -165,7 +171,7 @@ def open_takes(
     takes = _takes(Path(path))
     for name, take in takes.items():
         try:
-            found.extend(each_person(_read(name, take, rate_hz, positions, hints)))
+            found.extend(each_person(_read(take, rate_hz, positions, hints)))
         except RecordingError as error:
             if strict or len(takes) == 1:
                 raise
@@ -186,42 +192,114 @@ def take_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class _Take:
-    reader: Reader
+class TakeFiles:
+    """A take that lies in files, and is not read yet.
+
+    Attributes:
+        name: What it is called, with the folders that it lies in.
+        person: Who moves, as far as names of files and folders tell; empty where they do not.
+        files: Its files, in order.
+        reader: What reads them.
+    """
+
+    name: str
+    person: str
     files: tuple[Path, ...]
+    reader: Reader
+
+    def read(self, *, positions: bool = False, hints: Hints | None = None) -> tuple[Recording, ...]:
+        """Return a recording of each person in it; see `open_recordings`.
+
+        Raises:
+            RecordingError: The files do not hold what their format promises.
+        """
+        return each_person(_read(self, None, positions, hints))
 
 
-def _takes(path: Path) -> dict[str, _Take]:
+class FoundTakes(NamedTuple):
+    """The takes of a folder and of those in it, not read yet.
+
+    Attributes:
+        takes: In order of their names.
+        unreadable: Why not, by name, for folders whose takes cannot be told apart.
+    """
+
+    takes: tuple[TakeFiles, ...]
+    unreadable: Mapping[str, RecordingError]
+
+
+def find_takes(path: str | os.PathLike[str]) -> FoundTakes:
+    r"""Find the takes of a folder and of all folders in it, in order of their names.
+
+    Nothing is read but what tells formats apart. Who moves is told by a take's name, as in UI-PRMD
+    and CMU's motions, or else by the first folder that it lies in.
+
+    Raises:
+        RecordingError: The path holds no recording.
+
+    Example:
+        >>> from pathlib import Path
+        >>> for person in ("anna", "ben"):
+        ...     Path("walks", person).mkdir(parents=True, exist_ok=True)
+        ...     _ = Path("walks", person, "slow.csv").write_text("time_s,elbow\n0,0\n0.1,1\n")
+        >>> [(take.name, take.person) for take in find_takes("walks").takes]
+        [('anna/slow', 'anna'), ('ben/slow', 'ben')]
+    """
+    path = Path(path)
+    folders = [path]
+    if is_folder(path):
+        folders += sorted(Path(at) / each for at, inside, _ in os.walk(path) for each in inside)
+    found: list[TakeFiles] = []
+    unreadable: dict[str, RecordingError] = {}
+    for folder in folders:
+        parts = folder.relative_to(path).parts
+        try:
+            takes = _takes(folder)
+        except NothingReadableError:
+            continue
+        except RecordingError as error:
+            unreadable["/".join(parts) or str(path)] = error
+            continue
+        for name, take in takes.items():
+            person = take.person or (parts[0] if parts else "")
+            found.append(replace(take, name="/".join((*parts, name)), person=person))
+    if not found:
+        raise next(iter(unreadable.values()), _nothing_readable(path))
+    return FoundTakes(tuple(sorted(found, key=lambda take: take.name)), unreadable)
+
+
+def _nothing_readable(path: Path) -> RecordingError:
+    return NothingReadableError(
+        f"{path}: a folder with nothing readable; expected files named {', '.join(suffixes())}"
+    )
+
+
+def _takes(path: Path) -> dict[str, TakeFiles]:
     """Return the files of each take, by name."""
     if is_file(path):
-        return {stem(path): _Take(reader_for(path), (path,))}
+        name, reader = stem(path), reader_for(path)
+        return {name: TakeFiles(name, reader.person(name), (path,), reader)}
     if not is_folder(path):
         raise bad_file(path, "no such file or folder", "a recording or a folder of recordings")
     files: dict[Reader, list[Path]] = {}
     for file in sorted(path.iterdir()):
-        reader = reader_of(file)
-        if reader is not None:
-            files.setdefault(reader, []).append(file)
+        fitting = reader_of(file)
+        if fitting is not None:
+            files.setdefault(fitting, []).append(file)
     found = [
-        (name, _Take(reader, take))
+        TakeFiles(name, reader.person(name), take, reader)
         for reader, group in files.items()
         for name, take in reader.takes(group).items()
     ]
     if not found:
-        raise bad_file(
-            path, "a folder with nothing readable", f"files named {', '.join(suffixes())}"
-        )
-    names = [name for name, _ in found]
-    return dict(
-        sorted(
-            ((t.files[0].name if names.count(name) > 1 else name, t) for name, t in found),
-            key=lambda item: item[0],
-        )
-    )
+        raise _nothing_readable(path)
+    times = Counter(take.name for take in found)
+    takes = (replace(t, name=t.files[0].name) if times[t.name] > 1 else t for t in found)
+    return {take.name: take for take in sorted(takes, key=lambda take: take.name)}
 
 
 def _read(
-    name: str, take: _Take, rate_hz: float | None, positions: bool, hints: Hints | None
+    take: TakeFiles, rate_hz: float | None, positions: bool, hints: Hints | None
 ) -> Recording:
     parts = []
     for file in take.files:
@@ -233,7 +311,7 @@ def _read(
         if part.report is None:
             part = replace(part, report=ReadReport(take.reader.format, part.rate_hz))
         parts.append(part)
-    recording = parts[0] if len(parts) == 1 else joined(name, parts)
+    recording = parts[0] if len(parts) == 1 else joined(take.name, parts)
     return recording if rate_hz is None else resample(recording, rate_hz)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InvalidValueError, RecordingError
 from ..recording import Recording
-from .files import stem
+from .files import cmu_subject, stem
 
 DIRECTIONS = ("x", "-x", "y", "-y", "z", "-z")
 """Axes of a file that may point up."""
@@ -78,6 +78,10 @@ class Reader(ABC):
     def accepts(self, path: Path) -> bool:
         """Whether a file with the right suffix is one of the format, by its name or its start."""
         return True
+
+    def person(self, take: str) -> str:
+        """Return who moves in a take, as far as its name tells: CMU's ``86_01`` is of ``86``."""
+        return cmu_subject(take)
 
     def takes(self, paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:
         """Group the accepted files of a folder into takes, by name: one file is one take."""

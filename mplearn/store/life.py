@@ -17,6 +17,7 @@ from ..errors import (
     StateError,
     StoreDamagedError,
     StoreWarning,
+    StoreWriteError,
 )
 from ..learner import Event, MotionLearner
 from ..learner.events import PrimitiveMerged
@@ -41,6 +42,7 @@ class LifelongLearner:
     Args:
         learner: What learns. From now on only this object changes it.
         store: Where all is kept; None keeps it in memory only.
+        done: Keys of the recordings that it has learned (`source_key`), and will not learn again.
 
     Attributes:
         learner: To look at.
@@ -59,12 +61,14 @@ class LifelongLearner:
         Undo(entry=1)
     """
 
-    def __init__(self, learner: MotionLearner, store: Log | None = None) -> None:
+    def __init__(
+        self, learner: MotionLearner, store: Log | None = None, done: Sequence[str] = ()
+    ) -> None:
         self.learner = learner
         self.labels = Labels()
         self.store = store
         self._journal = Journal()
-        self._sources = SourcesState()
+        self._sources = SourcesState(tuple(done))
         self._source, self._taken = "", 0
         self._chunk: list[FloatArray] = []
         self._chunk_frame, self._chunk_when = learner.n_frames, 0.0
@@ -77,7 +81,7 @@ class LifelongLearner:
     def open(
         cls,
         path: str | Path,
-        create: Callable[[], MotionLearner] | None = None,
+        create: Callable[[], MotionLearner | LifelongLearner] | None = None,
         *,
         checkpoint_s: float = 30.0,
         salvage: bool = False,
@@ -104,7 +108,8 @@ class LifelongLearner:
             if found is None:
                 if create is None:
                     raise NotAStoreError(f"{path} holds no store: it was never finished")
-                life = cls(create())
+                made = create()
+                life = made if isinstance(made, LifelongLearner) else cls(made)
             else:
                 life = cls.of_found(found)
                 if found.damage:
@@ -141,6 +146,17 @@ class LifelongLearner:
             self._close_chunk()
             store, self.store = self.store, None
             store.close(self.state())
+
+    def flush(self) -> None:
+        """Wait until all that was learned so far is in the store.
+
+        Raises:
+            StoreWriteError: It could not be written; it is tried again.
+        """
+        if isinstance(self.store, Store):
+            self._close_chunk()
+            if not self.store.flush():
+                raise StoreWriteError(f"{self.store.path} cannot be written: {self.store.problem}")
 
     def __enter__(self) -> LifelongLearner:
         """Return itself."""

@@ -34,6 +34,7 @@ PUBLIC = {  # beside all of `mplearn.__all__`: what a user of each room starts f
         *("human_body", "robot_body", "marker_set", "KinematicTree", "InverseKinematics"),
         *("MotionObserver", "features_of", "keypoints_of"),
     ],
+    "mplearn.corpus": ["learn_corpus", "deal"],
     "mplearn.demonstrator": ["demonstrate"],
     "mplearn.evaluation": ["match_segments", "content_of"],
     "mplearn.generation": ["generate", "retime"],

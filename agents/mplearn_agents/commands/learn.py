@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from mplearn.errors import InvalidValueError, MPLearnError, RecordingError, StateError
 from mplearn_agents.arguments import count, positive
 from mplearn_agents.console import open_console, printable
+from mplearn_agents.corpora import add_corpus_arguments, learn_in_shards
 from mplearn_agents.live_learning import add_live_arguments, learn_from_source
 from mplearn_agents.reading import (
     add_reading_arguments,
@@ -80,6 +81,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="another setting of the learner, as in LearnerConfig: --set tree.max_chains=3 for "
         "factorial models, --set tree.durations=explicit for semi-Markov ones; may be repeated",
     )
+    add_corpus_arguments(parser, "learn")
+    parser.add_argument(
+        "--shards",
+        type=Path,
+        metavar="FOLDER",
+        help="where the stores of --jobs and --ray are kept, from which the same command goes on "
+        "(default: OUT.shards); --store then is a new store for what is merged",
+    )
     add_reading_arguments(parser)
 
 
@@ -87,6 +96,11 @@ def run(args: argparse.Namespace) -> None:
     """Learn, save the library and print a summary."""
     if (args.data is None) == (args.live is None):
         raise InvalidValueError("give a recording, or --live SOURCE")
+    if args.jobs is not None or args.ray is not None:
+        if args.live is not None:
+            raise InvalidValueError("--jobs and --ray learn recordings, not --live SOURCE")
+        learn_in_shards(args, partial(_configured, args))
+        return
     if args.out is None and args.store is None:
         raise InvalidValueError("give a library to write, --out, or a store, --store, or both")
     if args.live is not None:

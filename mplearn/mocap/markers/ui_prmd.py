@@ -46,6 +46,11 @@ class UIPRMDReader(Reader):
         """Whether the file is named like ``m01_s01_e01_positions.txt``."""
         return _NAME.fullmatch(stem(path)) is not None
 
+    def person(self, take: str) -> str:
+        """Return who moves in a take: ``m01_s01`` is of ``s01``."""
+        match = re.match(r"m\d+_(s\d+)", take)
+        return match[1] if match else ""
+
     def takes(self, paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:
         """Join consecutive repetitions of a movement by a person into a take, ``m01_s01``.
 

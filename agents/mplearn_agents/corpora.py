@@ -1,0 +1,187 @@
+"""Whole corpora on the command line: learned by many processes, while one looks on."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterable
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mplearn.errors import InvalidValueError
+
+from .arguments import count
+from .console import new_table, open_console, printable
+from .interrupts import asked_to_stop
+from .reading import hints_of
+from .tables import primitive_table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rich.console import Console
+    from rich.table import Table
+
+    from mplearn.corpus import Corpus, Executor, Progress, Reading
+    from mplearn.learner import LearnerConfig
+
+_NAMED = 3  # takes refused that the live table names
+_LISTED = 100  # that are named at the end; all are in the shards' journals
+
+
+def add_corpus_arguments(parser: argparse.ArgumentParser, verb: str) -> None:
+    """Declare who does the work."""
+    group = parser.add_argument_group("many recordings at once")
+    group.add_argument(
+        "--jobs",
+        type=count,
+        metavar="N",
+        help=f"{verb} the takes of a folder, and of the folders in it, by N processes; what comes "
+        "out does not depend on N",
+    )
+    group.add_argument(
+        "--ray",
+        nargs="?",
+        const="",
+        metavar="ADDRESS",
+        help="by the workers of a Ray cluster (mplearn[cluster]) that all see the files: the one "
+        "of this machine, or that at ADDRESS",
+    )
+
+
+@contextmanager
+def chosen_executor(args: argparse.Namespace) -> Iterator[Executor]:
+    """Return who does the work, as the options want it; let the workers go at the end."""
+    from mplearn.corpus import Processes, RayTasks
+
+    if args.jobs is not None and args.ray is not None:
+        raise InvalidValueError("give --jobs or --ray, not both")
+    executor = Processes(args.jobs) if args.ray is None else RayTasks(args.ray)
+    try:
+        yield executor
+    finally:
+        executor.close()
+
+
+def reading_of(args: argparse.Namespace) -> Reading:
+    """Return how takes are read, as the options want it."""
+    from mplearn.anatomy import read_map
+    from mplearn.corpus import Reading
+
+    names = None if args.map is None else read_map(args.map)
+    return Reading(args.observe, hints_of(args), names)
+
+
+def learn_in_shards(
+    args: argparse.Namespace, configure: Callable[[LearnerConfig], LearnerConfig]
+) -> None:
+    """Learn a folder as a corpus, save the library and print a summary."""
+    from rich.live import Live
+
+    from mplearn.corpus import learn_corpus
+    from mplearn.mocap import command_line
+    from mplearn.store import LifelongLearner, is_begun
+
+    if args.out is None and args.shards is None:
+        raise InvalidValueError("give a library to write, --out, or a folder of stores, --shards")
+    if args.store is not None and is_begun(args.store):
+        raise InvalidValueError(
+            f"--store {args.store} is begun already: a corpus is merged into a new one"
+        )
+    if args.strict:
+        raise InvalidValueError("--strict is for takes learned one after the other, not --jobs")
+    into = args.shards or args.out.with_name(args.out.name + ".shards")
+    console = open_console()
+    with (
+        command_line(),
+        asked_to_stop() as stop,
+        chosen_executor(args) as executor,
+        Live(console=console, refresh_per_second=4) as live,
+    ):
+        corpus = learn_corpus(
+            args.data,
+            into,
+            reading=reading_of(args),
+            rate_hz=args.rate_hz,
+            configure=configure,
+            executor=executor,
+            people=args.person or (),
+            show=lambda progress: live.update(progress_table(progress)),
+            stop=stop,
+        )
+    _say_refused(console, corpus.refused.items())
+    if corpus.learner is None:
+        console.print(
+            f"Stopped: what was learned until then is in {printable(str(into))}. The same command "
+            "goes on from there.",
+            markup=False,
+        )
+        return
+    life = LifelongLearner(corpus.learner, done=corpus.keys)
+    library = life.snapshot(shown_once=args.demonstrations == 1)
+    if not len(library):
+        library = life.snapshot(shown_once=True)
+    written = [into]
+    if args.out is not None:
+        args.out.parent.mkdir(parents=True, exist_ok=True)
+        library.save(args.out)
+        written.insert(0, args.out)
+    if args.store is not None:
+        args.store.parent.mkdir(parents=True, exist_ok=True)
+        LifelongLearner.open(args.store, lambda: life).close()
+        written.append(args.store)
+    console.print(primitive_table(library))
+    console.print(_summary(corpus, written), markup=False)
+
+
+def _summary(corpus: Corpus, written: Iterable[Path]) -> str:
+    progress, learner = corpus.progress, corpus.learner
+    assert learner is not None
+    people = len({shard.person for shard in corpus.shards if shard.person})
+    memory = max(report.memory_bytes for report in corpus.reports)
+    return (
+        f"{len(learner.tree.leaves)} primitives from {progress.learned} takes of "
+        f"{people or 'unnamed'} people in {progress.shards} shards, {progress.watched_s / 60:.1f} "
+        f"minutes of motion; merging took {corpus.merging_s:.1f} s, a worker had "
+        f"{memory / 2**20:.0f} MB at most; written to "
+        f"{printable(' and '.join(str(path) for path in written))}"
+    )
+
+
+def _say_refused(console: Console, refused: Iterable[tuple[str, str]]) -> None:
+    named = list(refused)
+    for name, why in named[:_LISTED]:
+        text = printable(f"left out: {name}: {why}")
+        console.print(text, markup=False, highlight=False, style="yellow")
+    if len(named) > _LISTED:
+        console.print(f"left out: {len(named) - _LISTED} more, named in the shards' journals")
+
+
+def progress_table(progress: Progress) -> Table:
+    """Return how far the learning of a corpus is."""
+    table = new_table("learning a corpus", "what", "how far")
+    left = "" if progress.left_s is None else f", {duration(progress.left_s)} left"
+    done = progress.learned + len(progress.refused)
+    table.add_row("takes", f"{done} of {progress.takes}, {progress.rate:.2f} a second{left}")
+    table.add_row("motion", f"{duration(progress.watched_s)} learned")
+    table.add_row("shards", f"{progress.done} of {progress.shards}, {progress.merged} merged")
+    known = f"{progress.primitives}, each shard's by themselves"
+    table.add_row("primitives known", known)
+    last = ", ".join(list(progress.refused)[-_NAMED:])
+    table.add_row("left out", printable(f"{len(progress.refused)}{': ... ' if last else ''}{last}"))
+    if progress.deaths:
+        table.add_row("workers died", f"{progress.deaths}; what they did is taken up again")
+    return table
+
+
+def duration(seconds: float) -> str:
+    """Return a time as people say it.
+
+    >>> duration(42.0), duration(200.0), duration(7000.0)
+    ('42 s', '3 min 20 s', '1 h 57 min')
+    """
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes} min"
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"

@@ -1,0 +1,51 @@
+"""The workers of a Ray cluster [Moritz2018], on one machine or on many that see the same files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any, TypeVar
+
+from ..errors import CorpusError
+from ..extras import require
+
+T = TypeVar("T")
+
+_RETRIES = 3  # of a task whose machine or process is lost
+
+
+class RayTasks:
+    """Does the work as tasks of Ray, which are tried again where a worker or a machine is lost.
+
+    All machines need mplearn, and see the recordings and the folder of stores under the same paths.
+
+    Args:
+        address: Of a cluster's head (``"auto"``: the one that this machine belongs to); empty
+            starts one on this machine alone.
+
+    Raises:
+        MissingDependencyError: Ray is not installed (extra ``cluster``).
+        CorpusError: There is no such cluster.
+    """
+
+    def __init__(self, address: str = "") -> None:
+        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+        self._ray: Any = require("ray", "cluster")
+        self._own = not self._ray.is_initialized()
+        if self._own:
+            try:
+                self._ray.init(address=address or "local", log_to_driver=False)
+            except (ConnectionError, ValueError, RuntimeError) as error:
+                raise CorpusError(f"no Ray cluster at {address!r}: {error}") from error
+
+    def submit(self, work: Callable[..., T], *args: Any) -> Future[T]:
+        """Have ``work(*args)`` done by one of the cluster's workers."""
+        task = self._ray.remote(max_retries=_RETRIES)(work)
+        future: Future[T] = task.remote(*args).future()
+        return future
+
+    def close(self) -> None:
+        """Leave the cluster, or end the one that was started here."""
+        if self._own:
+            self._ray.shutdown()

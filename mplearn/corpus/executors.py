@@ -1,0 +1,111 @@
+"""Who does the work: this process, processes of this machine, or (`cluster`) those of many."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from typing import Any, Protocol, TypeVar
+
+from ..errors import InvalidValueError
+
+T = TypeVar("T")
+
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+class Executor(Protocol):
+    """Does work that needs nothing but its arguments, in any order."""
+
+    def submit(self, work: Callable[..., T], *args: Any) -> Future[T]:
+        """Have ``work(*args)`` done; a dead worker is an error of the future, not of this call."""
+
+    def close(self) -> None:
+        """Let the workers go."""
+
+
+class Here:
+    """Does the work in this process, at once."""
+
+    def submit(self, work: Callable[..., T], *args: Any) -> Future[T]:
+        """Do ``work(*args)`` and return what came of it."""
+        future: Future[T] = Future()
+        try:
+            future.set_result(work(*args))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+    def close(self) -> None:
+        """Do nothing: there is nobody to let go."""
+
+
+class Processes:
+    """Does the work in processes of this machine, each started anew (spawn), of one thread.
+
+    A process that dies takes what the others are doing with it; what is submitted after that is
+    done by new ones.
+
+    Args:
+        jobs: How many.
+
+    Raises:
+        InvalidValueError: ``jobs`` is not positive.
+    """
+
+    def __init__(self, jobs: int) -> None:
+        if jobs < 1:
+            raise InvalidValueError(f"jobs must be at least 1, not {jobs}")
+        self.jobs = jobs
+        self._pool: ProcessPoolExecutor | None = None
+
+    def submit(self, work: Callable[..., T], *args: Any) -> Future[T]:
+        """Have ``work(*args)`` done by one of the processes."""
+        with _one_thread():  # processes are started as they are needed
+            if self._pool is not None:
+                try:
+                    return self._pool.submit(work, *args)
+                except BrokenExecutor:
+                    self._pool.shutdown()
+            self._pool = ProcessPoolExecutor(
+                self.jobs, multiprocessing.get_context("spawn"), _prepare
+            )
+            return self._pool.submit(work, *args)
+
+    def close(self) -> None:
+        """End the processes, once they are done with what they do."""
+        if self._pool is not None:
+            self._pool.shutdown(cancel_futures=True)
+            self._pool = None
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Let processes that are started meanwhile have one thread each: there is one a core."""
+    before = {name: os.environ.get(name) for name in _ONE_THREAD}
+    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name)
+            else:
+                os.environ[name] = value
+
+
+def _prepare() -> None:
+    """Leave Ctrl-C to the parent, and end with it, however it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -1,0 +1,42 @@
+"""Corpora on the command line."""
+
+from pathlib import Path
+
+import pytest
+
+from mplearn.library import PrimitiveLibrary
+from mplearn.store import StoreReader
+from mplearn_agents.cli import main
+
+
+def test_a_folder_is_learned_by_processes_and_goes_on(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, store = tmp_path / "all.mplearn", tmp_path / "all.db"
+    asked = ["learn", str(folder), "--out", str(out), "--jobs", "1"]
+    assert main([*asked, "--store", str(store)]) == 0
+    said = capsys.readouterr().out
+    assert "8 takes of 3 people in 4 shards" in said
+    assert "left out: ben/broken: " in said
+    library = PrimitiveLibrary.load(out)
+    assert PrimitiveLibrary.load(store).version == library.version
+    assert len(StoreReader(store).life.state().sources.done) == 8
+    before = out.read_bytes()
+    assert main(asked) == 0
+    assert out.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (["--jobs", "1"], "--out"),
+        (["--jobs", "1", "--ray", "--out", "x"], "not both"),
+        (["--jobs", "1", "--strict", "--out", "x"], "--strict"),
+        (["--jobs", "0", "--out", "x"], "--jobs must be at least 1, not 0"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(
+    options: list[str], why: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["learn", str(folder), *options]) == 2
+    assert why in capsys.readouterr().err

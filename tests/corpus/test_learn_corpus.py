@@ -1,0 +1,262 @@
+"""A corpus is the same whatever the workers, and whatever happens to them."""
+
+import multiprocessing
+import os
+import random
+import shutil
+import signal
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import pytest
+from corpus_folder import write_take
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mplearn.corpus import Corpus, Progress, Reading, Shard, deal, learn_corpus
+from mplearn.corpus.shard import ShardJournal
+from mplearn.errors import CorpusError, InvalidValueError, RecordingError
+from mplearn.merging import merge_learners
+from mplearn.mocap import Hints, TakeFiles, readers, register_reader, registry
+from mplearn.mocap.markers.csv_table import CSVReader
+from mplearn.recording import Recording
+from mplearn.store import StoreReader
+
+
+def saved(corpus: Corpus, folder: Path) -> bytes:
+    assert corpus.learner is not None
+    return corpus.learner.save(folder / "whole.mplearn").read_bytes()
+
+
+class Shuffled:
+    """Does all that was submitted so far in an order of its own, when the first is asked for."""
+
+    def __init__(self, seed: int) -> None:
+        self._random = random.Random(seed)
+        self._todo: list[tuple[Future[Any], Callable[..., Any], tuple[Any, ...]]] = []
+        self._lock = threading.Lock()
+        self.order: list[str] = []
+
+    def submit(self, work: Callable[..., Any], *args: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        with self._lock:
+            self._todo.append((future, work, args))
+            if len(self._todo) == 1:
+                threading.Timer(0.05, self._do).start()
+        return future
+
+    def _do(self) -> None:
+        with self._lock:
+            todo, self._todo = self._todo, []
+        self._random.shuffle(todo)
+        for future, work, args in todo:
+            self.order.append(str(args[0]))
+            try:
+                future.set_result(work(*args))
+            except Exception as error:
+                future.set_exception(error)
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.fixture(scope="module")
+def alone(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """What one process after another learns."""
+    into = tmp_path_factory.mktemp("alone")
+    corpus = learn_corpus(folder, into / "shards", jobs=0)
+    assert list(corpus.refused) == ["ben/broken"]
+    assert "broken.csv" in corpus.refused["ben/broken"]
+    assert [shard.person for shard in corpus.shards] == ["anna", "ben", "cleo", ""]
+    assert corpus.progress.learned == 8
+    assert corpus.progress.merged == 3
+    return saved(corpus, into)
+
+
+def test_the_order_in_which_shards_are_done_changes_no_byte(
+    folder: Path, alone: bytes, tmp_path: Path
+) -> None:
+    orders = set()
+    for seed in (1, 2):
+        workers = Shuffled(seed)
+        corpus = learn_corpus(folder, tmp_path / f"{seed}", executor=workers)
+        assert saved(corpus, tmp_path) == alone
+        orders.add(tuple(workers.order))
+    assert len(orders) == 2
+
+
+def _writer_of(into: Path) -> int:
+    """Return the process that writes to a store there; 0 for none."""
+    for lock in into.glob("*.lock"):
+        words = lock.read_text(encoding="utf-8").split()
+        if words:
+            return int(words[1])
+    return 0
+
+
+class StopsAfter:
+    """Sets an event once so many takes are done, and looks on."""
+
+    def __init__(self, n_takes: int) -> None:
+        self.stop, self._n = threading.Event(), n_takes
+
+    def __call__(self, progress: Progress) -> None:
+        if progress.learned >= self._n:
+            self.stop.set()
+
+
+def test_stopped_it_goes_on(folder: Path, alone: bytes, tmp_path: Path) -> None:
+    stops = StopsAfter(2)
+    first = learn_corpus(folder, tmp_path / "s", jobs=0, show=stops, stop=stops.stop)
+    assert first.learner is None
+    assert 2 <= first.progress.learned < 8
+    again = learn_corpus(folder, tmp_path / "s", jobs=0)
+    assert again.progress.already >= first.progress.learned
+    assert saved(again, tmp_path) == alone
+    third = learn_corpus(folder, tmp_path / "s", jobs=0)
+    assert third.progress.already == 9
+    assert saved(third, tmp_path) == alone
+
+
+class Poison(CSVReader):
+    """A reader that ends the process at one take, and has a fault at another."""
+
+    format = "poison"
+    suffixes = (".poison",)
+
+    def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
+        if path.stem == "fault":
+            raise ZeroDivisionError("a fault of a reader")
+        if multiprocessing.parent_process() is not None:
+            os.kill(os.getpid(), signal.SIGKILL)
+        raise RecordingError("not here")
+
+
+def test_what_kills_a_process_is_named_and_nothing_else_is_lost(
+    folder: Path, alone: bytes, tmp_path: Path
+) -> None:
+    takes = tmp_path / "takes"
+    shutil.copytree(folder, takes)
+    for name in ("fault", "kill"):
+        (takes / "cleo" / f"{name}.poison").write_text("x", encoding="utf-8")
+    killed, seen = [], []
+
+    def kill(progress: Progress) -> None:
+        """End a worker in the middle of its work, too."""
+        seen.append(progress.learned)
+        if not killed and progress.learned >= 1:
+            worker = _writer_of(tmp_path / "s")
+            if worker:
+                os.kill(worker, signal.SIGKILL)
+                killed.append(worker)
+
+    register_reader(Poison())
+    try:
+        corpus = learn_corpus(takes, tmp_path / "s", jobs=2, show=kill)
+    finally:
+        registry._registered[:] = [r for r in readers() if not isinstance(r, Poison)]
+    assert killed
+    assert seen == sorted(seen)
+    assert sorted(corpus.refused) == ["ben/broken", "cleo/fault", "cleo/kill"]
+    assert "2 times: the process ended" in corpus.refused["cleo/kill"]
+    assert "ZeroDivisionError: a fault of a reader" in corpus.refused["cleo/fault"]
+    assert corpus.progress.deaths >= 4
+    assert corpus.progress.learned == 8
+    assert all(report.memory_bytes > 1e6 for report in corpus.reports if report.learned)
+    assert saved(corpus, tmp_path) == alone
+
+
+def test_what_came_since_is_learned_in_shards_of_its_own(tmp_path: Path) -> None:
+    for seed, name in enumerate(["anna/a", "ben/a"]):
+        write_take(tmp_path / "takes" / f"{name}.csv", 15.0, seed)
+    first = learn_corpus(tmp_path / "takes", tmp_path / "s", jobs=0)
+    write_take(tmp_path / "takes" / "anna" / "0.csv", 15.0, 5)
+    more = learn_corpus(tmp_path / "takes", tmp_path / "s", jobs=0)
+    assert more.shards == (*first.shards, Shard("anna", ("anna/0",)))
+    assert more.progress.already == 2
+    assert more.learner is not None
+    assert first.learner is not None
+    assert more.learner.n_frames == first.learner.n_frames * 3 // 2
+
+
+def test_other_rules_are_refused(folder: Path, tmp_path: Path) -> None:
+    stops = StopsAfter(1)
+    learn_corpus(folder, tmp_path / "s", jobs=0, show=stops, stop=stops.stop)
+    for other in ({"reading": Reading("channels")}, {"rate_hz": 25.0}):
+        with pytest.raises(InvalidValueError, match="other rules"):
+            learn_corpus(folder, tmp_path / "s", jobs=0, **other)
+    (tmp_path / "s" / "plan.json").write_text("{", encoding="utf-8")
+    with pytest.raises(InvalidValueError, match=r"plan\.json"):
+        learn_corpus(folder, tmp_path / "s", jobs=0)
+
+
+def test_nothing_to_learn_is_said(tmp_path: Path) -> None:
+    (tmp_path / "takes").mkdir()
+    with pytest.raises(RecordingError, match="nothing readable"):
+        learn_corpus(tmp_path / "takes", tmp_path / "s", jobs=0)
+    (tmp_path / "takes" / "a.csv").write_text("time_s,a\n0,x\n", encoding="utf-8")
+    with pytest.raises(RecordingError, match=r"a\.csv"):
+        learn_corpus(tmp_path / "takes", tmp_path / "s", jobs=0)
+    with pytest.raises(InvalidValueError, match="jobs"):
+        learn_corpus(tmp_path / "takes", tmp_path / "s", jobs=-1)
+
+
+def test_workers_that_die_at_once_end_it(folder: Path, tmp_path: Path) -> None:
+    class Dying:
+        def submit(self, work: Callable[..., Any], *args: Any) -> Future[Any]:
+            future: Future[Any] = Future()
+            future.set_exception(RuntimeError("no room"))
+            return future
+
+        def close(self) -> None:
+            pass
+
+    with pytest.raises(CorpusError, match="no room"):
+        learn_corpus(folder, tmp_path / "s", executor=Dying())
+
+
+def test_the_tree_merges_as_merging_does(folder: Path, alone: bytes, tmp_path: Path) -> None:
+    stores = tmp_path / "s"
+    learn_corpus(folder, stores, jobs=0)
+    parts = [StoreReader(stores / f"{k:04d}.db").life.learner for k in range(4)]
+    assert merge_learners(parts).save(tmp_path / "whole.mplearn").read_bytes() == alone
+
+
+NAMES = st.lists(
+    st.tuples(st.sampled_from(["", "anna", "ben"]), st.integers(0, 99)), max_size=40, unique=True
+)
+
+
+def _files(names: list[tuple[str, int]]) -> list[TakeFiles]:
+    return [TakeFiles(f"{who}/{k:02d}", who, (), CSVReader()) for who, k in names]
+
+
+@given(NAMES, st.integers(1, 7), st.randoms())
+def test_dealing_depends_on_the_takes_alone(
+    names: list[tuple[str, int]], size: int, order: random.Random
+) -> None:
+    shards = deal(_files(names), size)
+    shuffled = list(names)
+    order.shuffle(shuffled)
+    assert deal(_files(shuffled), size) == shards
+    dealt = [name for shard in shards for name in shard.takes]
+    assert sorted(dealt) == sorted(take.name for take in _files(names))
+    assert all(1 <= len(shard.takes) <= size for shard in shards)
+    assert all(name.startswith(shard.person) for shard in shards for name in shard.takes)
+    assert deal(_files(names), size, shards) == shards
+
+
+def test_a_journal_torn_by_a_death_is_read_on(tmp_path: Path) -> None:
+    journal = ShardJournal(tmp_path / "0000.db")
+    journal.write("begun", "a")
+    with journal.path.open("a", encoding="utf-8") as file:
+        file.write('{"what": "lear')
+    again = ShardJournal(tmp_path / "0000.db")
+    again.write("begun", "a")
+    again.refresh()
+    assert again.deaths("a") == 2
+    assert not again.is_done("a")
+    assert ShardJournal(tmp_path / "0000.db").deaths("a") == 2
