@@ -1,7 +1,8 @@
 """The ``mplearn`` command: one sub-command a module in `mplearn_agents.commands`.
 
 Exit codes, of all commands: 0 done; 1 what was checked is not in order (``doctor``, ``export
---check``); 2 bad input, with one line on standard error; 130 interrupted.
+--check``); 2 bad input, with one line on standard error; 130 interrupted (``learn`` writes what it
+has learned first; who looks at a live source ends it by Ctrl-C, which is no interruption).
 """
 
 from __future__ import annotations
@@ -13,24 +14,30 @@ import pkgutil
 import re
 import sys
 from collections.abc import Sequence
-from importlib.metadata import version
 from types import ModuleType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from mplearn.errors import InvalidValueError, MPLearnError
 
 from . import commands
-from .console import inert_output
-
-#: What `main` returns where something that was checked is not in order.
-NOT_IN_ORDER = 1
-#: What `main` returns for bad input, as argparse does for a bad option.
-BAD_INPUT = 2
-#: What `main` returns where a person interrupted it.
-INTERRUPTED = 130
+from .exit_codes import BAD_INPUT, INTERRUPTED
+from .inert import inert_output
 
 _OF_AN_OPTION = re.compile(r"argument (?P<option>--[\w-]+): (?P<problem>must .*)", re.DOTALL)
 _CODES = """exit codes: 0 done; 1 what was checked is not in order; 2 bad input; 130 interrupted"""
+
+
+class _Version(argparse.Action):
+    """Prints which version this is."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str) -> None:
+        super().__init__(option_strings, dest, nargs=0, help="print the version, and end")
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
+        from importlib.metadata import version
+
+        print(f"mplearn {version('mplearn')}")
+        parser.exit()
 
 
 class _Parser(argparse.ArgumentParser):
@@ -59,7 +66,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: Sequence[str] | None) -> int:
     try:
-        args = build_parser().parse_args(argv)
+        words = sys.argv[1:] if argv is None else list(argv)
+        args = build_parser(words).parse_args(words)
         code = args.run(args)
         sys.stdout.flush()
     except MPLearnError as error:
@@ -72,16 +80,28 @@ def _run(argv: Sequence[str] | None) -> int:
     return 0 if code is None else int(code)
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """Return the parser of all commands."""
+def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
+    """Return the parser of all commands.
+
+    Args:
+        words: What will be parsed: of other commands than the one in it only the names are there,
+            for to learn what they take costs seconds. None for all that all take.
+    """
+    known, named = _names(), None
+    if words is not None:
+        named = next((word for word in words if not word.startswith("-")), "")
     parser = _Parser(
         prog="mplearn",
         description="Learn motion primitives and their order by watching people, and perform them.",
         epilog=_CODES,
     )
-    parser.add_argument("--version", action="version", version=f"mplearn {version('mplearn')}")
+    parser.add_argument("--version", action=_Version)
     found = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for name, module in command_modules().items():
+    for name in known:
+        if named in known and name != named:
+            found.add_parser(name)
+            continue
+        module = _module(name)
         command = found.add_parser(
             name,
             help=module.HELP,
@@ -89,15 +109,23 @@ def build_parser() -> argparse.ArgumentParser:
             epilog=f"example:\n  {module.EXAMPLE}\n\n{_CODES}",
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        module.add_arguments(command)
-        command.set_defaults(run=module.run)
+        if named in (None, name):
+            module.add_arguments(command)
+            command.set_defaults(run=module.run)
     return parser
 
 
 def command_modules() -> dict[str, ModuleType]:
     """Return the modules of `commands` by name, see there."""
-    names = sorted(module.name for module in pkgutil.iter_modules(commands.__path__))
-    return {name: importlib.import_module(f"{commands.__name__}.{name}") for name in names}
+    return {name: _module(name) for name in _names()}
+
+
+def _names() -> list[str]:
+    return sorted(module.name for module in pkgutil.iter_modules(commands.__path__))
+
+
+def _module(name: str) -> ModuleType:
+    return importlib.import_module(f"{commands.__name__}.{name}")
 
 
 def _refuse(message: str) -> int:

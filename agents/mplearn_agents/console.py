@@ -1,76 +1,17 @@
-"""What commands say: text that nobody's name can turn into anything else, and tables that fit.
-
-Names come from anywhere: files, people, the network. All that is printed passes through here, where
-what would steer a terminal is spelled out, and nothing is markup.
-"""
+"""What commands print: text that is text (`inert`), and tables that fit; nothing is markup."""
 
 from __future__ import annotations
 
-import re
-import sys
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from typing import Any, TextIO
+from collections.abc import Iterable
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-_UNUSUAL = re.compile(r"[^ -~]")
+from .inert import printable
+
 _ENDLESS = 100_000  # columns where no terminal cuts or wraps
-
-
-def printable(text: str, keep: str = "") -> str:
-    """Return a text in which what would steer a terminal, in names of a file, is spelled out.
-
-    Control characters and escapes, lone surrogates, and controls of the writing's direction become
-    what Python writes for them; characters of ``keep`` stay.
-    """
-
-    def spelled(found: re.Match[str]) -> str:
-        c = found.group()
-        return c if c.isprintable() or c in keep else ascii(c)[1:-1]
-
-    return _UNUSUAL.sub(spelled, text)
-
-
-class InertStream:
-    """A text stream on which only lines of printable text come out.
-
-    Args:
-        stream: Where they go; what it cannot encode is spelled out.
-    """
-
-    def __init__(self, stream: TextIO) -> None:
-        self.rich_proxied_file = stream  # rich writes past this: `InertConsole` cleans its text
-
-    def write(self, text: str) -> int:
-        """Write a text, spelling out what is not printable."""
-        stream = self.rich_proxied_file
-        encoding = stream.encoding or "utf-8"
-        plain = printable(text, "\n").encode(encoding, "backslashreplace").decode(encoding)
-        stream.write(plain)
-        return len(text)
-
-    def writelines(self, lines: Iterable[str]) -> None:
-        """Write texts one after the other."""
-        for line in lines:
-            self.write(line)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.rich_proxied_file, name)
-
-
-@contextmanager
-def inert_output() -> Iterator[None]:
-    """Let nothing printed inside steer the terminal."""
-    before = sys.stdout, sys.stderr
-    sys.stdout, sys.stderr = InertStream(before[0]), InertStream(before[1])
-    try:
-        yield
-    finally:
-        sys.stdout, sys.stderr = before
 
 
 class InertConsole(Console):

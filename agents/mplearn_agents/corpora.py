@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 from mplearn.errors import InvalidValueError
 
 from .arguments import count
-from .console import new_table, open_console, printable
+from .exit_codes import INTERRUPTED
+from .inert import printable
 from .interrupts import asked_to_stop
 from .reading import hints_of
-from .tables import primitive_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -74,13 +74,16 @@ def reading_of(args: argparse.Namespace) -> Reading:
 
 def learn_in_shards(
     args: argparse.Namespace, configure: Callable[[LearnerConfig], LearnerConfig]
-) -> None:
-    """Learn a folder as a corpus, save the library and print a summary."""
+) -> int:
+    """Learn a folder as a corpus, save the library and print a summary; return the exit code."""
     from rich.live import Live
 
     from mplearn.corpus import learn_corpus
     from mplearn.mocap import command_line
     from mplearn.store import LifelongLearner, is_begun
+
+    from .console import open_console
+    from .tables import primitive_table
 
     if args.out is None and args.shards is None:
         raise InvalidValueError("give a library to write, --out, or a folder of stores, --shards")
@@ -116,7 +119,7 @@ def learn_in_shards(
             "goes on from there.",
             markup=False,
         )
-        return
+        return INTERRUPTED
     life = LifelongLearner(corpus.learner, done=corpus.keys)
     library = life.snapshot(shown_once=args.demonstrations == 1)
     if not len(library):
@@ -132,6 +135,7 @@ def learn_in_shards(
         written.append(args.store)
     console.print(primitive_table(library))
     console.print(_summary(corpus, written), markup=False)
+    return 0
 
 
 def _summary(corpus: Corpus, written: Iterable[Path]) -> str:
@@ -159,6 +163,8 @@ def _say_refused(console: Console, refused: Iterable[tuple[str, str]]) -> None:
 
 def progress_table(progress: Progress) -> Table:
     """Return how far the learning of a corpus is."""
+    from .console import new_table
+
     table = new_table("learning a corpus", "what", "how far")
     left = "" if progress.left_s is None else f", {duration(progress.left_s)} left"
     done = progress.learned + len(progress.refused)

@@ -24,7 +24,7 @@ from mplearn.learner import (
 from mplearn.recording import Segment
 from mplearn.sources import Change
 
-from .console import printable
+from .inert import printable
 
 
 def event_text(event: Event, rate_hz: float) -> str | None:

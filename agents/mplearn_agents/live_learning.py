@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from mplearn.errors import RecordingError
 
 from .arguments import pace, positive
-from .console import open_console, printable
+from .inert import printable
 from .interrupts import asked_to_stop
 from .reading import hints_of
 
@@ -93,6 +93,8 @@ def learn_from_source(
     from mplearn.mocap import command_line
     from mplearn.sources import open_source
     from mplearn.store import LifelongLearner, is_begun
+
+    from .console import open_console
 
     console = open_console(stderr=args.json)
     has_begun = args.store is not None and is_begun(args.store)

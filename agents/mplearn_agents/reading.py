@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from mplearn.errors import InvalidValueError
 
 from .arguments import positive
-from .console import printable
+from .inert import printable
 
 if TYPE_CHECKING:
     from rich.console import Console

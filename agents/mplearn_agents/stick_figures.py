@@ -11,7 +11,7 @@ import numpy as np
 from mplearn.body import human_body, posture_of
 from mplearn.recording import FloatArray
 
-from .console import printable
+from .inert import printable
 from .inspection import Inspection, plain_points
 
 LEFT, RIGHT, MIDDLE, OTHER = "#c1272d", "#0f5e9c", "#222222", "#b0b0b0"

@@ -17,7 +17,8 @@ from rich.table import Table
 from mplearn.library import PrimitiveLibrary
 from mplearn_agents import console as consoles
 from mplearn_agents.cli import build_parser, command_modules, main
-from mplearn_agents.console import InertConsole, InertStream, inert_output, printable
+from mplearn_agents.console import InertConsole
+from mplearn_agents.inert import InertStream, inert_output, printable
 from mplearn_envs.data.library_source import LibrarySource
 
 COMMANDS = sorted(command_modules())
@@ -47,6 +48,28 @@ def test_the_help_has_an_example_that_parses(command, capsys):
     assert words[:2] == ["mplearn", command]
     args = build_parser().parse_args(words[1:])
     assert args.run is command_modules()[command].run
+
+
+def test_every_action_of_a_store_has_an_example_that_parses(capsys):
+    actions = said(capsys, "store", "nothing")[2].split("choose from ")[1].rstrip(")\n")
+    for action in actions.replace("'", "").split(", "):
+        code, out, _ = said(capsys, "store", action, "--help")
+        example = out.split("example:\n")[1].strip()
+        assert code == 0 and example.startswith(f"mplearn store {action} life.db")
+        assert build_parser().parse_args(shlex.split(example)[1:]).store.name == "life.db"
+
+
+def test_only_the_named_command_is_asked_what_it_takes(capsys):
+    """What takes long to import is imported by who needs it."""
+    code = "import sys\nfrom mplearn_agents.cli import main\ntry:\n    main(sys.argv[1:])\n"
+    code += "except SystemExit:\n    pass\nprint(*sys.modules, sep='\\n')"
+    for words in (["--help"], ["show", "--help"], ["store", "log", "--help"]):
+        done = subprocess.run(
+            [sys.executable, "-c", code, *words], capture_output=True, text=True, check=True
+        )
+        loaded = set(done.stdout.split("\n"))
+        assert "usage: mplearn" in done.stdout
+        assert not loaded & {"numpy", "numba", "rich", "mujoco", "gymnasium", "importlib.metadata"}
 
 
 def options_with(command, kinds):

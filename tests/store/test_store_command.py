@@ -5,6 +5,7 @@ import os
 import signal
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rich.console import Console
 from streams import CHANNELS, RATE_HZ, learner, stream
@@ -61,6 +62,33 @@ def test_learning_that_is_stopped_goes_on(
         assert life.learner.state() == whole.state()
         log = learn(life, TAKES, console, taken=life.taken)
         assert (log.already, len(log.segments), log.refused) == (3, 0, {})
+
+
+@pytest.mark.parametrize(("stop", "code"), [(12, 130), (10**9, 0)])
+def test_who_interrupts_learning_is_told_so_and_keeps_what_was_learned(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    stop: int,
+    code: int,
+) -> None:
+    frames = TAKES[0].frames
+    rows = np.column_stack((np.arange(len(frames)) / RATE_HZ, frames))
+    data, out = tmp_path / "take.csv", tmp_path / "out.mplearn"
+    np.savetxt(data, rows, delimiter=",", header="time,a,b,c,d", comments="")
+    shown, left = mplearn_agents.learning._show, [stop]
+
+    def show(*args: object) -> None:
+        left[0] -= 1
+        if left[0] == 0:
+            os.kill(os.getpid(), signal.SIGINT)
+        shown(*args)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(mplearn_agents.learning, "_show", show)
+    argv = ["learn", str(data), "--observe", "channels", "--out", str(out)]
+    assert main(argv) == code
+    assert ("Stopped: what was learned" in capsys.readouterr().out) == bool(code)
+    PrimitiveLibrary.load(out)
 
 
 def test_commands(store: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from mplearn_agents.console import new_table, open_console
+from mplearn_agents.exit_codes import NOT_IN_ORDER
 
 HELP = (
     "Check this installation: versions, extras, rendering, data; say what to do. 1: not in order."
@@ -22,6 +22,7 @@ def run(args: argparse.Namespace) -> int:
     """Check, print, and return 1 where something that is needed does not work."""
     from rich.text import Text
 
+    from mplearn_agents.console import new_table, open_console
     from mplearn_agents.diagnosis import diagnose
 
     found = list(diagnose())
@@ -33,4 +34,4 @@ def run(args: argparse.Namespace) -> int:
         for each in found:
             table.add_row(each.what, Text(each.state, colours[each.state]), each.found, each.advice)
         open_console().print(table)
-    return int(any(each.state == "wrong" for each in found))
+    return NOT_IN_ORDER if any(each.state == "wrong" for each in found) else 0

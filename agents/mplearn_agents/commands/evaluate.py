@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from mplearn.errors import InvalidValueError, MPLearnError
 from mplearn_agents.arguments import count, seed
 
-from ..evaluations import BUILT_IN, Setting, evaluations_for
 from ..reading import say_left_out
 
 if TYPE_CHECKING:
@@ -23,6 +22,8 @@ EXAMPLE = "mplearn evaluate synthetic --only segmentation"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
+    from ..evaluations import BUILT_IN
+
     parser.add_argument(
         "data",
         help=f"{' or '.join(repr(name) for name in BUILT_IN)}; a recording or folder whose labels "
@@ -51,6 +52,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> None:
     """Run the experiments; print each table as it is done."""
     from mplearn_agents.console import open_console
+
+    from ..evaluations import BUILT_IN, Setting, evaluations_for
 
     console = open_console()
     setting = Setting(args.data, tuple(args.seeds), args.orders, _wrong(args))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from mplearn.errors import InvalidValueError
 from mplearn_agents.arguments import count, positive, primitive_key, seed
+from mplearn_agents.exit_codes import NOT_IN_ORDER
 
 if TYPE_CHECKING:
     from mplearn_envs.export import Verdict
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
 HELP = "Export what a robot performs of a library, a path or a walk; or check such a file."
 EXAMPLE = "mplearn export my.mplearn 'bow down' 'bow up' --robot unitree_g1 --to mjlab"
-_NOT_IN_ORDER = 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -128,7 +128,7 @@ def _check(args: argparse.Namespace) -> int:
     else:
         for verdict in verdicts:
             _print(args.check, model.name, verdict)
-    return 0 if all(verdict.in_order for verdict in verdicts) else _NOT_IN_ORDER
+    return 0 if all(verdict.in_order for verdict in verdicts) else NOT_IN_ORDER
 
 
 def _print(path: Path, robot: str, verdict: Verdict) -> None:

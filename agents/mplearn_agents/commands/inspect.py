@@ -8,7 +8,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mplearn_agents.console import open_console
 from mplearn_agents.reading import add_reading_arguments, hints_of, say_left_out
 
 if TYPE_CHECKING:
@@ -37,6 +36,7 @@ def run(args: argparse.Namespace) -> None:
     """Read, recognise, print and draw."""
     from mplearn.anatomy import read_map
     from mplearn.mocap import command_line, open_takes
+    from mplearn_agents.console import open_console
     from mplearn_agents.inspection import inspect
 
     console = open_console()

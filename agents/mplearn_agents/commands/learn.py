@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import InvalidValueError, MPLearnError, RecordingError, StateError
 from mplearn_agents.arguments import count, positive
-from mplearn_agents.console import open_console, printable
 from mplearn_agents.corpora import add_corpus_arguments, learn_in_shards
+from mplearn_agents.exit_codes import INTERRUPTED
+from mplearn_agents.inert import printable
 from mplearn_agents.live_learning import add_live_arguments, learn_from_source
 from mplearn_agents.reading import (
     add_reading_arguments,
@@ -92,28 +93,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_reading_arguments(parser)
 
 
-def run(args: argparse.Namespace) -> None:
-    """Learn, save the library and print a summary."""
+def run(args: argparse.Namespace) -> int:
+    """Learn, save the library and print a summary; return 130 where not all was learned."""
     if (args.data is None) == (args.live is None):
         raise InvalidValueError("give a recording, or --live SOURCE")
     if args.jobs is not None or args.ray is not None:
         if args.live is not None:
             raise InvalidValueError("--jobs and --ray learn recordings, not --live SOURCE")
-        learn_in_shards(args, partial(_configured, args))
-        return
+        return learn_in_shards(args, partial(_configured, args))
     if args.out is None and args.store is None:
         raise InvalidValueError("give a library to write, --out, or a store, --store, or both")
     if args.live is not None:
         learn_from_source(args, partial(_configured, args))
-    else:
-        _learn_from_files(args)
+        return 0
+    return _learn_from_files(args)
 
 
-def _learn_from_files(args: argparse.Namespace) -> None:
+def _learn_from_files(args: argparse.Namespace) -> int:
     from mplearn.evaluation import observe
     from mplearn.learner import LearnerConfig, with_takes
     from mplearn.mocap import command_line, open_takes
     from mplearn.store import LifelongLearner, is_begun
+    from mplearn_agents.console import open_console
     from mplearn_agents.learning import learn, why_nothing
     from mplearn_agents.tables import primitive_table
 
@@ -186,6 +187,7 @@ def _learn_from_files(args: argparse.Namespace) -> None:
             f"{log.reasons}",
             markup=False,
         )
+    return INTERRUPTED if log.stopped else 0
 
 
 def _new_life(args: argparse.Namespace, config: LearnerConfig, stack: ExitStack) -> LifelongLearner:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mplearn.errors import InvalidValueError, RecordingError
-from mplearn_agents.console import new_table, open_console
 from mplearn_agents.reading import (
     add_reading_arguments,
     hints_of,
@@ -43,6 +42,7 @@ def run(args: argparse.Namespace) -> None:
     from rich.text import Text
 
     from mplearn.library import PrimitiveLibrary
+    from mplearn_agents.console import new_table, open_console
     from mplearn_agents.recognition import as_csv, recognise_recording
 
     if args.to is not None and args.to.suffix.lower() != ".csv":

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mplearn_agents.console import open_console, printable
+from mplearn_agents.inert import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -30,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> None:
     """Print the tables, and write the page where one is asked for."""
     from mplearn.library import PrimitiveLibrary
+    from mplearn_agents.console import open_console
     from mplearn_agents.tables import library_summary
 
     library = PrimitiveLibrary.load(args.library)

@@ -11,13 +11,26 @@ from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import StoreDamagedError
 from mplearn_agents.arguments import whole
-from mplearn_agents.console import printable
+from mplearn_agents.inert import printable
 
 if TYPE_CHECKING:
     from mplearn.store import Command, Entry, Happening, LifelongLearner
 
 HELP = "Look after a store: what it holds, its log, backups, checks, commands, undo and redo."
 EXAMPLE = "mplearn store info life.db"
+#: What follows in the example of an action.
+_MORE = {
+    "log": " --json",
+    "history": " 'bow up'",
+    "backup": " backups/monday.db",
+    "merge": " P3 P7 --by Anna",
+    "split": " 12 --by Anna",
+    "delete": " P9",
+    "freeze": " 'bow up'",
+    "unfreeze": " 'bow up'",
+    "note": " 'a new demonstrator from here on' --by Anna",
+    "redo": " 14",
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +38,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True)
 
     def add(name: str, help: str, do: Callable[[argparse.Namespace], None]) -> Any:
-        action = actions.add_parser(name, help=help, description=help)
+        action = actions.add_parser(
+            name,
+            help=help,
+            description=help,
+            epilog=f"example:\n  mplearn store {name} life.db{_MORE.get(name, '')}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
         action.add_argument("store", type=Path, metavar="STORE", help="the store, as life.db")
         action.set_defaults(act=do)
         return action
