@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import json
+from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +12,6 @@ from typing import TYPE_CHECKING
 
 from mplearn.errors import InvalidValueError
 
-from .arguments import count
 from .exit_codes import INTERRUPTED
 from .inert import printable
 from .interrupts import asked_to_stop
@@ -27,26 +28,6 @@ if TYPE_CHECKING:
 
 _NAMED = 3  # takes refused that the live table names
 _LISTED = 100  # that are named at the end; all are in the shards' journals
-
-
-def add_corpus_arguments(parser: argparse.ArgumentParser, verb: str) -> None:
-    """Declare who does the work."""
-    group = parser.add_argument_group("many recordings at once")
-    group.add_argument(
-        "--jobs",
-        type=count,
-        metavar="N",
-        help=f"{verb} the takes of a folder, and of the folders in it, by N processes; what comes "
-        "out does not depend on N",
-    )
-    group.add_argument(
-        "--ray",
-        nargs="?",
-        const="",
-        metavar="ADDRESS",
-        help="by the workers of a Ray cluster (mplearn[cluster]) that all see the files: the one "
-        "of this machine, or that at ADDRESS",
-    )
 
 
 @contextmanager
@@ -69,7 +50,7 @@ def reading_of(args: argparse.Namespace) -> Reading:
     from mplearn.corpus import Reading
 
     names = None if args.map is None else read_map(args.map)
-    return Reading(args.observe, hints_of(args), names)
+    return Reading(getattr(args, "observe", "robot"), hints_of(args), names)
 
 
 def learn_in_shards(
@@ -136,6 +117,53 @@ def learn_in_shards(
     console.print(primitive_table(library))
     console.print(_summary(corpus, written), markup=False)
     return 0
+
+
+def recognise_in_chunks(args: argparse.Namespace) -> None:
+    """Recognise a folder as a corpus, write the table and print how often what was recognised."""
+    from rich.progress import Progress as Bar
+
+    from mplearn.corpus import recognise_corpus
+    from mplearn.mocap import command_line
+    from mplearn.tables import write_segments
+    from mplearn_agents.console import new_table, open_console
+
+    if args.to is None and not args.json:
+        raise InvalidValueError("give a table to write, --to FILE, or --json")
+    if args.strict:
+        raise InvalidValueError("--strict is for takes recognised one after the other")
+    console, aside = open_console(), open_console(stderr=True)
+    with (
+        command_line(),
+        chosen_executor(args) as executor,
+        Bar(console=aside, transient=True) as bar,
+    ):
+        task = bar.add_task("recognising", total=None)
+        found = recognise_corpus(
+            args.library,
+            args.data,
+            reading=reading_of(args),
+            executor=executor,
+            show=lambda done, of: bar.update(task, completed=done, total=of),
+        )
+    _say_refused(aside, found.refused.items())
+    if args.to is not None:
+        write_segments(found.table, args.to)
+    if args.json:
+        for segment in found.table:
+            print(json.dumps(segment.as_dict()))
+        return
+    names = Counter(segment.name for segment in found.table)
+    table = new_table("segments", "primitive", "times", right=("times",))
+    for name, times in names.most_common():
+        table.add_row(printable(name) if name else "unknown", str(times))
+    console.print(table)
+    known = len(found.table) - names[""]
+    console.print(
+        f"{known} of {len(found.table)} segments recognised in {found.n_takes} takes; written to "
+        f"{printable(str(args.to))}",
+        markup=False,
+    )
 
 
 def _summary(corpus: Corpus, written: Iterable[Path]) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from mplearn.errors import InvalidValueError
 
-from .arguments import positive
+from .arguments import count, positive
 from .inert import printable
 
 if TYPE_CHECKING:
@@ -39,6 +39,26 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--strict", action="store_true", help="refuse all if one take is refused; else leave it out"
+    )
+
+
+def add_corpus_arguments(parser: argparse.ArgumentParser, verb: str) -> None:
+    """Declare who does the work."""
+    group = parser.add_argument_group("many recordings at once")
+    group.add_argument(
+        "--jobs",
+        type=count,
+        metavar="N",
+        help=f"{verb} the takes of a folder, and of the folders in it, by N processes; what comes "
+        "out does not depend on N",
+    )
+    group.add_argument(
+        "--ray",
+        nargs="?",
+        const="",
+        metavar="ADDRESS",
+        help="by the workers of a Ray cluster (mplearn[cluster]) that all see the files: the one "
+        "of this machine, or that at ADDRESS",
     )
 
 

@@ -11,4 +11,6 @@ from .learning import learn_corpus as learn_corpus
 from .progress import Progress as Progress
 from .reading import Reading as Reading
 from .reading import probe as probe
+from .recognising import RecognisedCorpus as RecognisedCorpus
+from .recognising import recognise_corpus as recognise_corpus
 from .shard import ShardReport as ShardReport

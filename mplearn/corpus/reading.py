@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from ..anatomy import as_bodies, recognise
-from ..errors import CorpusError, MPLearnError, RecordingError
+from ..errors import CorpusError, MPLearnError
 from ..learner import LearnerConfig, learnable_rate
-from ..mocap import Hints, TakeFiles, join_by_name, resample
+from ..mocap import Hints, TakeFiles, join_by_name, resample, with_channels
 from ..recording import Recording
 from .executors import Executor, Here
 
@@ -68,25 +68,6 @@ class Reading:
                 replace(seen, rate_hz=config.rate_hz) if same else resample(seen, config.rate_hz)
             )
         return tuple(streams)
-
-
-def with_channels(recording: Recording, channels: tuple[str, ...]) -> Recording:
-    """Return a recording with these of its channels, in this order.
-
-    Raises:
-        RecordingError: It lacks some.
-    """
-    place = {name: i for i, name in enumerate(recording.channels)}
-    lacking = [name for name in channels if name not in place]
-    if lacking:
-        raise RecordingError(
-            f"{recording.name} lacks {len(lacking)} of {len(channels)} channels: "
-            f"{', '.join(lacking[:8])}"
-        )
-    if recording.channels == channels:
-        return recording
-    columns = [place[name] for name in channels]
-    return replace(recording, frames=recording.frames[:, columns], channels=channels)
 
 
 def probe(

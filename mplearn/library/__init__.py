@@ -6,3 +6,5 @@ from .novelty import AnomalyScore as AnomalyScore
 from .novelty import MotionNovelty as MotionNovelty
 from .primitive import Primitive as Primitive
 from .primitive import TreeNode as TreeNode
+from .segment_table import RecognisedSegment as RecognisedSegment
+from .segment_table import SegmentTable as SegmentTable

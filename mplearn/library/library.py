@@ -23,12 +23,13 @@ from ..graph import (
     TransitionGraph,
     tree_levels,
 )
-from ..recording import FloatArray
+from ..recording import FloatArray, Recording
 from ..state import from_plain, to_plain, within
 from ..tree.recogniser import Recogniser, Recognition
 from .content import FILES, LibraryState
 from .novelty import AnomalyScore, MotionNovelty, novelty_of
 from .primitive import Primitive, TreeNode
+from .segment_table import SegmentTable
 
 Key: TypeAlias = int | str
 _STORE = b"SQLite format 3\0"
@@ -199,6 +200,35 @@ class PrimitiveLibrary:
             k: How many to return at most.
         """
         return self.graph.predict(self._known(history), k)
+
+    def segments(self, recording: Recording) -> SegmentTable:
+        """Return the segments of a recording as a tidy table, a row each.
+
+        Args:
+            recording: Of a body, where the library has one; else with its channels. Its rate may be
+                another.
+
+        Returns:
+            When each begins and ends, its primitive, name, person, distance, p-value, and how sure
+            the boundary is (`mplearn.tables.RecognisedSegment`); pauses are left out.
+
+        Raises:
+            RecordingError: The recording lacks channels of the library.
+            BodyError: There is no body in it.
+
+        Example:
+            >>> from mplearn.demonstrator import demonstrate
+            >>> from mplearn.learner import LearnerConfig, MotionLearner
+            >>> take = demonstrate(["BAR", "BAL"] * 6, seed=1, rate_hz=50.0).recording
+            >>> learner = MotionLearner(LearnerConfig(take.channels, take.rate_hz))
+            >>> events = [*learner.learn_recording(take)]
+            >>> table = learner.snapshot().segments(take)
+            >>> len(table) >= 10, table.column("name")[:4] == ["P1", "P2", "P1", "P2"]
+            (True, True)
+        """
+        tables = import_module("mplearn.tables")  # which stands above: loaded where needed
+        found: SegmentTable = tables.segments_of(self, recording)
+        return found
 
     # ---- planning
 

@@ -3,6 +3,7 @@
 from .gaps import GapConfig as GapConfig
 from .gaps import GapTracker as GapTracker
 from .joining import join_by_name as join_by_name
+from .joining import with_channels as with_channels
 from .open import FoundTakes as FoundTakes
 from .open import TakeFiles as TakeFiles
 from .open import Takes as Takes

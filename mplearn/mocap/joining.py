@@ -70,6 +70,25 @@ def join_by_name(recordings: Sequence[Recording]) -> Joined:
     )
 
 
+def with_channels(recording: Recording, channels: tuple[str, ...]) -> Recording:
+    """Return a recording with these of its channels, in this order.
+
+    Raises:
+        RecordingError: It lacks some.
+    """
+    place = {name: i for i, name in enumerate(recording.channels)}
+    lacking = [name for name in channels if name not in place]
+    if lacking:
+        raise RecordingError(
+            f"{recording.name} lacks {len(lacking)} of {len(channels)} channels: "
+            f"{', '.join(lacking[:8])}"
+        )
+    if recording.channels == channels:
+        return recording
+    columns = [place[name] for name in channels]
+    return replace(recording, frames=recording.frames[:, columns], channels=channels)
+
+
 def _in_channels(recording: Recording, channels: tuple[str, ...]) -> Recording:
     if recording.channels == channels:
         return recording

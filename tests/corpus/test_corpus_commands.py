@@ -4,8 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from mplearn.corpus import learn_corpus, recognise_corpus
 from mplearn.library import PrimitiveLibrary
 from mplearn.store import StoreReader
+from mplearn.tables import read_segments
 from mplearn_agents.cli import main
 
 
@@ -40,3 +42,23 @@ def test_what_does_not_go_together_is_refused(
 ) -> None:
     assert main(["learn", str(folder), *options]) == 2
     assert why in capsys.readouterr().err
+
+
+def test_a_folder_is_recognised_by_processes_as_by_one(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    learn_corpus(folder, tmp_path / "s", jobs=0).learner.snapshot().save(tmp_path / "a.mplearn")
+    alone = recognise_corpus(tmp_path / "a.mplearn", folder, jobs=0)
+    assert list(alone.refused) == ["ben/broken"]
+    assert alone.n_takes == 8
+    takes = alone.table.column("take")
+    assert takes == sorted(takes)
+    assert set(alone.table.column("person")) == {"anna", "ben", "cleo", ""}
+    asked = ["recognise", str(tmp_path / "a.mplearn"), str(folder), "--jobs", "1"]
+    assert main([*asked, "--to", str(tmp_path / "a.eaf")]) == 0
+    assert read_segments(tmp_path / "a.eaf") == alone.table
+    said = capsys.readouterr()
+    assert "segments recognised in 8 takes" in said.out
+    assert "left out: ben/broken" in said.err
+    known = [row for row in alone.table if row.primitive is not None]
+    assert len(known) > 0.7 * len(alone.table)

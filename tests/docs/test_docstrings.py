@@ -48,6 +48,7 @@ PUBLIC = {  # beside all of `mplearn.__all__`: what a user of each room starts f
     "mplearn.sources": ["open_source"],
     "mplearn.state": ["checkpoint", "newer", "saved_as"],
     "mplearn.store": ["LifelongLearner"],
+    "mplearn.tables": ["write_segments", "SegmentTable"],
     "mplearn.tree": ["PrimitiveTree", "TreeConfig"],
     "mplearn_envs.environment.primitive_humanoid": ["PrimitiveHumanoidEnv"],
 }

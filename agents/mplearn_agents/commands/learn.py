@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import InvalidValueError, MPLearnError, RecordingError, StateError
 from mplearn_agents.arguments import count, positive
-from mplearn_agents.corpora import add_corpus_arguments, learn_in_shards
 from mplearn_agents.exit_codes import INTERRUPTED
 from mplearn_agents.inert import printable
 from mplearn_agents.live_learning import add_live_arguments, learn_from_source
 from mplearn_agents.reading import (
+    add_corpus_arguments,
     add_reading_arguments,
     hints_of,
     say_bodies,
@@ -100,6 +100,8 @@ def run(args: argparse.Namespace) -> int:
     if args.jobs is not None or args.ray is not None:
         if args.live is not None:
             raise InvalidValueError("--jobs and --ray learn recordings, not --live SOURCE")
+        from mplearn_agents.corpora import learn_in_shards
+
         return learn_in_shards(args, partial(_configured, args))
     if args.out is None and args.store is None:
         raise InvalidValueError("give a library to write, --out, or a store, --store, or both")

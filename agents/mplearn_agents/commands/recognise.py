@@ -8,8 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mplearn.errors import InvalidValueError, RecordingError
+from mplearn.errors import RecordingError
 from mplearn_agents.reading import (
+    add_corpus_arguments,
     add_reading_arguments,
     hints_of,
     say_bodies,
@@ -32,7 +33,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("library", type=Path, help="library file")
     parser.add_argument("data", type=Path, help="a recording, or a folder of them")
     parser.add_argument("--json", action="store_true", help="print a line of JSON for each segment")
-    parser.add_argument("--to", type=Path, metavar="FILE.csv", help="write them as a table, too")
+    parser.add_argument(
+        "--to",
+        type=Path,
+        metavar="FILE",
+        help="write them as a table, too: FILE.csv, .parquet, .arrow, .boris (BORIS), .eaf (ELAN), "
+        "or FILE_events.tsv (Motion-BIDS)",
+    )
+    add_corpus_arguments(parser, "recognise")
     add_reading_arguments(parser)
 
 
@@ -42,11 +50,16 @@ def run(args: argparse.Namespace) -> None:
     from rich.text import Text
 
     from mplearn.library import PrimitiveLibrary
+    from mplearn.tables import SegmentTable, format_of, recognise_recording, write_segments
     from mplearn_agents.console import new_table, open_console
-    from mplearn_agents.recognition import as_csv, recognise_recording
 
-    if args.to is not None and args.to.suffix.lower() != ".csv":
-        raise InvalidValueError(f"--to writes a table FILE.csv, not {args.to.name!r}")
+    if args.to is not None:
+        format_of(args.to)
+    if args.jobs is not None or args.ray is not None:
+        from mplearn_agents.corpora import recognise_in_chunks
+
+        recognise_in_chunks(args)
+        return
     library = PrimitiveLibrary.load(args.library)
     aside = open_console(stderr=True)
     recordings = _read(args, library, aside)
@@ -62,8 +75,7 @@ def run(args: argparse.Namespace) -> None:
                 if args.json:
                     print(json.dumps(segment.as_dict()), flush=True)
     if args.to is not None:
-        args.to.parent.mkdir(parents=True, exist_ok=True)
-        args.to.write_text(as_csv(found), encoding="utf-8", errors="backslashreplace")
+        write_segments(SegmentTable(found), args.to)
     if args.json:
         return
     right = ("from [s]", "to [s]", "distance", "p")

@@ -2,51 +2,18 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import math
-from collections.abc import Callable, Iterable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from mplearn.errors import RecordingError
-from mplearn.learner import Event, LearnerConfig, MotionLearner
-from mplearn.library import PrimitiveLibrary
-from mplearn.recording import FloatArray, Recording, Segment
+from ..anatomy import recognise
+from ..errors import RecordingError
+from ..learner import Event, LearnerConfig, MotionLearner
+from ..library import PrimitiveLibrary, RecognisedSegment, SegmentTable
+from ..mocap import resample, with_channels
+from ..recording import FloatArray, Recording, Segment
 
 _AT_ONCE = 50  # frames between two looks at how far it is
-
-
-class RecognisedSegment(NamedTuple):
-    """A segment of a recording, and what a library says of it.
-
-    Attributes:
-        take: Name of the recording.
-        start_s: When it begins [s].
-        end_s: When it ends [s].
-        primitive: Id of the primitive that it is an execution of; None where none is like it.
-        name: The primitive's name; "" where there is none.
-        nearest: Name of the nearest primitive, recognised or not; "" where there is none.
-        distance: To the nearest primitive [nats a frame]; NaN where there is none.
-        p_value: Share of what was learned that is at least as far out, in (0, 1]; NaN as above.
-    """
-
-    take: str
-    start_s: float
-    end_s: float
-    primitive: int | None
-    name: str
-    nearest: str
-    distance: float
-    p_value: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return it as values that JSON has; NaN is None."""
-        return {
-            key: None if isinstance(value, float) and math.isnan(value) else value
-            for key, value in self._asdict().items()
-        }
 
 
 class Recognising(MotionLearner):
@@ -86,8 +53,31 @@ class Recognising(MotionLearner):
                 nearest,
                 float(distance),
                 float(p_value),
+                recording.person,
+                float(segment.confidence),
             )
         self._seen.clear()
+
+
+def segments_of(library: PrimitiveLibrary, recording: Recording) -> SegmentTable:
+    """Return the segments of a recording of any rate; see `PrimitiveLibrary.segments`."""
+    return SegmentTable(recognise_recording(library, seen_by(library, recording)))
+
+
+def seen_by(library: PrimitiveLibrary, recording: Recording) -> Recording:
+    """Return a recording as a library sees it: a body's points, or its own channels, at its rate.
+
+    Raises:
+        RecordingError: It lacks channels of the library.
+        BodyError: There is no body in it.
+    """
+    if recording.channels != library.channels:
+        if library.body and recording.is_markers:
+            recording = recognise(recording).apply(recording)
+        else:
+            recording = with_channels(recording, library.channels)
+    same = recording.rate_hz == library.rate_hz
+    return recording if same else resample(recording, library.rate_hz)
 
 
 def recognise_recording(
@@ -121,13 +111,3 @@ def recognise_recording(
 
 def _name(library: PrimitiveLibrary, id: int) -> str:
     return library[id].name if id in library else str(id)
-
-
-def as_csv(segments: Iterable[RecognisedSegment]) -> str:
-    """Return segments as a table with commas and a head."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(RecognisedSegment._fields)
-    for segment in segments:
-        writer.writerow("" if value is None else value for value in segment.as_dict().values())
-    return out.getvalue()

@@ -1,0 +1,147 @@
+"""A corpus is recognised by a library, some takes at a time."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+from ..errors import LibraryError, MPLearnError, StoreError
+from ..learner import LearnerConfig
+from ..library import PrimitiveLibrary
+from ..mocap import TakeFiles, find_takes
+from ..recording import are_markers
+from ..tables import RecognisedSegment, SegmentTable, recognise_recording
+from .executors import Executor, Here, Processes
+from .reading import Reading
+from .shard import DEATHS
+
+_CHUNK = 16  # takes
+
+
+class RecognisedCorpus(NamedTuple):
+    """What a library recognised in a corpus.
+
+    Attributes:
+        table: The segments of all takes, in the order of their names.
+        refused: Why not, by name, for takes that could not be read, or seen by the library.
+        n_takes: Takes in which it looked.
+    """
+
+    table: SegmentTable
+    refused: Mapping[str, str]
+    n_takes: int
+
+
+class _Chunk(NamedTuple):
+    rows: dict[str, list[RecognisedSegment]]
+    refused: dict[str, str]
+
+
+def recognise_corpus(
+    library: str | os.PathLike[str],
+    folder: str | os.PathLike[str],
+    *,
+    reading: Reading | None = None,
+    jobs: int = 1,
+    executor: Executor | None = None,
+    show: Callable[[int, int], object] = lambda done, of: None,
+) -> RecognisedCorpus:
+    """Recognise what of a library is in all recordings of a folder, and of the folders in it.
+
+    Args:
+        library: File of a library, or a store.
+        folder: The recordings.
+        reading: How they are read; what is observed is what the library needs.
+        jobs: Processes; 0 works in this one. See `learn_corpus`.
+        executor: Who does the work instead.
+        show: Called with how many takes are done, and of how many.
+
+    Raises:
+        RecordingError: There are no recordings.
+        LibraryError: There is no such library.
+    """
+    known = PrimitiveLibrary.load(Path(library))
+    observe = "robot" if known.body else "positions" if are_markers(known.channels) else "channels"
+    asked = reading or Reading()
+    reading = Reading(observe, asked.hints, asked.names)  # type: ignore[arg-type]
+    found = find_takes(folder)
+    own = executor or (Processes(jobs) if jobs else Here())
+    try:
+        done = _all(Path(library), found.takes, reading, own, show)
+    finally:
+        if executor is None:
+            own.close()
+    refused = {name: str(error) for name, error in found.unreadable.items()} | done.refused
+    rows = (row for take in found.takes for row in done.rows.get(take.name, ()))
+    return RecognisedCorpus(SegmentTable(rows), refused, len(done.rows))
+
+
+def _all(
+    library: Path,
+    takes: Sequence[TakeFiles],
+    reading: Reading,
+    executor: Executor,
+    show: Callable[[int, int], object],
+) -> _Chunk:
+    """Have all takes recognised; those of a chunk that ended its worker one by one."""
+    waiting = [takes[k : k + _CHUNK] for k in range(0, len(takes), _CHUNK)][::-1]
+    running: dict[Future[_Chunk], Sequence[TakeFiles]] = {}
+    tries: Counter[str] = Counter()
+    whole = _Chunk({}, {})
+    while waiting or running:
+        while waiting:
+            chunk = waiting.pop()
+            future = executor.submit(recognise_takes, library, chunk, reading)
+            running[future] = chunk
+            if future.done():
+                break
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            chunk = running.pop(future)
+            error = future.exception()
+            if error is None:
+                whole.rows.update(future.result().rows)
+                whole.refused.update(future.result().refused)
+            elif isinstance(error, MPLearnError):
+                raise error
+            elif len(chunk) > 1:
+                waiting += [[take] for take in reversed(chunk)]
+            else:
+                name = chunk[0].name
+                tries[name] += 1
+                if tries[name] < DEATHS:
+                    waiting.append(chunk)
+                else:
+                    why = f"{type(error).__name__}: {error}"
+                    whole.refused[name] = f"recognising it was tried {DEATHS} times: {why}"
+            show(len(whole.rows) + len(whole.refused), len(takes))
+    return whole
+
+
+def recognise_takes(library: Path, takes: Sequence[TakeFiles], reading: Reading) -> _Chunk:
+    """Recognise some takes; one that cannot be read costs nothing else.
+
+    Raises:
+        LibraryError: There is no such library.
+    """
+    known = _loaded(library)
+    config = LearnerConfig(known.channels, known.rate_hz)
+    chunk = _Chunk({}, {})
+    for take in takes:
+        try:
+            streams = reading.streams(take, config)
+            chunk.rows[take.name] = [row for s in streams for row in recognise_recording(known, s)]
+        except (LibraryError, StoreError):
+            raise
+        except MPLearnError as error:
+            chunk.refused[take.name] = str(error)
+    return chunk
+
+
+@lru_cache(maxsize=1)
+def _loaded(library: Path) -> PrimitiveLibrary:
+    return PrimitiveLibrary.load(library)
