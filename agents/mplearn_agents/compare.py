@@ -22,7 +22,7 @@ from .comparison import SLOW, Comparison
 from .contest import Contest
 from .episodes import Episode
 
-COLUMNS = ("task", "dynamics", "policy", "return", "success", "falls", "time")
+COLUMNS = ("task", "dynamics", "policy", "return", "share of the best", "success", "falls", "time")
 CONFIDENCE = 0.95
 
 
@@ -31,8 +31,8 @@ def compare(
     folder: Path,
     jobs: int | None = 1,
     done: Callable[[Contest], object] = lambda _: None,
-) -> Iterator[Table]:
-    """Yield one table a task.
+) -> Iterator[tuple[Table, Table]]:
+    """Yield two tables a task: who does it how well, and how long each takes to think and act.
 
     Args:
         comparison: What to compare.
@@ -56,7 +56,7 @@ def compare(
                 for contest in of_seeds:
                     played.setdefault(name, []).append(next(results))
                     done(contest)
-            yield _table(comparison, task, played)
+            yield _table(comparison, task, played), _wall_table(task, played)
 
 
 @contextmanager
@@ -85,18 +85,20 @@ def _table(
     comparison: Comparison, task: str, played: Mapping[str, Sequence[Sequence[Sequence[Episode]]]]
 ) -> Table:
     """Return a task's table; ``played``: the episodes of each contestant, seed and game."""
+    games = comparison.games
     rows = [
-        (task, dynamics, name, *_cells([games[k] for games in of_seeds]))
-        for k, dynamics in enumerate(comparison.dynamics)
+        (task, game.name, name, *_cells([games[k] for games in of_seeds]))
+        for k, game in enumerate(games)
         for name, of_seeds in played.items()
     ]
     return Table(
-        f"Task {task!r}: {len(comparison.seeds)} seeds",
+        f"Task {task!r} in {comparison.env}: {len(comparison.seeds)} seeds",
         COLUMNS,
         tuple(rows),
         f"Mean over seeds and its {100 * CONFIDENCE:.0f} % interval (Student's t), of "
         f"{comparison.episodes} kinematic or {comparison.simulated_episodes} simulated episodes a "
-        f"seed (so few of {', '.join(SLOW)}, too). The return is discounted by time. Agents are "
+        f"seed (so few of {', '.join(SLOW)}, too). The return is discounted by time; of the best "
+        f"return that is possible, holding is 0 % and all of it 100 %. Agents are "
         f"trained kinematically, one a seed, for {comparison.steps_of(task)} macro steps.",
     )
 
@@ -109,9 +111,24 @@ def _cells(results: Sequence[Sequence[Episode]]) -> tuple[str, ...]:
 
     return (
         with_interval(means(lambda e: e.return_)),
+        with_interval(100 * means(lambda e: e.share), " %", 1),
         with_interval(100 * means(lambda e: e.success), " %", 1),
         with_interval(100 * means(lambda e: e.fallen), " %", 1),
         with_interval(means(lambda e: e.duration_s), " s", 1),
+    )
+
+
+def _wall_table(task: str, played: Mapping[str, Sequence[Sequence[Sequence[Episode]]]]) -> Table:
+    """Return how long a macro step of each contestant took, its thinking included."""
+    rows = []
+    for name, of_seeds in played.items():
+        episodes = [episode for seed in of_seeds for game in seed for episode in game]
+        wall_s, steps = sum(e.wall_s for e in episodes), sum(e.steps for e in episodes)
+        rows.append((task, name, f"{1e3 * wall_s / steps:.1f} ms", f"{wall_s:.0f} s"))
+    return Table(
+        f"Task {task!r}: time on the wall",
+        ("task", "policy", "a macro step", "in all"),
+        tuple(rows),
     )
 
 

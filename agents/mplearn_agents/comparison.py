@@ -6,13 +6,15 @@ from dataclasses import dataclass, replace
 from typing import get_args
 
 from mplearn.errors import InvalidValueError
+from mplearn_envs.execution.bodies import BodyName
 from mplearn_envs.execution.modes import Dynamics
 from mplearn_envs.tasks import TASKS
+from mplearn_envs.varied.people import SPLITS
 
 from .contest import Contest, Game
 from .policies import POLICIES
 from .rl import TrainingConfig
-from .rl.config import AlgorithmName, PriorUse
+from .rl.config import AlgorithmName, EnvVersion, PriorUse
 from .suited import NEEDS_TASK, SUITED, suited
 
 DYNAMICS = get_args(Dynamics)
@@ -37,6 +39,9 @@ class Comparison:
         simulated_episodes: Episodes a seed, simulated; and of policies that think long.
         steps: Macro steps of a training; None: what suits the task, see `Suited`.
         library: File of the library; None is the built-in one.
+        env: Version of the environment.
+        people: Of v1: with whom it is played, one game each. Agents are trained with "train".
+        bodies: Levels of what the body is like, simulated; see `mplearn_envs.execution.bodies`.
     """
 
     tasks: tuple[str, ...] = tuple(SUITED)
@@ -49,14 +54,28 @@ class Comparison:
     simulated_episodes: int = 4
     steps: int | None = None
     library: str | None = None
+    env: EnvVersion = "v0"
+    people: tuple[str, ...] = ("train", "test")
+    bodies: tuple[str, ...] = ("nominal",)
 
     def __post_init__(self) -> None:
-        for what, allowed in (("tasks", TASKS), ("policies", POLICIES), ("dynamics", DYNAMICS)):
+        for what, allowed in (
+            ("tasks", TASKS),
+            ("policies", POLICIES),
+            ("dynamics", DYNAMICS),
+            ("people", SPLITS),
+            ("bodies", get_args(BodyName)),
+        ):
             unknown = [name for name in getattr(self, what) if name not in allowed]
             if unknown:
                 raise InvalidValueError(f"{what} must be among {tuple(allowed)}, not {unknown}")
         if len(self.seeds) < 2:
             raise InvalidValueError(f"an interval needs at least 2 seeds, not {self.seeds}")
+
+    @property
+    def games(self) -> tuple[Game, ...]:
+        """What everyone plays."""
+        return self._games("")
 
     @property
     def n_contests(self) -> int:
@@ -73,11 +92,17 @@ class Comparison:
         ]
         out = {}
         for name in [*policies, *trainings]:
-            games = tuple(Game(dynamics, self._n(name, dynamics)) for dynamics in self.dynamics)
+            games = self._games(name)
             training = trainings.get(name)
             out[name] = [
                 Contest(
-                    task, name, seed, games, self.library, training and replace(training, seed=seed)
+                    task,
+                    name,
+                    seed,
+                    games,
+                    self.library,
+                    training and replace(training, seed=seed),
+                    self.env,
                 )
                 for seed in self.seeds
             ]
@@ -86,6 +111,15 @@ class Comparison:
     def steps_of(self, task: str) -> int:
         """Return the macro steps of a training."""
         return suited(task).steps if self.steps is None else self.steps
+
+    def _games(self, name: str) -> tuple[Game, ...]:
+        """Return what a contestant plays."""
+        return tuple(
+            Game(dynamics, self._n(name, dynamics), body, people)
+            for dynamics in self.dynamics
+            for body in (self.bodies if dynamics == "simulated" else ("nominal",))
+            for people in (self.people if self.env == "v1" else (None,))
+        )
 
     def _n(self, name: str, dynamics: str) -> int:
         slow = dynamics == "simulated" or name in SLOW
@@ -105,6 +139,7 @@ class Comparison:
                 algorithm=algorithm,
                 prior=use,
                 steps=steps,
+                env=self.env,
                 library=self.library,
                 round_steps=min(steps, ROUND_STEPS),
                 episodes=PROBES,

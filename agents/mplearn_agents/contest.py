@@ -14,6 +14,7 @@ import mplearn_envs  # noqa: F401  (registers the environment)
 from .episodes import Episode, play
 from .policies import POLICIES, Policy
 from .rl import TrainedPolicy, TrainingConfig
+from .rl.config import EnvVersion
 from .rl.train import train
 from .rl.trained import CONFIG, POLICY
 
@@ -25,10 +26,20 @@ class Game:
     Attributes:
         dynamics: "kinematic" or "simulated".
         episodes: How many.
+        body: What the body is like, see `mplearn_envs.execution.bodies`.
+        people: Of v1: with whom; None elsewhere.
     """
 
     dynamics: str
     episodes: int
+    body: str = "nominal"
+    people: str | None = None
+
+    @property
+    def name(self) -> str:
+        """What tables call it."""
+        body = "" if self.body == "nominal" else f" {self.body}"
+        return f"{self.dynamics}{body}" + (f", {self.people}" if self.people else "")
 
 
 @dataclass(frozen=True)
@@ -42,6 +53,7 @@ class Contest:
         games: What is played.
         library: File of the library; None is the built-in one.
         training: Of an agent; None for a policy.
+        env: Version of the environment.
     """
 
     task: str
@@ -50,6 +62,7 @@ class Contest:
     games: tuple[Game, ...]
     library: str | None
     training: TrainingConfig | None
+    env: EnvVersion = "v0"
 
     def play(self, folder: Path) -> list[list[Episode]]:
         """Return the episodes of each game; those that the folder has are taken from there.
@@ -62,19 +75,17 @@ class Contest:
         return [self._played(game, folder) for game in self.games]
 
     def _played(self, game: Game, folder: Path) -> list[Episode]:
-        env = gymnasium.make(
-            "mplearn/PrimitiveHumanoid-v0",
-            library=self.library,
-            task=self.task,
-            dynamics=game.dynamics,
-            disable_env_checker=True,
-        )
-        asked = {
+        options: dict[str, Any] = {"task": self.task, "dynamics": game.dynamics, "body": game.body}
+        options |= {"library": self.library} if self.env == "v0" else {"people": game.people}
+        name = f"mplearn/PrimitiveHumanoid-{self.env}"
+        env = gymnasium.make(name, disable_env_checker=True, **options)
+        asked: dict[str, Any] = {
             "episodes": game.episodes,
             "library": env.unwrapped.library.version,  # type: ignore[attr-defined]
             "training": None if self.training is None else asdict(self.training),
         }
-        what = f"{self.task}-{game.dynamics}-{self.name}-{self.seed}".replace(", ", "-")
+        asked = json.loads(json.dumps(asked))  # as it is kept: with lists for tuples
+        what = f"{self.task}-{game.name}-{self.name}-{self.seed}".replace(", ", "-")
         file = folder / "episodes" / f"{what.replace(' ', '-')}.json"
         episodes = _kept(file, asked)
         if episodes is None:
@@ -106,7 +117,9 @@ def _kept(file: Path, asked: dict[str, Any]) -> list[Episode] | None:
 
 def _trained(config: TrainingConfig, agents: Path) -> TrainedPolicy:
     """Return the agent of a training, which is made, or ended, if it was not before."""
-    what = (config.task, config.algorithm, config.prior, config.steps, config.seed)
+    what = [config.task, config.algorithm, config.prior, config.steps, config.seed]
+    if config.env != "v0":
+        what.insert(0, config.env)
     folder = agents / "-".join(map(str, what))
     if (folder / POLICY).exists() and TrainingConfig.load(folder / CONFIG)[0] == config:
         return TrainedPolicy.load(folder)

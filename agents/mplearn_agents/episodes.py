@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, field
 from typing import Any
 
 import gymnasium
@@ -27,6 +28,7 @@ class Episode:
         illegal: How many of them were illegal.
         share: How good the return is: 0 what holding earns, 1 the best that is possible; NaN if the
             task does not say.
+        wall_s: How long it took to play, thinking included [s of the clock on the wall].
     """
 
     return_: float
@@ -36,6 +38,7 @@ class Episode:
     steps: int
     illegal: int
     share: float = np.nan
+    wall_s: float = field(default=np.nan, compare=False)
 
 
 def play(env: gymnasium.Env[Any, Any], policy: Policy, episodes: int, seed: int) -> list[Episode]:
@@ -60,6 +63,7 @@ def play(env: gymnasium.Env[Any, Any], policy: Policy, episodes: int, seed: int)
 def _episode(env: gymnasium.Env[Any, Any], policy: Policy, seed: int) -> Episode:
     observation, info = env.reset(seed=seed)
     policy.reset()
+    began_s = time.perf_counter()
     scale = info.get("task", {})
     total, discount, duration_s, steps, illegal = 0.0, 1.0, 0.0, 0, 0
     over = fallen = False
@@ -76,4 +80,5 @@ def _episode(env: gymnasium.Env[Any, Any], policy: Policy, seed: int) -> Episode
     success = float(info.get("is_success", np.nan))
     best, idle = (float(scale.get(f"{which}_return", np.nan)) for which in ("best", "idle"))
     share = (total - idle) / (best - idle)
-    return Episode(total, success, fallen, duration_s, steps, illegal, share)
+    wall_s = time.perf_counter() - began_s
+    return Episode(total, success, fallen, duration_s, steps, illegal, share, wall_s)

@@ -64,9 +64,32 @@ def test_a_table_of_policies_and_agents_and_what_is_kept_of_it(tmp_path, capsys,
     assert rows[1] == rows[3] == rows[5]
 
 
+def test_version_1_is_played_with_people_and_read_on_the_scale_of_the_best(tmp_path, capsys):
+    out = ["--out", str(tmp_path), "--jobs", "1", "--seeds", "2", "--episodes", "2"]
+    played = ["--tasks", "goal", "--dynamics", "kinematic", "--algorithms"]
+    policies = ["--policies", "random", "quick-path", "pooled-path"]
+    assert main(["compare", "--env", "v1", *out, *played, *policies]) == 0
+    shown = capsys.readouterr().out
+    assert "time on the wall" in shown and "a macro step" in shown
+    rows = [line for line in (tmp_path / "compare.md").read_text().splitlines() if "| goal" in line]
+    cells = [row.strip("| ").split(" | ") for row in rows]
+    assert [row[1:3] for row in cells] == [
+        [f"kinematic, {people}", policy]
+        for people in ("train", "test")
+        for policy in ("random", "quick-path", "pooled-path")
+    ]
+    share = {tuple(row[1:3]): float(row[4].split()[0]) for row in cells}
+    for people in ("train", "test"):
+        where = f"kinematic, {people}"
+        assert share[where, "quick-path"] == pytest.approx(100.0, abs=0.5)
+        assert share[where, "random"] < share[where, "pooled-path"] <= 100.5
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
+        (["--env", "v1", "--people", "nobody"], "people must be among"),
+        (["--bodies", "soft"], "bodies must be among"),
         (["--tasks", "goal", "fly"], "tasks must be among"),
         (["--policies", "mirrored"], "policies must be among"),
         (["--seeds", "1"], "at least 2 seeds"),

@@ -19,11 +19,20 @@ EXAMPLE = "mplearn train --task goal --out agents/goal"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    from mplearn_agents.rl.config import AlgorithmName, PriorUse, TrainingConfig
+    from mplearn_agents.rl.config import AlgorithmName, EnvVersion, PriorUse, TrainingConfig
 
     default = {f.name: f.default for f in fields(TrainingConfig) if f.default is not MISSING}
     parser.add_argument("--out", type=Path, required=True, help="folder for the agent and its log")
     parser.add_argument("--library", type=Path, help="library file (default: the built-in one)")
+    parser.add_argument(
+        "--env",
+        choices=get_args(EnvVersion),
+        default=default["env"],
+        help="version of the environment (default: v0); v1 has 138 primitives of several people",
+    )
+    parser.add_argument(
+        "--people", choices=["train", "test", "all"], help="of v1: with whom (default: train)"
+    )
     parser.add_argument(
         "--task",
         default="goal",
@@ -56,8 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--discount",
         type=positive,
-        default=default["discount"],
-        help=f"what a reward in a second's time is worth (default: {default['discount']})",
+        help="what a reward in a second's time is worth (default: 0.95, in v1 0.98)",
     )
     parser.add_argument(
         "--learning-rate", type=positive, help="of the optimiser (default: by algorithm)"
@@ -97,6 +105,8 @@ def run(args: argparse.Namespace) -> None:
     if ".py:" in args.task:
         given["task"] = str(Path(args.task).absolute())
     given["library"] = None if args.library is None else str(args.library)
+    if args.people is not None:
+        given["environment"] = {"people": args.people}
     usual = suited(args.task)
     given["prior"] = args.prior or usual.prior
     given["steps"] = usual.steps if args.steps is None else args.steps

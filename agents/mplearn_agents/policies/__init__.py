@@ -27,6 +27,7 @@ POLICIES: dict[str, Callable[[gymnasium.Env[Any, Any]], Policy]] = {
     "likely-path": partial(PathToTask.for_env, prefer="likely"),
     "short-path": partial(PathToTask.for_env, prefer="short"),
     "quick-path": partial(PathToTask.for_env, prefer="quick"),
+    "pooled-path": partial(PathToTask.for_env, prefer="quick", pooled=True),
     "mirror": lambda _: Mirror(),
     "search": Search.for_env,
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 import gymnasium
@@ -35,13 +35,19 @@ class Imitation(Policy):
         forecast: Probabilities of the next primitive.
         slots: Action of each primitive.
         seed: Seed of the walk; None draws one.
+        renew: Returns the forecast of now, where the library may change from episode to episode.
     """
 
     def __init__(
-        self, forecast: Forecast, slots: Mapping[int, int], seed: int | None = None
+        self,
+        forecast: Forecast,
+        slots: Mapping[int, int],
+        seed: int | None = None,
+        renew: Callable[[], Forecast] | None = None,
     ) -> None:
         self.forecast = forecast
         self.slots = slots
+        self._renew, self._version = renew, ""
         self.seed = seed
         self._rng = np.random.default_rng(seed)
         self._history: list[int] = []
@@ -52,8 +58,9 @@ class Imitation(Policy):
     @classmethod
     def for_env(cls, env: gymnasium.Env[Any, Any]) -> Imitation:
         """Return the policy that imitates whoever an environment's library was learned from."""
-        repertoire = env.unwrapped.repertoire  # type: ignore[attr-defined]
-        return cls(repertoire.library.graph, repertoire.slots)
+        actor: Any = env.unwrapped
+        repertoire = actor.repertoire
+        return cls(repertoire.library.graph, repertoire.slots, None, lambda: actor.library.graph)
 
     def reset(self, seed: int | None = None) -> None:
         """Forget the history; with a seed, start anew."""
@@ -65,6 +72,9 @@ class Imitation(Policy):
         """Return an action drawn from the forecast."""
         if info["primitive"] < 0:  # at the start, and after a dead end
             self._history = []
+        version = info.get("library_version", "")
+        if self._renew is not None and version != self._version:
+            self.forecast, self._version = self._renew(), version
         weights = np.zeros(legal_actions(info).size)
         if self._history:
             weights[self._actions] = self.forecast.probabilities(self._history)[self._known]

@@ -11,6 +11,9 @@ import networkx as nx
 import numpy as np
 
 from mplearn.errors import InvalidValueError, NoPathError, RobotError, UnknownPrimitiveError
+from mplearn.graph import TransitionGraph
+from mplearn.recording import FloatArray
+from mplearn_envs.varied.people import varied_library
 
 from .base import Policy, transition_prior
 
@@ -111,6 +114,8 @@ class PathToTask(Policy):
         in_order: Whether the task wants one slot after the other, or any of them.
         prefer: See `PathToGoal`.
         renew: Returns the graph of now, where the library may change from episode to episode.
+        correcting: Whether the graph may be another person's: where the prior shows other ways than
+            the graph has, it is mended, for the rest of the episode.
     """
 
     def __init__(
@@ -119,23 +124,32 @@ class PathToTask(Policy):
         in_order: bool,
         prefer: Prefer = "quick",
         renew: Callable[[], nx.DiGraph[int]] | None = None,
+        correcting: bool = False,
     ) -> None:
+        self._correcting, self._given, self._here = correcting, graph, 0
         self.graph, self.in_order, self.prefer = graph, in_order, prefer
         self._renew, self._version = renew, ""
         self._ways: dict[tuple[int, ...], PathToGoal] = {}
 
     @classmethod
-    def for_env(cls, env: gymnasium.Env[Any, Any], prefer: Prefer = "quick") -> PathToTask:
-        """Return the policy for an environment's library, robot and task."""
+    def for_env(
+        cls, env: gymnasium.Env[Any, Any], prefer: Prefer = "quick", pooled: bool = False
+    ) -> PathToTask:
+        """Return the policy for an environment's library, robot and task.
+
+        Args:
+            env: The environment.
+            prefer: See `PathToGoal`.
+            pooled: Whether it knows, of an environment of several people, no person's graph but
+                that of the people of "train" together; an agent may know no more.
+        """
         from mplearn_envs.tasks import ReciteTask
 
-        task = env.unwrapped.task  # type: ignore[attr-defined]
-        return cls(
-            graph_of_actions(env),
-            isinstance(task, ReciteTask),
-            prefer,
-            lambda: graph_of_actions(env),
-        )
+        in_order = isinstance(env.unwrapped.task, ReciteTask)  # type: ignore[attr-defined]
+        if pooled and hasattr(env.unwrapped, "people"):
+            pool = graph_of_actions(env, varied_library().graph)
+            return cls(pool, in_order, prefer, correcting=True)
+        return cls(graph_of_actions(env), in_order, prefer, lambda: graph_of_actions(env))
 
     def act(self, observation: Any, info: Mapping[str, Any]) -> int:
         """Return the first action of the best path to what the task wants next.
@@ -153,20 +167,57 @@ class PathToTask(Policy):
         version = info.get("library_version", "")
         if self._renew is not None and version != self._version:
             self.graph, self._version, self._ways = self._renew(), version, {}
+        if self._correcting:
+            self._correct(transition_prior(info))
         goals = slots[:1] if self.in_order else slots
         if goals not in self._ways:
             self._ways[goals] = PathToGoal(self.graph, goals, self.prefer)
-        return self._ways[goals].act(observation, info)
+        self._here = self._ways[goals].act(observation, info)
+        return self._here
+
+    def reset(self, seed: int | None = None) -> None:
+        """Forget what was seen in the episode."""
+        self._here = 0
+        if self._correcting and self.graph is not self._given:
+            self.graph, self._ways = self._given, {}
+
+    def _correct(self, prior: FloatArray) -> None:
+        """Let the graph have the ways that the prior shows from the present primitive."""
+        shown = set((np.flatnonzero(prior[1:]) + 1).tolist())
+        if self._here == 0 or set(self.graph.successors(self._here)) == shown:
+            return
+        self.graph, self._ways = self.graph.copy(), {}
+        self.graph.remove_edges_from(list(self.graph.out_edges(self._here)))
+        for after in shown:
+            self.graph.add_edge(self._here, after, probability=float(prior[after]))
 
 
-def graph_of_actions(env: gymnasium.Env[Any, Any]) -> nx.DiGraph[int]:
-    """Return what an environment's robot can do after what: actions as nodes, see `PathToGoal`."""
+def graph_of_actions(
+    env: gymnasium.Env[Any, Any], known: TransitionGraph | None = None
+) -> nx.DiGraph[int]:
+    """Return what an environment's robot can do after what: actions as nodes, see `PathToGoal`.
+
+    Args:
+        env: The environment.
+        known: Transitions between its primitives; None takes those of the environment.
+    """
     repertoire = env.unwrapped.repertoire  # type: ignore[attr-defined]
     graph: nx.DiGraph[int] = nx.DiGraph()
-    for id in repertoire.feasible_ids:
+    possible = repertoire.feasible_ids
+    for id in possible:
         slot = repertoire.slots[id]
         graph.add_node(slot, duration_s=repertoire.skills.duration_s(id))
-        prior = repertoire.after(id).prior
-        for after in np.flatnonzero(prior[1:]) + 1:
-            graph.add_edge(slot, int(after), probability=float(prior[after]))
+    for id in possible:
+        if known is None:
+            prior = repertoire.after(id).prior
+            following = {int(after): float(prior[after]) for after in np.flatnonzero(prior[1:]) + 1}
+        else:
+            row = known.prior(id)
+            following = {
+                repertoire.slots[known.ids[k]]: float(row[k])
+                for k in np.flatnonzero(row)
+                if known.ids[k] in possible
+            }
+        for after, probability in following.items():
+            graph.add_edge(repertoire.slots[id], after, probability=probability)
     return graph

@@ -14,6 +14,7 @@ from mplearn_agents.suited import PriorUse as PriorUse
 
 VERSION = 3  # of agents: changes with networks, what they see, and what tasks show
 Ends: TypeAlias = list[list[float]]  # the tracked coordinates where a motion begins and ends
+EnvVersion: TypeAlias = Literal["v0", "v1"]
 AlgorithmName: TypeAlias = Literal["maskable-ppo", "ppo", "dqn"]
 
 
@@ -27,6 +28,7 @@ class TrainingConfig:
     nothing had happened, bit for bit (but for DQN, whose replay memory starts empty again).
 
     Attributes:
+        env: Version of the environment: "v0", or "v1" with many primitives of several people.
         task: Name of the environment's task, or where one's own is: "module:Class" or
             "file.py:Class".
         algorithm: "maskable-ppo"; or "ppo" or "dqn", which know no masks, with illegal actions
@@ -41,10 +43,11 @@ class TrainingConfig:
         learning_rate: Of the optimiser; None is the algorithm's own.
         network: Widths of the hidden layers, of actor and critic each.
         n_envs: Environments that it learns from at once; None is the algorithm's own. DQN has one.
-        discount: What a reward in a second's time is worth, in (0, 1].
+        discount: What a reward in a second's time is worth, in (0, 1]; None is the environment's.
         environment: Further arguments of the environment.
     """
 
+    env: EnvVersion = "v0"
     task: str = "goal"
     algorithm: AlgorithmName = "maskable-ppo"
     steps: int = 40_000
@@ -57,15 +60,21 @@ class TrainingConfig:
     learning_rate: float | None = None
     network: tuple[int, ...] = (128, 128)
     n_envs: int | None = None
-    discount: float = 0.95
+    discount: float | None = None
     environment: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name, allowed in (("algorithm", AlgorithmName), ("prior", PriorUse)):
+        for name, allowed in (
+            ("env", EnvVersion),
+            ("algorithm", AlgorithmName),
+            ("prior", PriorUse),
+        ):
             if getattr(self, name) not in get_args(allowed):
                 raise InvalidValueError(
                     f"{name} must be one of {get_args(allowed)}, not {getattr(self, name)!r}"
                 )
+        if self.env == "v1" and self.library is not None:
+            raise InvalidValueError("v1 has its own library: give none, or train on v0")
         for name in ("steps", "round_steps", "episodes"):
             if getattr(self, name) < 1:
                 raise InvalidValueError(f"{name} must be at least 1, not {getattr(self, name)}")
@@ -78,7 +87,7 @@ class TrainingConfig:
             )
         if self.learning_rate is not None and not 0.0 < self.learning_rate < inf:
             raise InvalidValueError(f"learning_rate must be positive, not {self.learning_rate}")
-        if not 0.0 < self.discount <= 1.0:
+        if self.discount is not None and not 0.0 < self.discount <= 1.0:
             raise InvalidValueError(f"discount must be in (0, 1], not {self.discount}")
         if self.n_envs is not None and self.n_envs < 1:
             raise InvalidValueError(f"n_envs must be at least 1, not {self.n_envs}")

@@ -27,7 +27,6 @@ from .trained import CONFIG, POLICY, TrainedPolicy, ends_of
 if TYPE_CHECKING:
     from rich.console import Console
 
-ENVIRONMENT = "mplearn/PrimitiveHumanoid-v0"
 _CHECKPOINT = "checkpoint-{:09d}.zip"
 
 
@@ -35,13 +34,15 @@ def make_environment(config: TrainingConfig) -> gymnasium.Env[Any, Any]:
     """Return an environment of a training, with illegal actions as the environment has them."""
     import mplearn_envs  # noqa: F401  (registers the environment)
 
+    options: dict[str, Any] = {"task": config.task, "dynamics": config.dynamics}
+    if config.env == "v0":
+        options["library"] = config.library
+    if config.discount is not None:
+        options["discount"] = config.discount
     return gymnasium.make(
-        ENVIRONMENT,
-        library=config.library,
-        task=config.task,
-        dynamics=config.dynamics,
+        f"mplearn/PrimitiveHumanoid-{config.env}",
         disable_env_checker=True,
-        **{"discount": config.discount, **config.environment},
+        **(options | config.environment),
     )
 
 

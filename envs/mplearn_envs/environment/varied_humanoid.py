@@ -32,6 +32,9 @@ TASKS: dict[str, Task] = {
 }
 
 
+_kept: list[Repertoire] = []  # outlives its environments: others of the process want it again
+
+
 class VariedHumanoidEnv(MacroStepEnv):
     """A humanoid with 138 primitives of several people, among which the ways are long.
 
@@ -125,6 +128,8 @@ class VariedHumanoidEnv(MacroStepEnv):
         what = (self.actions.capacity, motion.speed, motion.style, motion.feasibility)
         how = (motion.upper_body, novel, foreknowledge() if usual else None)
         first = shared_repertoire(library_of(0), self.robot, *what, *how)
+        if usual:
+            _kept[:] = [first]
         self._repertoires = {
             person: shared_repertoire(library_of(person), self.robot, *what, *how, like=first)
             for person in self.people
