@@ -105,7 +105,7 @@ def perform(
     if not possible:
         raise _nothing(robot, left_out)
     if ids:
-        name = "_".join(known[id].name for id in possible)
+        name = " / ".join(known[id].name for id in possible)
         return Performed((_motion(skills, possible, name, hold_s),), left_out)
     motions = tuple(_motion(skills, [id], known[id].name, hold_s) for id in possible)
     return Performed(motions, left_out)

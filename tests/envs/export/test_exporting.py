@@ -1,6 +1,7 @@
 """What a robot performs, and that files hold it: against MuJoCo, our readers, and others' code."""
 
 import importlib.util
+import json
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,7 +12,12 @@ from export_world import written
 from standing_library import standing_library
 
 from mplearn import open_recording
-from mplearn.errors import InvalidValueError, RobotError, UnknownPrimitiveError
+from mplearn.errors import (
+    InvalidValueError,
+    RecordingError,
+    RobotError,
+    UnknownPrimitiveError,
+)
 from mplearn.mocap import Hints
 from mplearn_envs.export import (
     Format,
@@ -273,3 +279,82 @@ def test_any_mjcf_is_a_robot_by_a_file_that_describes_it(tmp_path: Path) -> None
             described_robot(described)
     with pytest.raises(RobotError, match=r"FILE\.toml"):
         described_robot(tmp_path / "person.xml")
+
+
+def test_a_lerobot_data_set_has_an_episode_a_motion_and_a_task_a_primitive(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    done = perform(standing_library(("wave", "arms up", "squat")), humanoid())
+    model = RobotModel.of(humanoid())
+    (path,) = export(done.motions, model, format_of("lerobot"), tmp_path / "set")
+    info = json.loads((path / "meta/info.json").read_text())
+    assert info["codebase_version"] == "v3.0" and info["fps"] == 50
+    data = parquet.read_table(path / info["data_path"].format(chunk_index=0, file_index=0))
+    assert set(data.column_names) == set(info["features"])
+    assert data.num_rows == info["total_frames"] == sum(map(len, done.motions))
+    assert data["index"].to_pylist() == list(range(data.num_rows))
+    episodes = parquet.read_table(path / "meta/episodes/chunk-000/file-000.parquet").to_pylist()
+    tasks = parquet.read_table(path / "meta/tasks.parquet").to_pylist()
+    names = {row["task_index"]: row["__index_level_0__"] for row in tasks}
+    for motion, episode in zip(done.motions, episodes, strict=True):
+        own = slice(episode["dataset_from_index"], episode["dataset_to_index"])
+        assert episode["length"] == len(motion) == own.stop - own.start
+        performed = [names[k] for k in data["task_index"].to_pylist()[own]]
+        assert performed[5] == motion.spans[0].name and performed[-1] == "hold"
+        assert set(episode["tasks"]) == set(performed)
+        state = np.array(data["observation.state"].to_pylist()[own])
+        np.testing.assert_allclose(state[:, 7:], motion.joint_pos, atol=1e-6)
+        action = np.array(data["action"].to_pylist()[own])
+        assert np.array_equal(action[:-1], state[1:, 7:])
+        np.testing.assert_allclose(
+            episode["stats/observation.state/mean"], state.mean(axis=0), atol=1e-6
+        )
+    export(done.motions[:1], model, format_of("lerobot"), path)  # over its own
+    assert json.loads((path / "meta/info.json").read_text())["total_episodes"] == 1
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "mine").write_text("x")
+    with pytest.raises(InvalidValueError, match="something else in it"):
+        export(done.motions, model, format_of("lerobot"), other)
+
+
+def test_lerobots_own_class_opens_the_data_set(tmp_path: Path) -> None:
+    lerobot = pytest.importorskip(
+        "lerobot.datasets.lerobot_dataset", reason="lerobot is not installed"
+    )
+    done = perform(standing_library(("wave", "arms up")), humanoid())
+    (path,) = export(done.motions, RobotModel.of(humanoid()), format_of("lerobot"), tmp_path / "d")
+    data = lerobot.LeRobotDataset("local/d", root=path)
+    assert data.num_episodes == 2 and len(data) == sum(map(len, done.motions))
+    assert data[5]["task"] == "arms up"
+
+
+def test_an_mcap_is_a_joint_trajectory_of_ros(motion: RobotMotion, tmp_path: Path) -> None:
+    reader = pytest.importorskip("mcap.reader")
+    model = RobotModel.of(humanoid())
+    if motion.joint_names != model.joint_names:
+        pytest.skip("one robot is enough")
+    path = written(tmp_path, motion, model, "mcap")
+    with path.open("rb") as file:
+        found = reader.make_reader(file)
+        assert found.get_header().profile == "ros2"
+        summary = found.get_summary()
+        schemas = {schema.name: schema for schema in summary.schemas.values()}
+        trajectory = schemas["trajectory_msgs/msg/JointTrajectory"]
+        assert trajectory.encoding == "ros2msg" and "geometry_msgs/msg/PoseStamped" in schemas
+        counts = summary.statistics.channel_message_counts
+        assert sorted(counts.values()) == [1, len(motion)]
+        (raw,) = (
+            message.data for schema, _, message in found.iter_messages(topics=["/joint_trajectory"])
+        )
+    # CDR by hand: encapsulation, an empty stamp, "world", then the names
+    assert raw[:4] == b"\x00\x01\x00\x00"
+    n = int.from_bytes(raw[4 + 20 : 4 + 24], "little")
+    assert n == len(model.joint_names)
+    first = model.joint_names[0].encode() + b"\x00"
+    assert raw[4 + 28 : 4 + 28 + len(first)] == first
+    with path.open("rb") as file:
+        file.seek(0)
+        cut = tmp_path / "cut.mcap"
+        cut.write_bytes(file.read()[:2000])
+    with pytest.raises(RecordingError, match=r"cut\.mcap"):
+        check(cut, model, format_of("mcap"))
