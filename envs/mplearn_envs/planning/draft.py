@@ -35,11 +35,13 @@ class Pace(NamedTuple):
         patience: By how much shifts of the weight and swings of a foot take longer than at least.
         in_turn: Whether the body goes to where the motion begins while both feet are down, after
             one has been lowered and before another is raised, and not meanwhile.
+        gathers: Whether the feet are put beside each other before that.
     """
 
     speed: float
     patience: float = 1.0
     in_turn: bool = False
+    gathers: bool = False
 
 
 class Draft(NamedTuple):
@@ -99,7 +101,7 @@ class Drafter:
         pose = forward(ref.tree, start.q)
         here = pose.moment[0] / pose.carried[0]
         timeline, targets = self._targets(start, motion, pace, here)
-        ground = plan_ground(ref, timeline, motion.footwork, start.ground)
+        ground = plan_ground(ref, timeline, motion.footwork, start.ground, knot_s)
         standing = np.concatenate((start.ground[None], ground))
         up = np.concatenate(([start.lifted], timeline.up))
         weight = plan_weight(timeline, sole_middles(ref, ground), here[:2], knot_s)
@@ -145,10 +147,12 @@ class Drafter:
         to_foot = float(np.linalg.norm(middles - here[:2], axis=1).max())
         apart = float(np.linalg.norm(middles[0] - middles[1]))
         rise = float(start.swing[-2:].max())
-        parts = stretches(n_frames, footwork, start.lifted, rise, to_foot, apart)
-        lowers = parts[0].up >= 0 and parts[0].first == parts[0].last
+        parts = stretches(n_frames, footwork, start.lifted, rise, to_foot, apart, pace.gathers)
+        first_of_all = 0  # parts that come before the body goes where the motion begins
         if pace.in_turn:
-            parts.insert(int(lowers), Stretch(0, 0, -1, -1, blend_s))
+            lowers = parts[0].up >= 0 and parts[0].first == parts[0].last
+            first_of_all = int(lowers) + (2 * int(not lowers) if pace.gathers else 0)
+            parts.insert(first_of_all, Stretch(0, 0, -1, -1, blend_s))
         timeline = lay_out(parts, 1.0 / (motion.rate_hz * speed), knot_s, wait_s, pace.patience)
         at = timeline.progress
         time = np.arange(1.0, len(at) + 1.0) * knot_s
@@ -157,7 +161,7 @@ class Drafter:
         first = (frames[1] - frames[0]) * motion.rate_hz * speed if moves else 0.0
         heights = path[:, -2:].copy()
         rate = before_rate - first
-        late_s = timeline.ends[0] * knot_s if pace.in_turn and lowers else 0.0
+        late_s = timeline.ends[first_of_all - 1] * knot_s if first_of_all else 0.0
         fades = fading(np.maximum(time - late_s, 0.0), blend_s, gap, 0.0 * rate)
         fades += fading(time, blend_s, 0.0 * gap, rate)
         for side, (begin_s, end_s) in self._swings(timeline).items():
@@ -166,7 +170,7 @@ class Drafter:
             at_once = rate[of_it] if begin_s == 0.0 else np.zeros(len(of_it))
             fades[:, of_it] = fading(late, end_s - begin_s, gap[of_it], at_once)
         path += fades
-        path[:, -2:] = plan_rise(timeline, heights, start, path[:, -2:])
+        path[:, -2:] = plan_rise(timeline, heights, start, path[:, -2:], knot_s)
         path = np.clip(path, limits[:, 0], limits[:, 1])
         width = len(self._rates) - 2
         path[:, :width] = limit_velocity(
@@ -191,7 +195,14 @@ class Drafter:
         carried = np.clip(targets[:, -2:] / CARRY_M, 0.0, 1.0)
         carried = smooth_step(carried)
         path: tuple[FloatArray, FloatArray] = balanced_path(
-            self._reference, targets[:, :width], targets[:, width:], ground, carried, cog, start.q
+            self._reference,
+            targets[:, :width],
+            targets[:, width:],
+            ground,
+            carried,
+            cog,
+            start.q,
+            self.knot_s,
         )
         return path
 

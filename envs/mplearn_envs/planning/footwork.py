@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mplearn.maths.easing import smooth_step
 from mplearn.maths.plane import turn_in_plane, wrap_angle
 from mplearn.maths.yaw_roll_pitch import yaw_roll_pitch_quaternion
 from mplearn.recording import BoolArray, FloatArray, IntArray
@@ -46,7 +45,8 @@ class Footwork(NamedTuple):
 
     Attributes:
         legs: Angles of the legs' hinges, shape (T, n_legs) [rad].
-        rise: Height of each sole's lowest corner above the ground, 0 where it stands, (T, 2) [m].
+        rise: Height of each sole's lowest corner above the ground, 0 where it stands, (T, 2) [m];
+            how a foot gets there from the ground, and back, is planned (`plan_rise`).
         left_from_right: The left foot in the right one's frame: x, y [m] and yaw [rad], (T, 3).
         lifts: What leaves the ground, in order of time.
     """
@@ -83,14 +83,9 @@ def read_footwork(robot: Robot, frames: FloatArray, rate_hz: float) -> Footwork:
     lifts = _lifts(gap, skims, longest)
     rise = np.zeros_like(gap)
     for side, start, end in lifts:
-        inside = slice(max(start, 0), end)
+        inside = slice(max(start, 0), end + 1)
         over = np.maximum(gap[inside, side] - DOWN_M, 0.0)
-        x = np.arange(len(over)) + 0.5
-        from_ground = x if start >= 0 else np.full(len(over), np.inf)
-        to_ground = len(over) - x if end < len(gap) else np.full(len(over), np.inf)
-        near = np.minimum(np.minimum(from_ground, to_ground) / (0.2 * rate_hz), 1.0)
-        clear = CLEAR_M * smooth_step(near)
-        rise[inside, side] = over**2 / (over + _SOFT_M) + clear
+        rise[inside, side] = over**2 / (over + _SOFT_M) + CLEAR_M
     legs = np.ascontiguousarray(frames[:, 3 + robot.leg_joints])
     return Footwork(legs, rise, relative, tuple(lifts))
 

@@ -17,6 +17,7 @@ TOLERANCE = 1e-8  # [m, rad] to which the feet, COG and base follow
 OFF_M = 0.08  # by no more than this a foot's height is its leg's and not the one it shall have
 APART_M = 0.02  # between a foot and the one that it passes, where it is
 LOW_M = 0.2  # not much higher than this
+RISING_M_S2 = 5.0  # so fast the base gathers speed, and loses it, where a leg lets it rise again
 _MAX_ITERATIONS = 12
 
 
@@ -29,8 +30,12 @@ def balanced_path(
     carried: FloatArray,
     cog: FloatArray,
     start: FloatArray,
+    knot_s: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Balance the reference robot under every target.
+
+    Where a leg is too short, the base is lower than it shall be; when the leg is free again, the
+    base does not jump.
 
     Args:
         robot: The reference robot.
@@ -41,6 +46,7 @@ def balanced_path(
         carried: How far each foot follows its leg's motion instead, shape (K, 2), 0 to 1.
         cog: Horizontal COG, shape (K, 2) [m].
         start: Posture before them, shape (7 + n,).
+        knot_s: Time between targets [s].
 
     Returns:
         The postures, shape (K + 1, 7 + n), start included, and the largest error that is left in
@@ -64,6 +70,8 @@ def balanced_path(
         np.zeros(2),
     )
     offset = robot.stance_height - robot.standing_height
+    low = max(targets[0, 0] + offset - start[2], 0.0)  # by this the base is lower than it shall be
+    rising = 0.0  # by how much less than before
     for k in range(n_knots):
         q = out[k].copy()
         if k > 0:  # base and legs go on as they went
@@ -77,7 +85,10 @@ def balanced_path(
         stance.carried[:] = carried[k]
         heading = 0.5 * (ground[k, 0, 2] + ground[k, 1, 2])
         orientation = turn_about_vertical(heading, roll_pitch_matrix(targets[k, 1], targets[k, 2]))
-        height = targets[k, 0] + offset
+        fastest = min(
+            max(rising, 0.0) + RISING_M_S2 * knot_s**2, np.sqrt(2.0 * RISING_M_S2 * low) * knot_s
+        )
+        height = targets[k, 0] + offset - max(low - fastest, 0.0)
         for iteration in range(_MAX_ITERATIONS + 1):
             pose = forward(robot.tree, q)
             for side in range(2):
@@ -88,6 +99,8 @@ def balanced_path(
                 break
             q = nearer(robot.tree, stance, pose, rows, q)
         out[k + 1] = q
+        was_low, low = low, max(targets[k, 0] + offset - q[2], 0.0)
+        rising = was_low - low
     return out, worst
 
 

@@ -31,7 +31,7 @@ from .plan import Motion as Motion
 from .plan import Plan as Plan
 from .plan import PlannerConfig as PlannerConfig
 from .splines import refine
-from .stride import left_share, recentred
+from .stride import SAME_PLACE_M, SAME_YAW_RAD, left_from_right, left_share, recentred
 
 GRID_DECIMALS = 6
 OUT_OF_REACH = 1e-3  # [m, rad]: an error that slowing down does not mend
@@ -134,14 +134,12 @@ class Planner:
         return self.plan(start, motion, 1.0, ("hold", duration_s))
 
     def _plan(self, start: Reference, motion: Motion, speed: float) -> Plan:
-        pace = Pace(speed)
-        draft = self._drafter.draft(start, motion, pace)
-        for _ in range(_TRIES):
-            slower = self._slower(draft, start, motion, pace)
-            if slower == pace:
-                break
-            pace = slower
-            draft = self._drafter.draft(start, motion, pace)
+        draft, pace = self._balanced(start, motion, Pace(speed))
+        if not self._sound(draft) and self._strides(start):
+            gathered = Pace(speed, in_turn=True, gathers=True)
+            again, its_pace = self._balanced(start, motion, gathered)
+            if self._sound(again) or again.error.max() < draft.error.max():
+                draft, pace = again, its_pace
         knot_s = self._drafter.knot_s
         middles = sole_middles(self._reference, draft.ground)
         borne = np.where(np.isfinite(draft.zmp), draft.zmp, draft.cog[:, :2])  # it may fly
@@ -164,6 +162,27 @@ class Planner:
             share=share,
         )
 
+    def _balanced(self, start: Reference, motion: Motion, pace: Pace) -> tuple[Draft, Pace]:
+        """Return a motion as slow as it must be, and how slow that is."""
+        draft = self._drafter.draft(start, motion, pace)
+        for _ in range(_TRIES):
+            slower = self._slower(draft, start, motion, pace)
+            if slower == pace:
+                break
+            pace = slower
+            draft = self._drafter.draft(start, motion, pace)
+        return draft, pace
+
+    def _sound(self, draft: Draft) -> bool:
+        """Return whether the robot reaches what is wanted, and stands."""
+        reached = draft.error.max() <= 10.0 * OUT_OF_REACH
+        return bool(reached and draft.margin.min() >= self.config.zmp_margin_m - _ENOUGH_M)
+
+    def _strides(self, start: Reference) -> bool:
+        """Return whether the feet are apart; where motions are judged they are side by side."""
+        off = left_from_right(start.ground) - left_from_right(self._reference.ground)
+        return bool(np.hypot(off[0], off[1]) > SAME_PLACE_M or abs(off[2]) > SAME_YAW_RAD)
+
     def _slower(self, draft: Draft, start: Reference, motion: Motion, pace: Pace) -> Pace:
         """Return the pace that velocity limits and balance ask for; the same where it is right.
 
@@ -183,10 +202,12 @@ class Planner:
         wanted = self.config.zmp_margin_m + self.config.model_error * moving
         short = np.nan_to_num(wanted - draft.margin, nan=np.inf)
         worst = int(np.argmax(short))
-        if not (short[worst] > _ENOUGH_M and moving[worst] > 0):
+        if not short[worst] > _ENOUGH_M or moving[worst] == 0:
             return pace
-        share = 1.0 - 1.1 * short[worst] / moving[worst]
-        slower = max(_SLOWEST, float(np.sqrt(max(share, 0.0))))
+        slower = _SLOWEST
+        if np.isfinite(moving[worst]):  # it does not fly
+            share = 1.0 - 1.1 * short[worst] / moving[worst]
+            slower = max(_SLOWEST, float(np.sqrt(max(share, 0.0))))
         if draft.timeline.waits(worst, 1.0 / (motion.rate_hz * pace.speed)):
             return pace._replace(patience=pace.patience / slower)
         return pace._replace(speed=pace.speed * slower)

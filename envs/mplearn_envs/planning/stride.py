@@ -14,18 +14,23 @@ from mplearn_envs.mechanics.pendulum import plan_cog
 from mplearn_envs.mechanics.reference import Reference, ReferenceRobot
 
 from .footwork import Footwork
-from .timeline import Timeline, shift_time_s
+from .timeline import BESIDE, GATHER_M, Timeline, shift_time_s
 
 SAME_PLACE_M = 0.1  # a foot that lands so near to where it stood lands there
 SAME_YAW_RAD = 0.25
 APART_M = 0.02  # between soles beside each other
 CARRY_M = 0.12  # from this height on a foot follows the motion of the leg alone
+CLEAR_S = 0.2  # in which a foot gets clear of the ground, and comes back to it [s]
 _STILL_M = 1e-5
 RESTS_S = 0.4  # where the weight has so long to come to rest, it rests where it shall
 
 
 def plan_ground(
-    robot: ReferenceRobot, timeline: Timeline, footwork: Footwork | None, start: FloatArray
+    robot: ReferenceRobot,
+    timeline: Timeline,
+    footwork: Footwork | None,
+    start: FloatArray,
+    knot_s: float,
 ) -> FloatArray:
     """Return where each foot stands or would: x, y [m] and yaw [rad], shape (K, 2, 3).
 
@@ -34,31 +39,47 @@ def plan_ground(
         timeline: The plan's times.
         footwork: The motion's feet.
         start: Where they stand at first, shape (2, 3).
+        knot_s: Time between knots [s].
     """
     out = np.empty((len(timeline.progress), 2, 3))
     here, first = start.copy(), 0
     for part, last in zip(timeline.stretches, timeline.ends, strict=True):
         out[first:last] = here
-        if part.lands >= 0 and footwork is not None:
-            frame = min(part.lands, len(footwork.rise) - 1)
-            place = landing(robot, here, part.up, footwork.left_from_right[frame])
-            x = ((np.arange(last - first) + 1.0) / (last - first))[:, None]
-            x = smooth_step(x)
-            out[first:last, part.up] = here[part.up] * (1.0 - x) + place * x
+        relative = None
+        if part.lands == BESIDE:
+            relative = left_from_right(robot.ground)
+        elif part.lands >= 0 and footwork is not None:
+            relative = footwork.left_from_right[min(part.lands, len(footwork.rise) - 1)]
+        if relative is not None:
+            place = landing(robot, here, part.up, relative)
+            n = last - first
+            clear = _clearing(
+                n, knot_s, timeline.patience
+            )  # a foot that moves while it touches the ground drags
+            x = (np.arange(n) + 1.0 - 0.5 * clear) / (n - clear)
+            x = smooth_step(np.clip(x, 0.0, 1.0))[:, None]
+            way = here[part.up] * (1.0 - x) + place * x
+            out[first:last, part.up] = passing(robot, here[1 - part.up], part.up, way)
             here[part.up] = place
         first = last
     return out
 
 
+def left_from_right(ground: FloatArray) -> FloatArray:
+    """Return the left foot in the right one's frame, x, y [m] and yaw [rad], for feet (2, 3)."""
+    x, y, turn = ground[0] - ground[1]
+    return np.array((*turn_in_plane(x, y, -ground[1, 2]), wrap_angle(turn)))
+
+
 def landing(
-    robot: ReferenceRobot, ground: FloatArray, side: int, left_from_right: FloatArray
+    robot: ReferenceRobot, ground: FloatArray, side: int, relative: FloatArray
 ) -> FloatArray:
     """Return where a foot lands: x, y [m] and yaw [rad], shape (3,).
 
     It does not land on the other foot, however narrow the demonstrator stands.
     """
     stands = ground[1 - side]
-    dx, dy, turn = left_from_right
+    dx, dy, turn = relative
     if side == 1:  # the right foot in the left one's frame
         (dx, dy), turn = turn_in_plane(-dx, -dy, -turn), -turn
     length, width = np.ptp(robot.corners, axis=1).max(axis=0)[:2]
@@ -70,6 +91,22 @@ def landing(
     if np.hypot(moved[0], moved[1]) < SAME_PLACE_M and abs(moved[2]) < SAME_YAW_RAD:
         return np.array(ground[side])
     return np.asarray(ground[side] + moved)
+
+
+def passing(robot: ReferenceRobot, stands: FloatArray, side: int, way: FloatArray) -> FloatArray:
+    """Return the way of a foot, shape (n, 3), led round the foot that stands, shape (3,).
+
+    Where it begins and ends stays.
+    """
+    dx, dy = (way[:, :2] - stands[:2]).T
+    x, y = turn_in_plane(dx, dy, -stands[2])
+    length, width = np.ptp(robot.corners, axis=1).max(axis=0)[:2]
+    clear = width + APART_M + 0.5 * length * np.abs(np.sin(way[:, 2] - stands[2]))
+    beside = smooth_step(np.clip(2.0 * (1.5 - np.abs(x) / length), 0.0, 1.0))
+    out = beside * np.maximum(0.0, clear - (y if side == 0 else -y))
+    out = np.maximum(0.0, out - np.linspace(out[0], out[-1], len(out)))
+    aside = turn_in_plane(0.0, 1.0 if side == 0 else -1.0, stands[2])
+    return np.asarray(way + np.outer(out, (*aside, 0.0)))
 
 
 def left_share(middles: FloatArray, up: IntArray, zmp: FloatArray) -> FloatArray:
@@ -99,6 +136,11 @@ def recentred(q: FloatArray, ground: FloatArray) -> tuple[FloatArray, FloatArray
     ground[:, :2] = np.stack(turn_in_plane(x, y, -yaw), axis=1)
     ground[:, 2] -= yaw
     return q, ground
+
+
+def _clearing(n_knots: int, knot_s: float, patience: float) -> float:
+    """Return in how many of so many knots a foot gets clear of the ground, or back to it."""
+    return min(CLEAR_S * patience / knot_s, n_knots / 3.0)
 
 
 class Weight(NamedTuple):
@@ -167,29 +209,49 @@ def plan_weight(
 
 
 def plan_rise(
-    timeline: Timeline, rise: FloatArray, start: Reference, blended: FloatArray
+    timeline: Timeline, rise: FloatArray, start: Reference, blended: FloatArray, knot_s: float
 ) -> FloatArray:
     """Return the heights of the soles along a plan, shape (K, 2) [m].
+
+    However slowly the demonstrator raised a foot, it leaves the ground at once, and comes back to
+    it at last.
 
     Args:
         timeline: The plan's times.
         rise: Heights in the motion, shape (K, 2) [m].
         start: Where the reference robot is.
         blended: Heights when a foot stays up, blended with those at the start, shape (K, 2).
+        knot_s: Time between knots [s].
     """
     out, first = rise.copy(), 0
+    was_up = start.lifted
     for i, (part, last) in enumerate(zip(timeline.stretches, timeline.ends, strict=True)):
         side, here = part.up, slice(first, last)
         if side < 0:
             out[here] = 0.0
         else:
             out[here, 1 - side] = 0.0
-            ramp = minimum_jerk((np.arange(last - first) + 1.0) / (last - first))
-            if part.first == part.last and i == 0 and start.up[side] > 0:
-                out[here, side] = start.swing[side - 2] * (1.0 - ramp)
+            n = last - first
+            ticks, clear = np.arange(n) + 1.0, _clearing(n, knot_s, timeline.patience)
+            ramp = minimum_jerk(ticks / n)
+            leaves = smooth_step(np.minimum(ticks / clear, 1.0))
+            lands = smooth_step(np.minimum((n - ticks) / clear, 1.0))
+            begins_up = i == 0 and start.up[side] > 0
+            lowers = begins_up and part.first == part.last
+            before = start.swing[side - 2] if begins_up else 0.0
+            if part.lands == BESIDE:
+                out[here, side] = (before * (1.0 - ramp) + GATHER_M * leaves) * lands
+            elif lowers:
+                out[here, side] = before * (1.0 - ramp)
             elif part.first == part.last:
                 out[here, side] = rise[last - 1, side] * ramp
-            elif i == 0 and start.up[side] > 0:
-                out[here, side] = blended[here, side]
+            else:
+                if begins_up:
+                    out[here, side] = blended[here, side]
+                if was_up != side:
+                    out[here, side] *= leaves
+                if part.lands >= 0:
+                    out[here, side] *= lands
+            was_up = -1 if lowers or part.lands != -1 else side
         first = last
     return np.maximum(out, 0.0)

@@ -18,6 +18,8 @@ from .footwork import Footwork
 RAMP_S = 0.3  # in which a motion that had to wait gathers speed
 SWING_S = 0.4  # to raise or lower a foot where the motion itself does not [s], and the more
 SWING_S_PER_M = 3.0  # the higher [s/m]
+BESIDE = -2
+GATHER_M = 0.04  # to this height a foot is raised that is put beside the other
 LEAST_SWING_S = 0.4  # in which one foot carries, at least [s]
 SHIFT_S = 0.5  # to bring the weight anywhere [s], and the more the farther:
 SHIFT_S_PER_M = 2.5  # [s/m]
@@ -31,7 +33,7 @@ class Stretch(NamedTuple):
         last: Frame at its end.
         up: Side of the foot that is in the air; -1 for none.
         lands: Frame of the motion in which that foot lands at its end; -1 where it lands not, or
-            where it stood.
+            where it stood; `BESIDE` where it lands beside the other, as the robot stands.
         least_s: How long it takes at least [s].
     """
 
@@ -89,6 +91,7 @@ def stretches(
     rise_m: float,
     to_foot_m: float,
     apart_m: float,
+    gathers: bool = False,
 ) -> list[Stretch]:
     """Divide a motion where feet leave the ground and land.
 
@@ -99,17 +102,23 @@ def stretches(
         rise_m: How high it is [m].
         to_foot_m: How far the COG is from the foot that shall carry first [m].
         apart_m: How far the feet are apart [m].
+        gathers: Whether the feet are put beside each other first.
     """
     last = n_frames - 1
     lifts = () if footwork is None else footwork.lifts
     begins_up = lifts[0].side if lifts and lifts[0].start < 0 else -1
     out = []
-    if up >= 0 and up != begins_up:
+    if gathers:
+        if up < 0:
+            up = 0 if begins_up < 0 else begins_up
+            out.append(Stretch(0, 0, -1, -1, shift_time_s(to_foot_m)))
+        out.append(Stretch(0, 0, up, BESIDE, swing_time_s(max(rise_m, GATHER_M)) + SWING_S))
+    elif up >= 0 and up != begins_up:
         out.append(Stretch(0, 0, up, -1, swing_time_s(rise_m)))
     here, loaded = 0, 1 - up if up >= 0 else -1
     for lift in lifts:
         start, end = max(lift.start, 0), min(lift.end, last)
-        carried_on = lift.start < 0 and lift.side == up
+        carried_on = lift.start < 0 and lift.side == up and not gathers
         if not carried_on and loaded != 1 - lift.side:
             far = to_foot_m if loaded < 0 else apart_m
             out.append(Stretch(here, start, -1, -1, shift_time_s(far)))

@@ -15,7 +15,7 @@ from mplearn_envs.mechanics.pendulum import JERK_WEIGHT, plan_cog, zmp_along
 from mplearn_envs.mechanics.reference import sole_middles, soles
 from mplearn_envs.planning import Motion, Planner, PlannerConfig
 from mplearn_envs.planning.footwork import Footwork, Lift, read_footwork
-from mplearn_envs.planning.stride import landing
+from mplearn_envs.planning.stride import landing, passing
 from mplearn_envs.robot import humanoid
 
 HUMANOID = humanoid()
@@ -235,6 +235,57 @@ def test_a_foot_lands_beside_the_other_not_on_it():
     np.testing.assert_array_equal(  # almost where it stood is where it stood
         landing(REFERENCE, REFERENCE.ground, 1, np.array([0.03, 0.2, 0.1])), REFERENCE.ground[1]
     )
+
+
+SLOW = step(1, (0.0, 0.18, 0.0), (-0.35, 0.17, 0.1), 200.0)  # a stride ahead of the left foot
+OTHER = step(0, (-0.35, 0.17, 0.1), (0.35, 0.17, 0.1), 200.0)  # past the right one, as in walking
+
+
+def test_a_foot_that_moves_over_the_floor_is_clear_of_it():
+    """However slowly it rises: here by a millimetre in the first tenth of the step."""
+    lift = SLOW.footwork.lifts[0]
+    rise = SLOW.footwork.rise.copy()
+    rise[:, 1] = np.where(rise[:, 1] > 0, np.maximum(rise[:, 1] ** 2 / 0.06, 0.015), 0.0)
+    motion = SLOW._replace(footwork=SLOW.footwork._replace(rise=rise, lifts=(lift,)))
+    plan = PLANNER.plan(REST, motion, 0.5)
+    moves = np.linalg.norm(np.diff(plan.ground[:, 1, :2], axis=0), axis=1) / plan.knot_s
+    heights = np.array([soles(HUMANOID, q)[1, :, 2].min() for q in plan.q[1:]])
+    assert moves.max() > 0.2
+    assert heights[moves > 0.05].min() > 0.005
+
+
+def test_a_foot_is_led_round_the_other_one():
+    stands = np.array([0.0, -0.09, 0.0])
+    x = np.linspace(0.0, 1.0, 50)[:, None]
+    way = np.array([-0.45, 0.03, 0.0]) * (1 - x) + np.array([0.45, 0.03, 0.0]) * x
+    led = passing(REFERENCE, stands, 0, way)
+    length, width, _ = np.ptp(REFERENCE.corners[0], axis=0)
+    beside = np.abs(led[:, 0]) < length
+    assert (led[beside, 1] + 0.09 > width + 0.019).all()
+    np.testing.assert_array_equal(led[[0, -1]], way[[0, -1]])
+    right = passing(REFERENCE, stands * (1, -1, 1), 1, way * (1, -1, 1))
+    np.testing.assert_allclose(right, led * (1, -1, 1), atol=1e-15)
+
+
+def test_strides_follow_each_other_without_a_fall():
+    simulation, here = started(), REST
+    for motion in (SLOW, OTHER, SLOW, OTHER):
+        plan = PLANNER.plan(here, motion, 0.4)
+        assert plan.error.max() < 0.01 and plan.zmp_margin_m.min() > 0.01
+        assert not simulation.perform(plan).fallen
+        here = plan.end
+
+
+def test_what_cannot_be_done_from_a_stride_is_done_from_where_the_feet_are_side_by_side():
+    """A squat is too deep for the ankles with one foot a third of a metre ahead."""
+    squat = {"base_height": -0.2, "shoulder_pitch_l": -1.0}
+    deep = PLANNER.motion(sweep({}, squat, 2.0), RATE_HZ)
+    simulation = started()
+    stride = PLANNER.plan(REST, SLOW, 0.4)
+    assert abs(stride.end.ground[0, 0] - stride.end.ground[1, 0]) > 0.3
+    plan = PLANNER.plan(stride.end, deep, 0.5)
+    assert plan.error.max() < 0.01
+    assert not simulation.perform(stride).fallen and not simulation.perform(plan).fallen
 
 
 def test_steps_are_a_pure_function_and_cached():
