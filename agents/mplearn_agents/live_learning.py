@@ -17,6 +17,7 @@ from mplearn.errors import RecordingError
 from .arguments import pace, positive
 from .inert import printable
 from .interrupts import asked_to_stop
+from .pauses import short_pauses
 from .reading import hints_of
 
 if TYPE_CHECKING:
@@ -117,16 +118,17 @@ def learn_from_source(
                 markup=False,
                 highlight=False,
             )
-            log = learn_live(
-                source,
-                stop,
-                _say(),
-                config=configure,
-                as_json=args.json,
-                seconds=args.seconds,
-                life=life,
-                store=args.store,
-            )
+            with short_pauses():
+                log = learn_live(
+                    source,
+                    stop,
+                    _say(),
+                    config=configure,
+                    as_json=args.json,
+                    seconds=args.seconds,
+                    life=life,
+                    store=args.store,
+                )
             if log.life is not None:
                 stack.push(log.life)
         _report(console, args, source, log, stopped=stop.is_set())

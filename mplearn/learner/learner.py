@@ -362,6 +362,14 @@ class MotionLearner:
             with_shown_once(library, self.tree, self.chain, self._view) if shown_once else library
         )
 
+    def prepare_snapshot(self) -> bool:
+        """Do a part of what a snapshot takes, a primitive's; return whether nothing is left of it.
+
+        Who may not be held up calls this now and then, and `snapshot` once it returns true: that
+        takes little then, even where all primitives have changed.
+        """
+        return self._snapshots.prepare(self.tree)
+
     def state(self) -> LearnerState:
         """Return all that the learner knows: `from_state` resumes bit for bit.
 

@@ -46,6 +46,20 @@ class Snapshots:
         (node,) = (node for node in tree.nodes if node.id == id)
         self.frozen[id] = FrozenState(self._primitive(tree, node)[1])
 
+    def prepare(self, tree: PeopleTree) -> bool:
+        """Make one of the primitives that `take` would have to make; return whether there is none.
+
+        Args:
+            tree: See `take`.
+        """
+        nodes = {node.id: node for node in tree.nodes}
+        for id in tree.leaves:
+            made = self._primitive(tree, nodes[id])
+            if id not in self._made or self._made[id][1] is not made[1]:
+                self._made[id] = made
+                return False
+        return True
+
     def take(self, tree: PeopleTree, graph: TransitionGraph) -> PrimitiveLibrary:
         """Return the primitives and transitions that are known now.
 

@@ -353,6 +353,13 @@ class LifelongLearner:
             self._shown = self._revision, self._named(self.learner.snapshot())
         return self._shown[1]
 
+    def prepare_snapshot(self) -> bool:
+        """Do a part of what a snapshot takes; return whether nothing is left of it.
+
+        See `MotionLearner.prepare_snapshot`.
+        """
+        return self.learner.prepare_snapshot()
+
     # ---- keeping
 
     def state(self) -> LifeState:

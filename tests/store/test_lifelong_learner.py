@@ -1,6 +1,7 @@
 """Commands, undo and redo while learning goes on, and the log that does it all again."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from mplearn import LearnerConfig, MotionLearner, Recording
 from mplearn.errors import InvalidValueError, MPLearnError, UnknownPrimitiveError
 from mplearn.learner import Recognised
+from mplearn.library import Primitive
 from mplearn.recording import FloatArray
 from mplearn.store import (
     Command,
@@ -328,3 +330,32 @@ def test_the_history_of_a_primitive(taught: MotionLearner, motions: Recording) -
     assert life.snapshot() is life.snapshot()
     life.learn_many(np.repeat(motions.frames[-1:], 10, axis=0))
     assert life.revision == revision
+
+
+def test_a_snapshot_can_be_prepared_a_primitive_at_a_time(
+    taught: MotionLearner, later: FloatArray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is left to do is little then, and what comes out is the same."""
+    made = [0]
+    from_exemplars = Primitive.from_exemplars
+
+    def counted(*args: Any, **kwargs: Any) -> Primitive:
+        made[0] += 1
+        return from_exemplars(*args, **kwargs)
+
+    monkeypatch.setattr(Primitive, "from_exemplars", counted)
+    life, other = life_of(taught), life_of(taught)
+    for part in (later[:1], later[1:]):
+        for each in (life, other):
+            each.learn_many(part)
+        at_once = other.snapshot()
+        while True:
+            before = made[0]
+            ready = life.prepare_snapshot()
+            assert made[0] - before == (0 if ready else 1)
+            if ready:
+                break
+        before = made[0]
+        assert life.snapshot().version == at_once.version
+        assert made[0] == before
+        assert life.prepare_snapshot()

@@ -24,6 +24,7 @@ from mplearn.learner import LearnerConfig, MotionLearner, learnable_rate
 from mplearn.sources import Block, Change, Observe, Source, open_source
 from mplearn.store import LifelongLearner, Store
 
+from ..pauses import short_pauses
 from .happenings import happening, tell
 from .knowledge import knowledge
 from .messages import Header, unpack
@@ -132,8 +133,9 @@ class Watcher:
         self._state = "waiting for frames"
         for target in (self._read_source, self._read_requests):
             threading.Thread(target=target, args=(source,), daemon=True).start()
-        while self._step():
-            pass
+        with short_pauses():
+            while self._step():
+                pass
 
     # ---- threads that read
 
@@ -290,9 +292,12 @@ class Watcher:
         self._outbox.post({"kind": "forecast", "next": coming}, key="forecast")
 
     def _tell_knowledge(self) -> None:
-        """Say what is known, if that has changed."""
+        """Say what is known, if that has changed; where much has, only after some more blocks."""
         lifelong = self._lifelong
         if lifelong is None or lifelong.revision == self._told_revision:
+            return
+        if not lifelong.prepare_snapshot():
+            self._told_at = 0.0
             return
         self._told_revision = lifelong.revision
         library, tree = lifelong.snapshot(), lifelong.learner.tree
@@ -313,7 +318,7 @@ class Watcher:
 
     def _status(self) -> Header:
         delays = sorted(self._delays)
-        now, waiting = time.monotonic(), self._inbox.qsize()
+        now = time.monotonic()
         recent = [(at, n) for at, n in self._arrivals if now - at < 2.0]
         span = now - recent[0][0] if len(recent) > 1 else 0.0
         tally = vars(self._source.tally) if self._source is not None else {}
@@ -325,7 +330,7 @@ class Watcher:
             "rate_hz": round(sum(n for _, n in recent[1:]) / span, 1) if span > 0 else 0.0,
             "delay_ms": round(1e3 * delays[len(delays) // 2], 1) if delays else None,
             "delay_99_ms": round(1e3 * delays[int(0.99 * len(delays))], 1) if delays else None,
-            "waiting": waiting,
+            "behind_s": round(self._behind_s(), 1),
             "lost": tally.get("lost", 0),
             "faults": {name: n for name, n in tally.items() if n and name != "frames"},
             "frames": tally.get("frames", 0),
@@ -336,6 +341,12 @@ class Watcher:
             "paused": False if lifelong is None else lifelong.learner.paused,
             "memory_mb": _memory_mb(),
         }
+
+    def _behind_s(self) -> float:
+        """Return how much of the stream waits to be learned [s]."""
+        blocks = self._inbox.qsize()
+        mean = sum(n for _, n in self._arrivals) / max(len(self._arrivals), 1)
+        return blocks * mean / self._rate_hz if self._rate_hz else 0.0
 
     def _problem(self) -> str:
         """Return why what is learned cannot be kept; empty where it can."""

@@ -136,7 +136,7 @@ function status() {
     ["delay", s.delay_ms == null ? "–" : `${s.delay_ms.toFixed(0)} ms`, s.delay_99_ms == null ? "" : `99 of 100 within ${s.delay_99_ms.toFixed(0)} ms`, s.delay_ms > 100],
     ["lost", `${s.lost ?? 0}`, faults || "nothing was lost", s.lost > 0],
     ...(s.problem ? [["store", "not kept", s.problem, true]] : []),
-    ...(s.waiting > 20 ? [["behind", `${s.waiting} blocks`, "the learner is slower than the stream", true]] : []),
+    ...(s.behind_s > 0.3 ? [["behind", `${s.behind_s.toFixed(1)} s`, "the learner is slower than the stream; nothing is dropped", true]] : []),
     ...(p.clients > 1 ? [["", `${p.clients} look on`, ""]] : []),
   ]);
   stage.captions.person = s.person ? `person ${s.person}` : "";
