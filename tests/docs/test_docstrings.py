@@ -47,6 +47,7 @@ PUBLIC = {  # beside all of `mplearn.__all__`: what a user of each room starts f
     "mplearn.segmentation": ["Segmenter"],
     "mplearn.sources": ["open_source"],
     "mplearn.state": ["checkpoint", "newer", "saved_as"],
+    "mplearn.statistics": ["compare", "quality", "transitions"],
     "mplearn.store": ["LifelongLearner"],
     "mplearn.tables": ["write_segments", "SegmentTable"],
     "mplearn.tree": ["PrimitiveTree", "TreeConfig"],

@@ -8,6 +8,7 @@ PRINTS = {
     "01-from-markers-to-a-walk": "SegmentClosed",
     "02-train-an-agent": "0 illegal",
     "03-the-papers-experiments": "primitives 4\n",
+    "04-compare-groups": "duration [s]: p = 0.0",
 }
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "notebooks").glob("*.ipynb"))
 

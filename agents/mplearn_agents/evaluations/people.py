@@ -120,6 +120,23 @@ def walks(setting: Setting) -> Iterator[Table]:
         yield learned_table(performable, setting.seeds)
 
 
+def shards(setting: Setting) -> Iterator[Table]:
+    """People learned apart and merged, against one learner for all."""
+    from mplearn.evaluation.experiments import shard_table, shards_of_people
+
+    if len({take.person for take in setting.takes}) > 1:
+        learned, asked = shards_of_people(setting.takes)
+        yield shard_table("a shard is a person", learned, asked)
+
+
+def quality(setting: Setting) -> Iterator[Table]:
+    """Motions performed wrongly on purpose, judged against right ones."""
+    from mplearn.evaluation.experiments import quality_table
+
+    if setting.wrong_takes:
+        yield from _filled(quality_table(setting.takes, setting.wrong_takes))
+
+
 def _filled(table: Table) -> Iterator[Table]:
     """Yield a table that has rows: where there was too little to measure it has none."""
     if table.rows:
@@ -138,5 +155,7 @@ EVALUATIONS = {
     "inverse-kinematics": inverse_kinematics,
     "scaffolding": scaffolding,
     "chains": chains,
+    "shards": shards,
+    "quality": quality,
     "walks": walks,
 }

@@ -57,6 +57,21 @@ def anomaly(setting: Setting) -> Iterator[Table]:
     yield anomaly_table(judge_paper_session(seed) for seed in setting.seeds)
 
 
+def shards(setting: Setting) -> Iterator[Table]:
+    """Sessions learned apart and merged, against one learner for all."""
+    from mplearn.evaluation.experiments import demonstrated_shards, shard_table
+
+    learned, asked = demonstrated_shards(setting.seeds)
+    yield shard_table("a shard is half a session like the paper's", learned, asked)
+
+
+def group_tests(setting: Setting) -> Iterator[Table]:
+    """Tests that compare groups: false alarms in 1,000 studies without a difference."""
+    from mplearn.evaluation.experiments import group_test_table
+
+    yield group_test_table()
+
+
 def inverse_kinematics(setting: Setting) -> Iterator[Table]:
     """Joint angles against the demonstrator's."""
     from mplearn.evaluation.experiments import joint_error_table
@@ -81,4 +96,6 @@ EVALUATIONS = {
     "anomaly": anomaly,
     "peers": peers,
     "inverse-kinematics": inverse_kinematics,
+    "shards": shards,
+    "group-tests": group_tests,
 }

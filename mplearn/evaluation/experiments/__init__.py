@@ -4,9 +4,11 @@ from .activities import activity_table as activity_table
 from .anomaly import judge_paper_session as judge_paper_session
 from .anomaly import judge_people as judge_people
 from .boundaries import boundary_table as boundary_table
+from .execution_quality import quality_table as quality_table
 from .exercises import exercise_table as exercise_table
 from .factorial import factorial_table as factorial_table
 from .generation import generation_table as generation_table
+from .group_tests import group_test_table as group_test_table
 from .inverse_kinematics import joint_error_table as joint_error_table
 from .inverse_kinematics import marker_residual_table as marker_residual_table
 from .judged import anomaly_table as anomaly_table
@@ -31,4 +33,7 @@ from .sessions import by_person as by_person
 from .sessions import learn_paper_sessions as learn_paper_sessions
 from .sessions import learn_people as learn_people
 from .sessions import observed_sessions as observed_sessions
+from .shards import demonstrated_shards as demonstrated_shards
+from .shards import shard_table as shard_table
+from .shards import shards_of_people as shards_of_people
 from .told_apart import content_table as content_table

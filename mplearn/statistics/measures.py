@@ -1,0 +1,160 @@
+"""A number for each person (or take) and primitive: how often, how long, how even."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from types import MappingProxyType
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from ..errors import InvalidValueError
+from ..library import RecognisedSegment, SegmentTable
+from ..recording import FloatArray
+
+Unit: TypeAlias = Literal["person", "take"]
+
+
+@dataclass(frozen=True, eq=False)
+class Measure:
+    """A measure of each primitive, for each unit of a study.
+
+    Attributes:
+        name: What is measured, with its unit of measure.
+        units: People, or takes, length U.
+        primitives: Names of the primitives, length P.
+        values: Shape (U, P); NaN where a unit shows too little of a primitive.
+    """
+
+    name: str
+    units: tuple[str, ...]
+    primitives: tuple[str, ...]
+    values: FloatArray
+
+    def of(self, unit: str, primitive: str) -> float:
+        """Return the value of a unit and a primitive."""
+        return float(self.values[self.units.index(unit), self.primitives.index(primitive)])
+
+
+def grouped(table: SegmentTable, unit: Unit) -> dict[str, dict[str, list[RecognisedSegment]]]:
+    """Return the segments of each unit by take, in the order of time.
+
+    Raises:
+        InvalidValueError: ``unit`` is neither person nor take, or somebody is unnamed.
+    """
+    if unit not in ("person", "take"):
+        raise InvalidValueError(f"unit must be 'person' or 'take', not {unit!r}")
+    found: defaultdict[str, defaultdict[str, list[RecognisedSegment]]]
+    found = defaultdict(lambda: defaultdict(list))
+    for row in table:
+        who = row.person if unit == "person" else row.take
+        if not who:
+            raise InvalidValueError(
+                f"take {row.take!r} names no person: unit='take' compares takes instead"
+            )
+        found[who][row.take].append(row)
+    return {
+        who: {take: sorted(rows, key=lambda row: row.start_s) for take, rows in takes.items()}
+        for who, takes in sorted(found.items())
+    }
+
+
+def names_of(table: SegmentTable) -> tuple[str, ...]:
+    """Return the names of the primitives that a table holds, in order."""
+    return tuple(sorted({row.name for row in table if row.name}))
+
+
+def _measured(
+    name: str,
+    table: SegmentTable,
+    unit: Unit,
+    value: Callable[[Mapping[str, list[RecognisedSegment]], str], float],
+) -> Measure:
+    units, primitives = grouped(table, unit), names_of(table)
+    values = [[value(takes, primitive) for primitive in primitives] for takes in units.values()]
+    shape = (len(units), len(primitives))
+    return Measure(
+        name, tuple(units), primitives, np.array(values, dtype=np.float64).reshape(shape)
+    )
+
+
+def _executions(
+    takes: Mapping[str, list[RecognisedSegment]], primitive: str
+) -> list[RecognisedSegment]:
+    return [row for rows in takes.values() for row in rows if row.name == primitive]
+
+
+def repetitions(table: SegmentTable, unit: Unit = "person") -> Measure:
+    """Return how often each primitive was performed.
+
+    Example:
+        >>> rows = [RecognisedSegment("t", k, k + 0.5, 1, "bow", "bow", 0.1, 0.9, "anna")
+        ...         for k in range(3)]
+        >>> repetitions(SegmentTable(rows)).of("anna", "bow")
+        3.0
+    """
+    return _measured("repetitions", table, unit, lambda takes, p: len(_executions(takes, p)))
+
+
+def durations(table: SegmentTable, unit: Unit = "person") -> Measure:
+    """Return how long each primitive takes, on average [s]."""
+
+    def value(takes: Mapping[str, list[RecognisedSegment]], primitive: str) -> float:
+        return _mean([row.duration_s for row in _executions(takes, primitive)])
+
+    return _measured("duration [s]", table, unit, value)
+
+
+def tempo(table: SegmentTable, unit: Unit = "person") -> Measure:
+    """Return how fast each primitive is repeated [1/min], by the median time between starts.
+
+    Only what lies between two executions in a take counts, whatever is done in between.
+    """
+
+    def value(takes: Mapping[str, list[RecognisedSegment]], primitive: str) -> float:
+        gaps = [
+            b.start_s - a.start_s
+            for rows in takes.values()
+            for a, b in pairwise([row for row in rows if row.name == primitive])
+        ]
+        return 60.0 / float(np.median(gaps)) if gaps else np.nan
+
+    return _measured("tempo [1/min]", table, unit, value)
+
+
+def variability(table: SegmentTable, unit: Unit = "person") -> Measure:
+    """Return how uneven the durations of each primitive are: their coefficient of variation."""
+
+    def value(takes: Mapping[str, list[RecognisedSegment]], primitive: str) -> float:
+        lengths = [row.duration_s for row in _executions(takes, primitive)]
+        return float(np.std(lengths, ddof=1) / np.mean(lengths)) if len(lengths) > 1 else np.nan
+
+    return _measured("variability of duration", table, unit, value)
+
+
+def spread(table: SegmentTable, unit: Unit = "person") -> Measure:
+    """Return how far executions lie from what was learned of their primitive [nats a frame]."""
+
+    def value(takes: Mapping[str, list[RecognisedSegment]], primitive: str) -> float:
+        return _mean([row.distance for row in _executions(takes, primitive)])
+
+    return _measured("distance [nats a frame]", table, unit, value)
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values)) if len(values) else np.nan
+
+
+MEASURES: Mapping[str, Callable[..., Measure]] = MappingProxyType(
+    {
+        "repetitions": repetitions,
+        "durations": durations,
+        "tempo": tempo,
+        "variability": variability,
+        "spread": spread,
+    }
+)
+"""The measures by name."""
