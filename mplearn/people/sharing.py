@@ -244,6 +244,9 @@ class Sharing:
             change = self._solve(before, joined, person, placement)
         elif number in joined:
             self.measure_offsets()
+        own = self.numbers[person]
+        back = [(own[n], ROOT) for n, to in placement.moved if to == ROOT and n in own]
+        change = Change(moved=tuple(back)).then(change)
         self._tidy(person)
         home = self._home(person, placement.node_id, number)
         new = home in change.born and not any(home in split.into for split in change.splits)

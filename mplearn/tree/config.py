@@ -78,6 +78,9 @@ class TreeConfig:
         spread: Largest scale over that quartile; inf for no such bound.
         mean_share: Largest scale over the mean distance; it holds while hardly any motion has been
             seen twice.
+        rise: The scale ends where the known segments round a new one grow in number by this more,
+            with the distance, than they do at the least (`exemplars.neighbours`): there other
+            motions begin. A leaf that is wider by then keeps its core only. inf for neither.
         birth_cap: Largest diameter of what is born over the median of that of the leaves, once many
             are known; inf for the scale alone.
         extent_share: Largest distance between executions of one motion over that of each from
@@ -88,6 +91,8 @@ class TreeConfig:
             takes 3 halves those and costs one demonstration, 4 leaves hardly any and costs two.
         pair_share: Two members alone become a node only below this share of the scale, and only
             while no larger cluster is below it.
+        pair_extent: And below this share of how far each is from standing still, which is small
+            only where they are like each other in shape; inf for no such bound.
         confirmed: Members from which on a primitive is sure; with fewer it is provisional.
         patience: A provisional primitive that nothing has joined after so many further segments is
             forgotten; after four times as many as there are primitives, if that is more.
@@ -141,10 +146,12 @@ class TreeConfig:
     scale_floor: float = newer(0.03, absent=0.0)
     spread: float = math.inf
     mean_share: float = 0.45
+    rise: float = newer(1.05, absent=math.inf)
     birth_cap: float = newer(1.75, absent=math.inf)
     extent_share: float = newer(1.4, absent=math.inf)
     min_exemplars: int = 2
     pair_share: float = newer(0.6, absent=1.0)
+    pair_extent: float = newer(1.1, absent=math.inf)
     confirmed: int = newer(3, absent=1)
     patience: int = newer(64, absent=64)
     reach: float = 1.5
@@ -176,9 +183,11 @@ class TreeConfig:
             tempo=math.inf,
             local=True,
             min_exemplars=4,
+            rise=math.inf,
             birth_cap=math.inf,
             extent_share=math.inf,
             pair_share=1.0,
+            pair_extent=math.inf,
             confirmed=1,
             young_reach=0.0,
             least_reach=0.0,
@@ -197,9 +206,11 @@ class TreeConfig:
             "scale_share",
             "spread",
             "mean_share",
+            "rise",
             "birth_cap",
             "extent_share",
             "pair_share",
+            "pair_extent",
             "reach",
             "reach_cap",
             "reach_limit",

@@ -11,14 +11,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..recording import FloatArray
+from ..recording import FloatArray, IntArray
 from .exemplars.spread import moments
-from .nodes.clustering import clusters_below, gap, separation, two_branches
+from .nodes.clustering import clusters_below, gap, nearest_usual, separation, two_branches
 from .nodes.node import Node
 from .nodes.search import mean_nearest
 from .nodes.structure import Structure
 from .placement import ROOT, Change, Match
 
+_FAR = 1e12  # farther than any two segments
 _UNKNOWN = 3.0  # leaves that the scale of all motion counts for beside that of those
 
 
@@ -36,8 +37,7 @@ def form_primitives(structure: Structure, node: Node, when: int) -> Change:
         loose = [i for i, number in enumerate(node.members) if number not in node.settled]
         matrix = node.matrix[np.ix_(loose, loose)]
         limit = cutoff(structure, node)
-        small = _smallness(structure, [node.members[i] for i in loose], limit)
-        groups = clusters_below(matrix / small, limit, structure.least, config.pair_share)
+        groups = _clusters(structure, [node.members[i] for i in loose], matrix, limit)
         if not groups:
             return change
         places = [loose[i] for i in groups[0]]
@@ -58,14 +58,33 @@ def form_primitives(structure: Structure, node: Node, when: int) -> Change:
             change = change.then(structure.take_in(child, inside))
 
 
-def _smallness(structure: Structure, members: Sequence[int], limit: float) -> FloatArray:
-    """Return how much nearer than the limit each two must be for what they show, shape (n, n).
+def _clusters(
+    structure: Structure, members: Sequence[int], matrix: FloatArray, limit: float
+) -> list[IntArray]:
+    """Return the clusters among what waits, tightest first, as positions.
 
-    Executions of one motion are nearer to each other than they are to no motion at all.
+    Executions of one motion are nearer to each other than they are to no motion at all. Two that
+    are near each other say less than three that are: pairs count only where there is no larger
+    cluster, and must be the nearer.
+
+    Args:
+        structure: The tree.
+        members: Numbers of the segments that wait.
+        matrix: Distances among them, shape (n, n).
+        limit: Largest distance inside a cluster.
     """
-    most = structure.config.extent_share * structure.memory.bank.extents(members)
-    shares = np.minimum(most / max(limit, 1e-12), 1e12)
-    return np.asarray(np.clip(np.sqrt(np.multiply.outer(shares, shares)), 1e-12, 1.0))
+    config, least = structure.config, structure.least
+    extents = np.minimum(structure.memory.bank.extents(members), _FAR)
+    sizes = np.sqrt(np.multiply.outer(extents, extents))
+
+    def found(limit: float, share: float, least: int) -> list[IntArray]:
+        most = np.clip(np.minimum(share * sizes, limit), 1e-12, _FAR)
+        return clusters_below(matrix / most, 1.0, least)
+
+    groups = found(limit, config.extent_share, max(least, 3))
+    if groups or least > 2:
+        return groups
+    return found(config.pair_share * limit, config.pair_extent, least)
 
 
 def _leaf_of(structure: Structure, members: Sequence[int], limit: float) -> Node | None:
@@ -144,6 +163,28 @@ def split_mixed(structure: Structure, leaf: Node, when: int) -> Change:
     ):
         return Change()
     return structure.split(leaf, [[leaf.members[i] for i in branch] for branch in branches], when)
+
+
+def shed_strangers(structure: Structure, leaf: Node, when: int) -> Change:
+    """Let a leaf keep its core only where it is wider than motions lie apart.
+
+    While little was known its radius reached other motions, which it took in. What is no part of
+    its largest cluster, and lies off that by a gap, waits again to become what it is.
+    """
+    config, limit = structure.config, structure.memory.valley()
+    if leaf.whole or leaf.frozen or leaf.diameter <= limit:
+        return Change()
+    matrix = structure.memory.bank.matrix(leaf.members, without_tempo=True)
+    groups = clusters_below(matrix, limit, 1)
+    core = max(groups, key=len, default=np.zeros(0, np.int64))
+    if len(core) < 2 or len(groups) < 2:
+        return Change()
+    usual = nearest_usual(matrix[np.ix_(core, core)])
+    away = [g for g in groups if matrix[np.ix_(g, core)].min() > config.split_gap * usual]
+    strangers = [leaf.members[i] for group in away for i in group]
+    if not strangers:
+        return Change()
+    return structure.shed(leaf, strangers).then(form_primitives(structure, structure.root, when))
 
 
 def merge_duplicates(structure: Structure, matches: Sequence[Match], when: int) -> Change:

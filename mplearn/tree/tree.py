@@ -26,6 +26,7 @@ from .config import TreeConfig
 from .editing import chosen_groups, leaf_of, pair_of, place_below, primitive_of
 from .exemplars.bank import ExemplarBank
 from .exemplars.memory import SegmentMemory
+from .exemplars.neighbours import N_STEPS
 from .exemplars.renewal import RenewalState
 from .exemplars.spread import SampleState, SpreadState
 from .models import GroupModels, Model
@@ -35,7 +36,13 @@ from .placement import ROOT, Change, Placement
 from .recogniser import Recogniser, refusal
 from .repetitions import Repetition, most_repeated
 from .reversal import Exchange, NodesEdit, exchange
-from .rules import forget_chances, form_primitives, merge_duplicates, split_mixed
+from .rules import (
+    forget_chances,
+    form_primitives,
+    merge_duplicates,
+    shed_strangers,
+    split_mixed,
+)
 
 _SHORTEST_S = 0.1
 _LONGEST_S = 60.0
@@ -54,6 +61,7 @@ class TreeState(State):
         sample: Some of all segments.
         nodes: The nodes, the root first.
         renewal: Models on their way that will take the place of these; None for none.
+        neighbours: See `exemplars.neighbours`; None for none.
     """
 
     n_seen: Count
@@ -63,6 +71,7 @@ class TreeState(State):
     sample: SampleState
     nodes: tuple[NodeState, ...]
     renewal: RenewalState | None = None
+    neighbours: Annotated[FloatArray, Array(N_STEPS + 1, low=0.0)] | None = None
 
     def check(self) -> None:
         """Check that the nodes make one tree, and that equal numbers are the same segment."""
@@ -305,24 +314,29 @@ class PrimitiveTree:
         structure, bank, number = self._structure, self._memory.bank, self.n_seen
         self.n_seen += 1
         self._memory.remember(number, frames.copy())
-        matches = structure.index.search(bank[number], bank)
+        matches, distances = structure.index.look(bank[number], bank)
         distance, ratio = (matches[0].distance, matches[0].ratio) if matches else (np.inf, np.inf)
         node = self.node(matches[0].node if ratio <= 1 else ROOT)
         recognised = node.id != ROOT and node.is_leaf
         structure.add(node, number)
+        waiting = node.matrix[-1, :-1] if node.id == ROOT else np.zeros(0)
+        self._memory.meet(np.concatenate([distances, waiting]))
         like = self._waiting_like(node)
         if node.id == ROOT or self.config.local:
             change = form_primitives(structure, node, self.n_seen)
         else:
-            change = split_mixed(structure, node, self.n_seen)
-            if not change.splits:
+            change = shed_strangers(structure, node, self.n_seen)
+            recognised = recognised and (number, ROOT) not in change.moved
+            if not change.moved:
+                change = split_mixed(structure, node, self.n_seen)
+            if not change.moved:
                 change = merge_duplicates(structure, matches, self.n_seen)
         change = change.then(forget_chances(structure, self.n_seen))
         self._memory.release(number)
         self._renew()
         structure.tune()
         self._models.forget()
-        home = next((to for which, to in change.moved if which == number), node.id)
+        home = dict(change.moved).get(number, node.id)
         home = next((merge.kept for merge in change.merges if merge.absorbed == home), home)
         others = tuple(move for move in change.moved if move[0] != number)
         return Placement(
@@ -468,6 +482,7 @@ class PrimitiveTree:
             sample=memory.sample(),
             nodes=tuple(node.state(memory.blob) for node in self.nodes),
             renewal=memory.renewal_state(),
+            neighbours=memory.neighbours.counts.copy(),
         )
 
     def load_state(self, state: TreeState) -> None:
@@ -485,6 +500,8 @@ class PrimitiveTree:
             state.sample,
             [each for node in state.nodes for each in node.exemplars()],
         )
+        if state.neighbours is not None:
+            memory.neighbours.counts = state.neighbours.copy()
         self.n_seen = state.n_seen
         self._memory = memory
         self._structure = Structure(self.config, memory)

@@ -54,6 +54,23 @@ def test_a_small_motion_that_comes_again_is_one(size: float) -> None:
     assert len(tree.leaves) == 7 and len(set(homes)) == 1 and homes[0] in tree.leaves
 
 
+@pytest.mark.parametrize("size", [0.1, 0.15])
+def test_two_executions_may_differ_nearly_as_much_as_they_move(size: float) -> None:
+    """Two unrelated motions of a size are sqrt(2) of it apart."""
+    rng = np.random.default_rng(5)
+    tree = PrimitiveTree(TreeConfig(), D, RATE_HZ)
+    for k in range(36):
+        tree.insert(execution(k % 6, rng))
+    rng = np.random.default_rng(6)
+    first, second = (
+        tree.insert(size * TIME @ (KINDS[6] + rng.normal(0, 0.6, (D, 3))).T).number
+        for _ in range(2)
+    )
+    apart = tree.bank.distances(tree.bank[first], [second])[0]
+    assert 0.84 < apart / np.sqrt(np.prod(tree.bank.extents([first, second]))) < 1.1
+    assert tree.node(tree.leaves[-1]).members == [first, second]
+
+
 def test_what_stands_still_belongs_to_no_small_motion() -> None:
     rng = np.random.default_rng(2)
     tree, homes = learned(TreeConfig(), [execution(6, rng, 0.1) for _ in range(9)])

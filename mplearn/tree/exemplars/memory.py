@@ -12,6 +12,7 @@ from ...state import Blob, within
 from ..config import TreeConfig
 from . import normalisation
 from .bank import ExemplarBank
+from .neighbours import Neighbours
 from .renewal import EFFORT, SAMPLE, Renewal, RenewalState
 from .spread import ChannelSpread, DistanceSample, SampleState, SpreadState
 
@@ -28,6 +29,7 @@ class SegmentMemory:
     Attributes:
         bank: Models of the segments, and the distances between them.
         frames: The segments as they came, shape (L, D) each.
+        neighbours: How near new segments come to known ones.
         renewal: The models on their way that will take the place of these; None for none.
     """
 
@@ -39,6 +41,7 @@ class SegmentMemory:
         self._spread = ChannelSpread(groups)
         self._sample = DistanceSample(config.n_sampled, config.seed)
         self._holds: Counter[int] = Counter()
+        self.neighbours = Neighbours()
         self.renewal: Renewal | None = None
 
     def remember(self, number: int, frames: FloatArray) -> None:
@@ -128,7 +131,18 @@ class SegmentMemory:
 
     def scale(self) -> float:
         """Return the largest distance expected between executions of one motion."""
-        return self._sample.scale(self.config)
+        return min(self._sample.scale(self.config), self.valley())
+
+    def valley(self) -> float:
+        """Return the distance at which other motions begin; inf where that is not asked for."""
+        rise = self.config.rise
+        return self.neighbours.valley(rise) * self._sample.mean() if np.isfinite(rise) else np.inf
+
+    def meet(self, distances: FloatArray) -> None:
+        """Take note of how far a new segment is from known ones, shape (k,)."""
+        mean = self._sample.mean()
+        if mean > 0:
+            self.neighbours.update(distances / mean)
 
     def variances(self) -> FloatArray:
         """Return the variance of each channel over all motion, shape (D,)."""

@@ -141,6 +141,11 @@ class DistanceSample:
         self._matrix[: len(matrix), : len(matrix)] = matrix
         self._state = None
 
+    def mean(self) -> float:
+        """Return the mean distance; 0 where there is none."""
+        n = len(self.numbers)
+        return float(self._matrix[:n, :n].sum() / max(n * (n - 1), 1))
+
     def scale(self, config: TreeConfig) -> float:
         """Return the largest distance expected between executions of one motion.
 
@@ -151,8 +156,7 @@ class DistanceSample:
         follows with a power below 1.
         """
         n = len(self.numbers)
-        matrix = self._matrix[:n, :n]
-        mean = matrix.sum() / max(n * (n - 1), 1)
+        matrix, mean = self._matrix[:n, :n], self.mean()
         apart = np.where(matrix > 1e-6 * mean, matrix, np.inf)  # a copy says nothing of variation
         nearest = apart.min(axis=1, initial=np.inf)
         nearest = nearest[np.isfinite(nearest)]

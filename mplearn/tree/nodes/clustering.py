@@ -8,38 +8,22 @@ from ...recording import FloatArray, IntArray
 from ..exemplars.spread import pairs
 
 
-def clusters_below(
-    matrix: FloatArray, cutoff: float, least: int, pair_share: float = 1.0
-) -> list[IntArray]:
+def clusters_below(matrix: FloatArray, cutoff: float, least: int) -> list[IntArray]:
     """Return the clusters whose largest distance is at most ``cutoff``, tightest first.
-
-    Two that are near each other say less than three that are: pairs count only where there is no
-    larger cluster, and only below a share of the cutoff.
 
     Args:
         matrix: Distances, shape (n, n).
         cutoff: D_cutoff.
         least: Fewest members of a cluster.
-        pair_share: Largest distance of a pair over the cutoff.
 
     Returns:
         Positions of the members, in order.
     """
-    from scipy.cluster.hierarchy import linkage
+    from scipy.cluster.hierarchy import fcluster, linkage
 
-    if len(matrix) < least or not cutoff >= 0:
+    if len(matrix) < max(least, 2) or not cutoff >= 0:
         return []
-    merges = linkage(pairs(matrix), "complete")
-    found = _cut(merges, matrix, cutoff, max(least, 3))
-    if found or least > 2:
-        return found
-    return _cut(merges, matrix, pair_share * cutoff, least)
-
-
-def _cut(merges: FloatArray, matrix: FloatArray, cutoff: float, least: int) -> list[IntArray]:
-    from scipy.cluster.hierarchy import fcluster
-
-    labels = fcluster(merges, cutoff, "distance")
+    labels = fcluster(linkage(pairs(matrix), "complete"), cutoff, "distance")
     groups = [np.flatnonzero(labels == label) for label in np.unique(labels)]
     large = [group for group in groups if len(group) >= least]
     return sorted(large, key=lambda group: float(matrix[np.ix_(group, group)].max()))
@@ -106,10 +90,19 @@ def gap(matrix: FloatArray, first: IntArray, second: IntArray) -> float:
     Unlike the mean, it stays low where one motion varies widely but without a break. The second
     neighbour counts: the first may be a copy, where a recording is seen twice.
     """
-    apart = matrix + np.diag(np.full(len(matrix), np.inf))
-    inside = [np.sort(apart[np.ix_(group, group)], axis=1)[:, :2] for group in (first, second)]
-    usual = float(np.median(np.concatenate(inside)[:, -1]))
-    return float(matrix[np.ix_(first, second)].min()) / max(usual, 1e-300)
+    inside = [matrix[np.ix_(group, group)] for group in (first, second)]
+    usual = max(nearest_usual(*inside), 1e-300)
+    return float(matrix[np.ix_(first, second)].min()) / usual
+
+
+def nearest_usual(*matrices: FloatArray) -> float:
+    """Return the usual distance to a second neighbour in groups of at least two, given theirs.
+
+    Of two, each has one neighbour, which counts.
+    """
+    apart = [matrix + np.diag(np.full(len(matrix), np.inf)) for matrix in matrices]
+    second = [np.sort(rows, axis=1)[:, min(1, len(rows) - 2)] for rows in apart]
+    return float(np.median(np.concatenate(second)))
 
 
 def most_redundant(matrix: FloatArray) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -62,6 +62,18 @@ class IndexState(State):
 _YOUNG = 3  # exemplars of a leaf up to which little is known of how much executions vary
 _YOUNG_GROWTH = np.array([1.0, 1.0, 1.35, 1.1, 1.0])
 # by number of exemplars: the largest of a few distances is smaller than that of many
+
+
+class Sight(NamedTuple):
+    """What a search saw.
+
+    Attributes:
+        matches: The nodes that a segment was compared with, best first.
+        distances: To all exemplars of those, shape (k,).
+    """
+
+    matches: list[Match]
+    distances: FloatArray
 
 
 class NodeIndex:
@@ -174,8 +186,12 @@ class NodeIndex:
 
         The first belongs to it if its ratio is at most 1.
         """
+        return self.look(exemplar, bank).matches
+
+    def look(self, exemplar: Exemplar, bank: ExemplarBank) -> Sight:
+        """Search, and return all that was seen."""
         if not len(self.ids):
-            return []
+            return Sight([], np.zeros(0))
         if self.config.n_candidates:
             return self._compare(exemplar, bank, self._candidates(exemplar, bank))
         return self._descend(exemplar, bank)
@@ -183,7 +199,7 @@ class NodeIndex:
     def others(self, exemplar: Exemplar, bank: ExemplarBank, but: int) -> list[Match]:
         """Return the leaves that a segment is near to, best first, but for one of them."""
         near = self._candidates(exemplar, bank)
-        return self._compare(exemplar, bank, near[self.ids[near] != but])
+        return self._compare(exemplar, bank, near[self.ids[near] != but]).matches
 
     def near(self, exemplar: Exemplar, bank: ExemplarBank) -> list[int]:
         """Return the ids of the leaves that a segment may belong to, in order."""
@@ -202,7 +218,7 @@ class NodeIndex:
             nearness[here] = _squared_offsets(means, rows, profile, best)
         return np.sort(np.argsort(nearness, kind="stable")[: self.config.n_candidates])
 
-    def _compare(self, exemplar: Exemplar, bank: ExemplarBank, places: IntArray) -> list[Match]:
+    def _compare(self, exemplar: Exemplar, bank: ExemplarBank, places: IntArray) -> Sight:
         members = [self.members[k] for k in places]
         row = bank.distances(exemplar, [m for group in members for m in group])
         radii = np.minimum(self.radii(), self.config.extent_share * float(exemplar.extent))
@@ -213,19 +229,21 @@ class NodeIndex:
             first += len(group)
             ratio = distance / max(float(radii[k]), 1e-12)
             matches.append(Match(int(self.ids[k]), bank.distance.divergence_of(distance), ratio))
-        return sorted(matches, key=lambda match: (match.ratio, match.node))
+        return Sight(sorted(matches, key=lambda match: (match.ratio, match.node)), row)
 
-    def _descend(self, exemplar: Exemplar, bank: ExemplarBank) -> list[Match]:
+    def _descend(self, exemplar: Exemplar, bank: ExemplarBank) -> Sight:
         found: list[Match] = []
+        seen = np.zeros(0)
         level = ROOT
         while True:
             places = np.flatnonzero(self._known["parent"] == level)
             if not len(places):
-                return found
-            matches = self._compare(exemplar, bank, places)
+                return Sight(found, seen)
+            matches, row = self._compare(exemplar, bank, places)
+            seen = np.concatenate([seen, row])
             inside = [match for match in matches if match.ratio <= 1]
             if not inside:
-                return found + matches
+                return Sight(found + matches, seen)
             nearest = min(inside, key=lambda match: (match.distance, match.node))
             found = [nearest, *found]
             level = nearest.node

@@ -126,6 +126,17 @@ class Structure:
             self.memory.release(*self.root.remove([self.root.members.index(number)]))
         return Change(moved=tuple((number, leaf.id) for number in numbers))
 
+    def shed(self, leaf: Node, numbers: Sequence[int]) -> Change:
+        """Move exemplars of a leaf to those that wait in the root."""
+        leaf.remove([leaf.members.index(number) for number in numbers])
+        leaf.n_placed -= len(numbers)
+        leaf.n_frames -= sum(len(self.memory.frames[number]) for number in numbers)
+        for number in numbers:
+            self.add(self.root, number)
+        self.memory.release(*numbers)
+        self._note(leaf)
+        return Change(moved=tuple((number, ROOT) for number in numbers))
+
     def split(self, leaf: Node, groups: Sequence[Sequence[int]], when: int) -> Change:
         """Form a leaf of each group of a leaf's exemplars; it becomes the node above them."""
         leaf.history.append(("split", when))
