@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from mplearn_agents.cli import NOT_IN_ORDER, main
+from mplearn_agents.cli import main
 
 
 def test_a_path_goes_out_and_is_in_order(tmp_path, capsys):
@@ -18,10 +18,10 @@ def test_a_path_goes_out_and_is_in_order(tmp_path, capsys):
         arrays = dict(file)
     arrays["joint_pos"] = np.degrees(arrays["joint_pos"])
     np.savez(out, **arrays)
-    assert main(["export", "--check", str(out)]) == NOT_IN_ORDER
+    assert main(["export", "--check", str(out)]) == 1
     said = capsys.readouterr().out
     assert "degrees, not radians" in said and "off by" in said
-    assert main(["export", "--check", str(out), "--json"]) == NOT_IN_ORDER
+    assert main(["export", "--check", str(out), "--json"]) == 1
     (verdict,) = json.loads(capsys.readouterr().out)
     assert verdict["faults"][0]["kind"] == "degrees" and verdict["left_m"] < 1e-5
 

@@ -9,6 +9,7 @@ PRINTS = {
     "02-train-an-agent": "0 illegal",
     "03-the-papers-experiments": "primitives 4\n",
     "04-compare-groups": "duration [s]: p = 0.0",
+    "05-from-a-person-to-a-robots-file": "as in Isaac Lab",
 }
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "notebooks").glob("*.ipynb"))
 

@@ -55,6 +55,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--speed", type=positive, default=0.5, help="share of the human's speed (default: 0.5)"
     )
     parser.add_argument(
+        "--simulate",
+        action="store_true",
+        help="what the robot does in simulation instead of what it is to do; motions in which it "
+        "falls are left out",
+    )
+    parser.add_argument(
         "--check",
         type=Path,
         metavar="FILE",
@@ -90,6 +96,7 @@ def _export(args: argparse.Namespace) -> None:
         clips=args.clips,
         seed=args.seed,
         speed=args.speed,
+        simulated=args.simulate,
     )
     for name, reason in done.left_out.items():
         print(f"left out {name}: {reason}")
@@ -133,8 +140,9 @@ def _check(args: argparse.Namespace) -> int:
 
 def _print(path: Path, robot: str, verdict: Verdict) -> None:
     misfit = verdict.misfit
+    of = "" if verdict.name.startswith(path.name) else f", {verdict.name}"
     print(
-        f"{path.name}, {verdict.name}: {verdict.format}, robot {robot}, {verdict.n_frames} frames "
+        f"{path.name}{of}: {verdict.format}, robot {robot}, {verdict.n_frames} frames "
         f"at {verdict.rate_hz:g} Hz"
     )
     if misfit.compared:

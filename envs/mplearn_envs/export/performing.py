@@ -14,6 +14,7 @@ from mplearn.maths.plane import turn_in_plane
 from mplearn.maths.quaternions import quaternion_product, vector_quaternion
 from mplearn.recording import FloatArray
 from mplearn_envs.data.library_source import LibrarySource
+from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.mechanics.reference import Reference, rest_reference
 from mplearn_envs.planning.plan import Plan
 from mplearn_envs.robot import Robot
@@ -48,6 +49,7 @@ def perform(
     seed: int = 0,
     speed: float = 0.5,
     hold_s: float = 0.5,
+    simulated: bool = False,
 ) -> Performed:
     """Return what a robot makes of a library, a path or a walk: feet, balance and all.
 
@@ -64,6 +66,8 @@ def perform(
         seed: See there.
         speed: Wanted speed, as a share of the human's.
         hold_s: Time in which it comes to rest at the end [s]; 0 leaves that out.
+        simulated: Whether to return what the robot does in MuJoCo, servos, contacts and all,
+            instead of what it is to do. A motion in which it falls is left out.
 
     Raises:
         LibraryError: The library cannot be read, or is for another body.
@@ -89,34 +93,38 @@ def perform(
     ids = [known[key].id for key in path]
     repertoire = Repertoire(known, robot, speed=speed)
     skills = repertoire.skills
+    left_out = _refused(skills, ids or known.ids) if walk is None or ids else {}
+    possible = [id for id in ids or known.ids if walk is not None or id not in left_out]
+    if not possible or (walk is not None and left_out):
+        raise _nothing(robot, {known[id].name: reason for id, reason in left_out.items()})
     if walk is not None:
-        left_out = {} if not ids else _refused(skills, ids)
-        if left_out:
-            raise _nothing(robot, left_out)
-        walks = [
-            _walk(repertoire, ids, walk, np.random.default_rng(seed + k)) for k in range(clips)
+        jobs = [
+            (f"walk_{k}", _walk(repertoire, ids, walk, np.random.default_rng(k)))
+            for k in range(seed, seed + clips)
         ]
-        return Performed(
-            tuple(_motion(skills, ids, f"walk_{seed + k}", hold_s) for k, ids in enumerate(walks)),
-            {},
-        )
-    left_out = _refused(skills, ids or known.ids)
-    possible = [id for id in ids or known.ids if skills.feasibility(id).feasible]
-    if not possible:
-        raise _nothing(robot, left_out)
-    if ids:
-        name = " / ".join(known[id].name for id in possible)
-        return Performed((_motion(skills, possible, name, hold_s),), left_out)
-    motions = tuple(_motion(skills, [id], known[id].name, hold_s) for id in possible)
-    return Performed(motions, left_out)
+    elif ids:
+        jobs = [(" / ".join(known[id].name for id in possible), possible)]
+    else:
+        jobs = [(known[id].name, [id]) for id in possible]
+    names = {known[id].name: reason for id, reason in left_out.items()}
+    motions = []
+    for name, path_ids in jobs:
+        stage = _Simulated(robot) if simulated else _Planned(robot)
+        try:
+            motions.append(_motion(skills, path_ids, name, hold_s, stage))
+        except _FallError as fall:
+            names[name] = str(fall)
+    if not motions:
+        raise _nothing(robot, names)
+    return Performed(tuple(motions), names)
 
 
-def _refused(skills: Skills, ids: Sequence[int]) -> dict[str, str]:
-    """Return why the robot cannot perform some of the primitives, by name."""
-    verdicts = {skills.library[id].name: skills.feasibility(id) for id in ids}
+def _refused(skills: Skills, ids: Sequence[int]) -> dict[int, str]:
+    """Return why the robot cannot perform some of the primitives, by id."""
+    verdicts = {id: skills.feasibility(id) for id in ids}
     return {
-        name: "; ".join(str(problem) for problem in verdict.problems)
-        for name, verdict in verdicts.items()
+        id: "; ".join(str(problem) for problem in verdict.problems)
+        for id, verdict in verdicts.items()
         if not verdict.feasible
     }
 
@@ -155,46 +163,79 @@ def _end(skills: Skills, ids: Sequence[int]) -> Reference:
     return here
 
 
-def _motion(skills: Skills, ids: Sequence[int], name: str, hold_s: float) -> RobotMotion:
-    """Return the postures of one plan after another, each where the one before has led."""
+class _FallError(Exception):
+    """The robot fell; its message says in which primitive."""
+
+
+class _Planned:
+    """The robot does what is planned: plans begin between the feet, so each is moved there."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.first = rest_reference(robot).q
+        self._place = np.zeros(3)  # x, y, yaw of the present plan's origin in the world
+
+    def postures(self, plan: Plan) -> FloatArray | None:
+        """Return the postures at a plan's knots but the first, shape (K, 7 + n)."""
+        x0, y0, yaw0 = self._place
+        out = plan.q[1:].copy()
+        x, y = turn_in_plane(out[:, 0], out[:, 1], yaw0)
+        out[:, 0], out[:, 1] = x + x0, y + y0
+        turn = vector_quaternion(0.0, 0.0, yaw0)
+        out[:, 3:7] = np.stack(quaternion_product(turn, tuple(out[:, 3:7].T)), axis=1)
+        middle, yaw = plan.ground[-1, :, :2].mean(axis=0), float(plan.ground[-1, :, 2].mean())
+        x, y = turn_in_plane(middle[0], middle[1], yaw0)
+        self._place = np.array([x0 + x, y0 + y, yaw0 + yaw])
+        return out
+
+
+class _Simulated:
+    """The simulated robot is sent the plans."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._simulation = Simulation(robot)
+        self._simulation.reset()
+        self.first = self._simulation.data.qpos.copy()
+
+    def postures(self, plan: Plan) -> FloatArray | None:
+        """Return the postures at a plan's knots but the first; None where the robot falls."""
+        simulation, out = self._simulation, []
+        n_steps = len(plan.commands) // (len(plan.q) - 1)
+        report = simulation.perform(
+            plan, lambda: out.append(simulation.data.qpos.copy()), frame_steps=n_steps
+        )
+        return None if report.fallen else np.array(out)
+
+
+def _motion(
+    skills: Skills, ids: Sequence[int], name: str, hold_s: float, stage: _Planned | _Simulated
+) -> RobotMotion:
+    """Return the postures of one plan after another.
+
+    Raises:
+        _FallError: The robot fell.
+    """
     robot = skills.robot
     here = rest_reference(robot)
-    place = np.zeros(3)  # x, y, yaw of the present plan's origin in the world
-    parts: list[FloatArray] = [here.q[None]]
+    parts: list[FloatArray] = [stage.first[None]]
     spans: list[Span] = []
     now = 0.0
     for id in [*ids, *([None] if hold_s > 0 else [])]:
         plan = skills.hold(here, hold_s) if id is None else skills.plan(here, id)
-        knot_s = plan.knot_s
-        parts.append(_placed(plan.q[1:], place))
-        end = now + plan.duration_s
         label = _HOLD if id is None else skills.library[id].name
+        postures = stage.postures(plan)
+        if postures is None:
+            raise _FallError(f"in simulation it falls in {label!r}")
+        parts.append(postures)
+        end = now + plan.duration_s
         spans.append(Span(-1 if id is None else id, label, now, end))
-        place, here, now = _next_place(plan, place), plan.end, end
-    postures = np.concatenate(parts)
+        here, now = plan.end, end
+    whole = np.concatenate(parts)
     return RobotMotion(
         name=name,
         joint_names=robot.joint_names,
-        rate_hz=1.0 / knot_s,
-        root_pos=postures[:, :3],
-        root_quat=postures[:, 3:7] / np.linalg.norm(postures[:, 3:7], axis=1, keepdims=True),
-        joint_pos=postures[:, 7:] + robot.attention_angles,
+        rate_hz=1.0 / plan.knot_s,
+        root_pos=whole[:, :3],
+        root_quat=whole[:, 3:7] / np.linalg.norm(whole[:, 3:7], axis=1, keepdims=True),
+        joint_pos=whole[:, 7:] + robot.attention_angles,
         spans=tuple(spans),
     )
-
-
-def _next_place(plan: Plan, place: FloatArray) -> FloatArray:
-    """Return the origin of what follows: plans begin between the feet, see `recentred`."""
-    middle, yaw = plan.ground[-1, :, :2].mean(axis=0), float(plan.ground[-1, :, 2].mean())
-    x, y = turn_in_plane(middle[0], middle[1], place[2])
-    return np.array([place[0] + x, place[1] + y, place[2] + yaw])
-
-
-def _placed(q: FloatArray, place: FloatArray) -> FloatArray:
-    """Return postures, shape (K, 7 + n), moved on the floor to where their origin is."""
-    out = q.copy()
-    x, y = turn_in_plane(q[:, 0], q[:, 1], place[2])
-    out[:, 0], out[:, 1] = x + place[0], y + place[1]
-    turn = vector_quaternion(0.0, 0.0, place[2])
-    out[:, 3:7] = np.stack(quaternion_product(turn, tuple(q[:, 3:7].T)), axis=1)
-    return out

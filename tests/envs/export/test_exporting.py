@@ -104,6 +104,35 @@ def test_what_the_robot_cannot_perform_is_named_and_left_out() -> None:
         perform(library, humanoid(), ("dance",))
 
 
+def test_what_the_simulated_robot_does_is_near_what_it_was_to_do() -> None:
+    library = standing_library(("wave", "squat"))
+    meant = perform(library, humanoid(), ("squat", "wave")).motions[0]
+    done = perform(library, humanoid(), ("squat", "wave"), simulated=True).motions[0]
+    assert len(done) == len(meant) and done.spans == meant.spans
+    off = np.abs(done.joint_pos - meant.joint_pos)
+    assert 1e-4 < off.max() < 0.3  # servos lag
+    assert np.abs(done.root_pos - meant.root_pos).max() < 0.05
+
+
+def test_a_motion_in_which_the_robot_falls_is_named_and_left_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from mplearn_envs.execution.simulation import Simulation
+
+    library, performed = standing_library(("wave", "arms up")), Simulation.perform
+    names = []
+
+    def trip(self, plan, *args, **kwargs):
+        names.append(plan)
+        report = performed(self, plan, *args, **kwargs)
+        return report._replace(fallen=len(names) == 1)
+
+    monkeypatch.setattr(Simulation, "perform", trip)
+    done = perform(library, humanoid(), simulated=True)
+    assert [motion.name for motion in done.motions] == ["wave"]
+    assert done.left_out == {"arms up": "in simulation it falls in 'arms up'"}
+
+
 def test_walks_are_the_seeds_and_follow_the_graph() -> None:
     library = standing_library()
     done = perform(library, humanoid(), walk=6, clips=2, seed=5)

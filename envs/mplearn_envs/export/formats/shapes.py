@@ -6,6 +6,7 @@ wrapped in their convex hull.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,8 +24,12 @@ _HIDDEN_GROUP = 3  # geoms from this group on are for contact, not to be seen
 _DEFAULT = (0.5, 0.5, 0.5, 1.0)
 
 
+@lru_cache(maxsize=8)
 def shapes(model: RobotModel) -> list[dict[str, Any]]:
-    """Return the visible shapes: ``body``, ``points`` in its frame [m], ``faces``, ``rgb``."""
+    """Return the visible shapes: ``body``, ``points`` in its frame [m], ``faces``, ``rgb``.
+
+    They are worked out once a model; nobody changes them.
+    """
     place = {int(body): k for k, body in enumerate(model.bodies)}
     mujoco_model = model.model
     own = [g for g in range(mujoco_model.ngeom) if int(mujoco_model.geom_bodyid[g]) in place]
