@@ -22,6 +22,7 @@ from mplearn.learner import (
 from mplearn.learner.events import Event
 from mplearn.recording import IntArray
 from mplearn_envs.data.library_source import LibrarySource
+from mplearn_envs.execution.bodies import Body
 from mplearn_envs.execution.modes import Dynamics
 from mplearn_envs.robot import Robot
 from mplearn_envs.tasks import FollowTask, Task
@@ -74,6 +75,7 @@ class OnlinePrimitiveHumanoidEnv(MacroStepEnv):
         actions: See there; the capacity is 64 unless given.
         pictures: See there.
         render_mode: See there.
+        body: See there.
         library: Must be None: it is learned.
 
     Raises:
@@ -96,6 +98,7 @@ class OnlinePrimitiveHumanoidEnv(MacroStepEnv):
         actions: ActionOptions | Mapping[str, Any] | None = None,
         pictures: PictureOptions | Mapping[str, Any] | None = None,
         render_mode: Literal["human", "rgb_array"] | None = None,
+        body: Body | str | Mapping[str, Any] = "nominal",
         library: None = None,
     ) -> None:
         if library is not None:
@@ -113,7 +116,17 @@ class OnlinePrimitiveHumanoidEnv(MacroStepEnv):
             actions = replace(actions, capacity=CAPACITY)
         source = LibrarySource(self.learner)
         super().__init__(
-            source, robot, task, dynamics, discount, flat, motion, actions, pictures, render_mode
+            source,
+            robot,
+            task,
+            dynamics,
+            discount,
+            flat,
+            motion,
+            actions,
+            pictures,
+            render_mode,
+            body,
         )
         if isinstance(self.task, FollowTask):
             raise InvalidValueError(

@@ -241,3 +241,16 @@ def test_slots_are_reused_only_when_none_is_left():
     assert slots.update([11, 12]) == () and slots.of == {11: 2, 12: 3}
     assert slots.update([11, 13]) == () and slots.of == {11: 2, 13: 1}
     assert slots.update([11, 13, 14, 15]) == (15,) and slots.of[14] == 3
+
+
+def test_each_episode_has_a_body_of_its_own():
+    env = make(dynamics="simulated", body={"masses": 0.1}, warm_up_s=8.0)
+    masses = []
+    for seed in (1, 2, 1):
+        env.reset(seed=seed)
+        masses.append(env.unwrapped.model.body_mass.copy())
+    nominal = humanoid().model().body_mass
+    assert not np.allclose(masses[0], nominal) and not np.allclose(masses[0], masses[1])
+    np.testing.assert_array_equal(masses[0], masses[2])
+    with pytest.raises(InvalidValueError, match="no body but 'nominal'"):
+        make(body="harsh")

@@ -1,0 +1,1 @@
+"""Baselines in single files, to be read from top to bottom, copied and changed."""
