@@ -51,6 +51,7 @@ PUBLIC = {  # beside all of `mplearn.__all__`: what a user of each room starts f
     "mplearn.store": ["LifelongLearner"],
     "mplearn.tables": ["write_segments", "SegmentTable"],
     "mplearn.tree": ["PrimitiveTree", "TreeConfig"],
+    "mplearn_envs.export": ["perform", "export", "robot_model", "format_of", "RobotMotion"],
     "mplearn_envs.environment.primitive_humanoid": ["PrimitiveHumanoidEnv"],
 }
 

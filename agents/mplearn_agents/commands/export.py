@@ -55,6 +55,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--speed", type=positive, default=0.5, help="share of the human's speed (default: 0.5)"
     )
     parser.add_argument(
+        "--upper-body",
+        action="store_true",
+        help="only arms, head and the trunk's turn, standing: where it cannot follow the legs",
+    )
+    parser.add_argument(
         "--simulate",
         action="store_true",
         help="what the robot does in simulation instead of what it is to do; motions in which it "
@@ -97,6 +102,7 @@ def _export(args: argparse.Namespace) -> None:
         seed=args.seed,
         speed=args.speed,
         simulated=args.simulate,
+        upper_body=args.upper_body,
     )
     for name, reason in done.left_out.items():
         print(f"left out {name}: {reason}")

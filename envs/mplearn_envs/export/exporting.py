@@ -42,6 +42,15 @@ def export(
     Raises:
         InvalidValueError: There is no motion, or the place is taken by something else.
         MissingDependencyError: The format needs a package that is not installed.
+
+    Example:
+        >>> from mplearn_envs.export import RobotModel, check, export, format_of, perform
+        >>> from mplearn_envs.robot import humanoid
+        >>> model = RobotModel.of(humanoid())
+        >>> bow = perform(None, humanoid(), ("bow down", "bow up")).motions
+        >>> (path,) = export(bow, model, format_of("unitree"), Path("bow.csv"))
+        >>> check(path, model)[0].in_order
+        True
     """
     if not motions:
         raise InvalidValueError("there is no motion to export")

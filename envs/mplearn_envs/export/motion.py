@@ -39,6 +39,13 @@ class RobotMotion:
         root_quat: How it is turned, unit quaternions (w, x, y, z), shape (T, 4).
         joint_pos: Angles of the hinges, in the zero of the robot's own MJCF, shape (T, n) [rad].
         spans: The primitives, one after another.
+
+    Example:
+        >>> still = np.tile([1.0, 0.0, 0.0, 0.0], (101, 1))
+        >>> swing = np.sin(np.linspace(0.0, 6.0, 101))[:, None]
+        >>> motion = RobotMotion("swing", ("elbow",), 50.0, np.zeros((101, 3)), still, swing)
+        >>> motion.duration_s, len(motion.resampled(30.0))
+        (2.0, 61)
     """
 
     name: str

@@ -18,12 +18,14 @@ from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.mechanics.reference import Reference, rest_reference
 from mplearn_envs.planning.plan import Plan
 from mplearn_envs.robot import Robot
+from mplearn_envs.skills.feasibility import FeasibilityConfig
 from mplearn_envs.skills.repertoire import Repertoire
 from mplearn_envs.skills.skills import Skills
 
 from .motion import RobotMotion, Span
 
 _HOLD = "hold"
+_CUT_OFF = FeasibilityConfig(overshoot=np.inf, slowest=0.05)  # what is shown where not all can be
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,7 @@ def perform(
     speed: float = 0.5,
     hold_s: float = 0.5,
     simulated: bool = False,
+    upper_body: bool = False,
 ) -> Performed:
     """Return what a robot makes of a library, a path or a walk: feet, balance and all.
 
@@ -68,6 +71,8 @@ def perform(
         hold_s: Time in which it comes to rest at the end [s]; 0 leaves that out.
         simulated: Whether to return what the robot does in MuJoCo, servos, contacts and all,
             instead of what it is to do. A motion in which it falls is left out.
+        upper_body: Whether only arms, head and the trunk's turn are performed, by a robot that
+            stands: for motions whose legs it cannot follow.
 
     Raises:
         LibraryError: The library cannot be read, or is for another body.
@@ -91,7 +96,8 @@ def perform(
     if not len(known):
         raise LibraryError("the library is empty: there is nothing to perform")
     ids = [known[key].id for key in path]
-    repertoire = Repertoire(known, robot, speed=speed)
+    limits = _CUT_OFF if upper_body else None
+    repertoire = Repertoire(known, robot, speed=speed, limits=limits, upper_body=upper_body)
     skills = repertoire.skills
     left_out = _refused(skills, ids or known.ids) if walk is None or ids else {}
     possible = [id for id in ids or known.ids if walk is not None or id not in left_out]

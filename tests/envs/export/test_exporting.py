@@ -104,6 +104,12 @@ def test_what_the_robot_cannot_perform_is_named_and_left_out() -> None:
         perform(library, humanoid(), ("dance",))
 
 
+def test_the_upper_body_alone_stands_where_legs_cannot_follow() -> None:
+    library = standing_library(("wave", "jump"))
+    done = perform(library, humanoid(), ("jump",), upper_body=True)
+    assert not done.left_out and np.ptp(done.motions[0].root_pos[:, 2]) < 1e-3
+
+
 def test_what_the_simulated_robot_does_is_near_what_it_was_to_do() -> None:
     library = standing_library(("wave", "squat"))
     meant = perform(library, humanoid(), ("squat", "wave")).motions[0]
