@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from array import array
 from collections.abc import Iterable, Sequence
 from itertools import chain
@@ -9,12 +10,54 @@ from pathlib import Path
 
 import numpy as np
 
-from ..recording import FloatArray
+from ..recording import BoolArray, FloatArray
 from .files import bad_file
 from .findings import Findings
 
-MISSING = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "nil"})
+MISSING = frozenset(
+    (
+        *("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "nil", "*", ".", "?"),
+        *("missing", "undefined", "#value!", "#div/0!", "#num!", "#ref!", "#name?", "#null!"),
+    )
+)
 """How tables write, in lower case, that there is no number."""
+_MISSING = re.compile(r"[-+]?(?:nan\(.*\)|\d\.?#(?:ind|qnan|snan)\d*)", re.IGNORECASE)  # C runtimes
+_FORTRAN = re.compile(r"[-+]?\d*\.?\d*[dD][-+]?\d{1,3}")  # 1.5D+03
+_THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:,\d{3})+\.\d+")  # 1,660.79
+_LONGEST = 400  # characters of a cell; no number has more digits
+_NINES = re.compile(r"-?9{4,}(?:\.[09]*)?")
+
+
+def says_missing(cell: str) -> bool:
+    """Whether a cell says that there is no number, an empty one too."""
+    text = cell.strip()
+    return text.lower() in MISSING or _MISSING.fullmatch(text) is not None
+
+
+def plain_number(cell: str) -> str:
+    """Return a number as Python reads it: exponents of Fortran, commas between thousands."""
+    text = cell.strip()
+    if len(text) <= _LONGEST and _THOUSANDS.fullmatch(text):
+        return text.replace(",", "")
+    if len(text) <= _LONGEST and _FORTRAN.fullmatch(text):
+        return text.lower().replace("d", "e")
+    return text
+
+
+def not_seen(points: FloatArray) -> BoolArray:
+    """Return where tables say that a marker was not seen, for points (..., 3): all zero, or nines.
+
+    Example:
+        >>> not_seen(np.array([[0.0, 0.0, 0.0], [-9999.0, -9999.0, -9999.0], [0.0, 0.0, 9999.0]]))
+        array([ True,  True, False])
+    """
+    same: BoolArray = (points == points[..., :1]).all(axis=-1)
+    gone: BoolArray = same & (points[..., 0] == 0.0)
+    far = same & (np.abs(points[..., 0]) >= 999.9)
+    for value in np.unique(points[far][..., 0]).tolist():
+        if _NINES.fullmatch(repr(value)):
+            gone |= same & (points[..., 0] == value)
+    return gone
 
 
 def number(path: Path, cell: str, where: str) -> float:
@@ -23,9 +66,9 @@ def number(path: Path, cell: str, where: str) -> float:
     Raises:
         RecordingError: The cell is not a number, or not finite.
     """
-    text = cell.strip()
-    if text.lower() in MISSING:
+    if says_missing(cell):
         return np.nan
+    text = plain_number(cell)
     try:
         if "_" in text:  # Python reads "1_0" as ten
             raise ValueError
@@ -82,6 +125,7 @@ def measured_rows(
     *,
     group: int = 1,
     columns: Sequence[int] | None = None,
+    cut_off: bool = False,
 ) -> FloatArray:
     """Return the cells of a table as an array, as far as they are there.
 
@@ -95,6 +139,7 @@ def measured_rows(
         findings: Where to tell what contradicts itself.
         group: How many columns at a row's end belong together: three for markers.
         columns: Which columns to return; all of them by default. Others may hold any text.
+        cut_off: Whether the file ends within its last row, which is left out then.
 
     Returns:
         Shape (T, n_columns), NaN where a cell is empty.
@@ -105,7 +150,10 @@ def measured_rows(
     values, lines = array("d"), array("q")
     extra: list[tuple[int, int]] = []
     n_cut = 0
+    short: tuple[int, int] | None = None  # a row that ends early, and that may be the last one
     for line, row in rows:
+        if short is not None:
+            break
         cells = row
         while len(cells) > n_columns and not cells[-1].strip():
             cells.pop()
@@ -114,13 +162,20 @@ def measured_rows(
             cells = cells[:n_columns]
         elif len(cells) < n_columns:
             if group == 1 or (n_columns - len(cells)) % group:
-                raise bad_file(path, f"line {line} has {len(cells)} columns", f"{n_columns}")
+                short = line, len(cells)
+                continue
             n_cut += 1
             cells = cells + [""] * (n_columns - len(cells))
         if columns is not None:
             cells = [cells[i] for i in columns]
         values.extend(_row(path, cells, line))
         lines.append(line)
+    else:
+        if short is not None and lines and cut_off:  # the last row of a file that was cut off
+            findings.warn(f"the last row, line {short[0]}, is cut off: left out")
+            short = None
+    if short is not None:
+        raise bad_file(path, f"line {short[0]} has {short[1]} columns", f"{n_columns}")
     n_rows = len(lines)
     if extra and len(extra) <= n_rows // 2:
         line, count = extra[0]

@@ -304,7 +304,7 @@ def _read(
     parts = []
     for file in take.files:
         # numbers that no one measured overflow: what comes of them is checked, and refused
-        with np.errstate(over="ignore", invalid="ignore"):
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             part = take.reader.read(file, hints or Hints(), positions=positions)
         if not part.labels:
             part = replace(part, labels=labels_beside(file, part))

@@ -214,7 +214,7 @@ def test_bvh_with_z_up_and_metres(tmp_path: Path) -> None:
         ("MOTION", "", "MOTION"),
         ("Frame Time: 0.01", "Frame Time: 1e-9", "Frame Time.*rate_hz"),
         ("Frame Time: 0.01\n", "", "Frame Time.*rate_hz"),
-        ("Frame Time: 0.01", "Frame Time: 8.333", "Frame Time.*rate_hz=120"),
+        ("Frame Time: 0.01", "Frame Time: 6.5", "Frame Time.*rate_hz=153.8"),
         ("Frame Time: 0.01", "Frame Time: 0", "Frame Time"),
         ("Frame Time: 0.01", "Frame Time: nan", "Frame Time"),
     ],

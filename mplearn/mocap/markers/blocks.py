@@ -12,7 +12,7 @@ from ...recording import FloatArray, Recording, marker_channels
 from ..clock import Clock, even_clock
 from ..files import bad_file, cmu_subject, stem
 from ..findings import Findings
-from ..numbers import measured_rows
+from ..numbers import measured_rows, not_seen
 from ..options import option
 from ..placing.space import Space, placed
 from ..reader import Hints
@@ -92,12 +92,14 @@ def read_block(
     clocks = [i for i in (block.time, block.frame) if i is not None]
     columns = [*clocks, *(i for axes in block.columns for i in axes)]
     rows = sheet.rows(block.start, block.stop)
-    values = measured_rows(path, rows, block.width, findings, group=3, columns=columns)
+    values = measured_rows(
+        path, rows, block.width, findings, group=3, columns=columns, cut_off=sheet.cut_off
+    )
     if not len(values):
         raise bad_file(path, "0 frames", "at least one")
     points = values[:, len(clocks) :].reshape(len(values), -1, 3).copy()
     if zero_is_missing:
-        points[(points == 0.0).all(axis=2)] = np.nan
+        points[not_seen(points)] = np.nan
     seen = (~np.isnan(points).any(axis=2)).sum(axis=0)
     kept, names = chosen_names(path, block.names, seen, findings)
     clock = _clock(path, block, values[:, : len(clocks)], findings)

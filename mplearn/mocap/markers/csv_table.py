@@ -34,7 +34,7 @@ from ...recording import FloatArray, IntArray, LabelledSegment, Recording, marke
 from ..clock import Clock, even_clock, in_seconds
 from ..files import bad_file, head_text, read_text, stem
 from ..findings import Findings
-from ..numbers import measured_rows
+from ..numbers import measured_rows, not_seen
 from ..options import option
 from ..placing.size import named_unit
 from ..placing.space import Space, placed
@@ -76,7 +76,7 @@ class CSVReader(Reader):
         if columns.points is not None:
             table = _by_points(path, table, columns)
         person = _person(path, table)
-        rate_hz, clock = _clock(path, table, hints, findings)
+        rate_hz, clock = _clock(path, table, header.rate_hz, hints, findings)
         index = np.rint(clock.places).astype(np.int64)
         values = clock.even(table.values)
         labels = _segments(table.texts, index, person)
@@ -90,7 +90,9 @@ class CSVReader(Reader):
                 labels,
                 report=findings.report(rate_hz),
             )
-        points = values.reshape(len(values), -1, 3)
+        points = values.reshape(len(values), -1, 3).copy()
+        gone = not_seen(points)
+        points[gone & ~gone.all(axis=0)] = np.nan  # what is there always may be where all begins
         seen = (~np.isnan(points).any(axis=2)).sum(axis=0)
         kept, names = chosen_names(path, table.markers, seen, findings)
         points = points[:, kept]
@@ -162,6 +164,9 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
 
     def rows() -> Iterator[tuple[int, list[str]]]:
         for line, cells in sheet.rows(header.start):
+            if cells[0].strip() == header.names[0] and cells[0].strip() and not is_number(cells[0]):
+                findings.note(f"line {line} repeats the names: left out")
+                continue
             if textual:
                 while len(cells) > n_columns and not cells[-1].strip():
                     cells.pop()
@@ -176,8 +181,9 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
         rows(),
         n_columns,
         findings,
-        group=3 if are_markers else 1,
+        group=3 if are_markers and sheet.separator else 1,
         columns=[*clocks, *wanted],
+        cut_off=sheet.cut_off,
     )
     place = {column: k for k, column in enumerate([*clocks, *wanted])}
     numbers = [i for i in columns.frames if _counts(found[:, place[i]])]
@@ -304,7 +310,9 @@ def _person(path: Path, table: _Table) -> str:
     return people[0]
 
 
-def _clock(path: Path, table: _Table, hints: Hints, findings: Findings) -> tuple[float, Clock]:
+def _clock(
+    path: Path, table: _Table, said_hz: float | None, hints: Hints, findings: Findings
+) -> tuple[float, Clock]:
     """Return the rate, and where the rows lie on an even clock."""
     times = [in_seconds(values, unit, findings) for values, unit in table.times]
     if len(times) > 1 and not all(_same_steps(times[0], other) for other in times[1:]):
@@ -317,7 +325,7 @@ def _clock(path: Path, table: _Table, hints: Hints, findings: Findings) -> tuple
         clock = _by_numbers(path, table.numbers)
     else:
         clock = Clock(np.nan, np.arange(len(table.values), dtype=np.float64), False)
-    rate_hz = hints.rate_hz or clock.rate_hz
+    rate_hz = hints.rate_hz or (clock.rate_hz if clock.rate_hz > 0 else said_hz or np.nan)
     if not 0 < rate_hz < np.inf:
         raise bad_file(path, "no rate", f"a column 'time' [s], or {option('rate_hz')}")
     return rate_hz, clock

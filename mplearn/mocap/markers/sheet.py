@@ -10,13 +10,19 @@ from itertools import zip_longest
 from pathlib import Path
 
 from ..files import bad_file
-from ..numbers import MISSING
+from ..numbers import plain_number, says_missing
 
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?\d+,\d+(e[-+]?\d+)?\s*", re.I)
 _DECIMAL_POINT = re.compile(r"\s*[-+]?\d*\.\d+(e[-+]?\d+)?\s*", re.I)
 _AXIS = re.compile(r"[xyz]\d*", re.I)
 _UNIT = re.compile(
     r"[\[(]?(mm|cm|m|meters?|millimeters?|s|sec|seconds|ms|deg|degrees|°|rad)[\])]?", re.I
+)
+_SEPARATOR = re.compile(r'"?sep=([,;\t]?)"?', re.I)
+_RATE = re.compile(
+    r"\b(?:fps|frequency|freq|(?:(?:frame|sampl(?:e|ing)|capture|data|camera)[\s_-]*)?rate)\b"
+    r"[^\d\n]{0,12}?(\d+(?:\.\d+)?)\s*(?:hz|fps|1/s)?\W*$",
+    re.I,
 )
 _LOOK = 40  # lines
 _COMMENT = "#%"
@@ -31,17 +37,22 @@ class Sheet:
         lines: Its lines.
         separator: What separates cells; empty for white space.
         decimal_comma: Whether numbers have a decimal comma.
+        cut_off: Whether the last line has no end.
     """
 
     path: Path
     lines: list[str]
     separator: str
     decimal_comma: bool
+    cut_off: bool = False
 
     @classmethod
     def of(cls, path: Path, text: str, separators: str = ",;\t") -> Sheet:
         """Return a text as a table; what separates its cells is found out."""
         lines = text.splitlines()
+        if lines and (said := _SEPARATOR.fullmatch(lines[0].strip())):  # for Excel
+            lines[0] = ""
+            separators = said[1] or "\t"
         some = [line for line in lines[:_LOOK] if line.strip()]
         # the first line that has any tells: names hold no separators, numbers may hold commas
         telling = next((line for line in some if any(s in line for s in separators)), "")
@@ -51,7 +62,7 @@ class Sheet:
         cells = [cell for i in range(min(len(lines), _LOOK)) for cell in sheet.cells(i)]
         commas = sum(bool(_DECIMAL_COMMA.fullmatch(cell)) for cell in cells)
         points = sum(bool(_DECIMAL_POINT.fullmatch(cell)) for cell in cells)
-        return cls(path, lines, separator, commas > points)
+        return cls(path, lines, separator, commas > points, bool(text) and text[-1] not in "\r\n")
 
     def cells(self, line: int) -> list[str]:
         """Return the cells of a line, counted from 0.
@@ -96,10 +107,10 @@ class Sheet:
 def is_number(text: str) -> bool:
     """Whether a cell holds a number, or says that one is missing."""
     text = text.strip()
-    if text.lower() in MISSING:
+    if says_missing(text):
         return bool(text)
     try:
-        float(text.replace(",", ".", 1))
+        float(plain_number(text).replace(",", ".", 1))
     except ValueError:
         return False
     return True
@@ -112,10 +123,12 @@ class Header:
     Attributes:
         names: One for each column; markers' as ``NAME.x`` where axes stand in a row of their own.
         start: Line at which the data start, from 0.
+        rate_hz: Rate that a remark above says [1/s], if one does.
     """
 
     names: tuple[str, ...]
     start: int
+    rate_hz: float | None = None
 
 
 def find_header(sheet: Sheet) -> Header:
@@ -125,6 +138,7 @@ def find_header(sheet: Sheet) -> Header:
         RecordingError: There is no row of names above rows of numbers.
     """
     start = 0
+    rate_hz = None
     above: list[list[str]] = []
     for line in range(min(len(sheet.lines), _LOOK)):
         cells = [cell.strip() for cell in sheet.cells(line)]
@@ -134,7 +148,10 @@ def find_header(sheet: Sheet) -> Header:
             start = line
             break
         if line == 0 or not above:
-            if cells[0][:1] in _COMMENT and 2 * len(cells) < _width_below(sheet, line):
+            narrow = 2 * len(cells) < _width_below(sheet, line)
+            said = _RATE.search(sheet.lines[line])
+            if narrow and (cells[0][:1] in _COMMENT or said):
+                rate_hz = float(said[1]) if said else rate_hz
                 continue  # a remark, not the names
             cells = _uncommented(cells)
             if sheet.is_data(line):
@@ -145,7 +162,7 @@ def find_header(sheet: Sheet) -> Header:
         start = line + 1
     if not above:
         raise bad_file(sheet.path, "an empty table", "rows of cells below a row of names")
-    return Header(_joined_names(above), start)
+    return Header(_joined_names(above), start, rate_hz)
 
 
 def _uncommented(cells: list[str]) -> list[str]:

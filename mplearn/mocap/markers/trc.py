@@ -12,7 +12,7 @@ from ...recording import FloatArray, Recording, marker_channels
 from ..clock import even_clock, in_seconds
 from ..files import bad_file, cmu_subject, read_text, stem
 from ..findings import Findings
-from ..numbers import measured_rows, number
+from ..numbers import measured_rows, not_seen, number
 from ..placing.size import UNITS_M, named_unit
 from ..placing.space import Space, placed
 from ..reader import Hints, Reader
@@ -36,11 +36,14 @@ class TRCReader(Reader):
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read the markers; see `Reader.read`."""
         findings = Findings(self.format)
-        sheet = Sheet.of(path, _tabbed(read_text(path)), separators="\t")
+        text = read_text(path).lstrip("\r\n")
+        sheet = Sheet.of(path, _tabbed(text), separators="\t")
         header = _Header.parse(path, sheet.lines)
-        values, labels = _table(sheet, header, findings)
+        # between blanks an empty cell does not show
+        group = 3 if "\t" in text or "," in text else 1
+        values, labels = _table(sheet, header, group, findings)
         measured = values[:, 2:].reshape(len(values), -1, 3)
-        measured[(measured == 0.0).all(axis=2)] = np.nan
+        measured[not_seen(measured)] = np.nan
         seen = (~np.isnan(measured).any(axis=2)).sum(axis=0)
         kept, names = chosen_names(path, labels, seen, findings)
         header.compare(path, "NumFrames", len(values), "frames", findings)
@@ -103,8 +106,17 @@ class _Header:
         findings.warn(f"{name} is {said[:20] or 'missing'}, but {count} {what} are there and read")
 
 
-def _table(sheet: Sheet, header: _Header, findings: Findings) -> tuple[FloatArray, list[str]]:
-    """Return frame numbers, times and coordinates, shape (T, 2 + 3M), and the M names."""
+def _table(
+    sheet: Sheet, header: _Header, group: int, findings: Findings
+) -> tuple[FloatArray, list[str]]:
+    """Return frame numbers, times and coordinates, shape (T, 2 + 3M), and the M names.
+
+    Args:
+        sheet: The file.
+        header: Its header.
+        group: How many cells at a row's end may be missing at once.
+        findings: Where to tell what contradicts itself.
+    """
     path, lines = sheet.path, sheet.lines
     labels = _labels(lines[header.names_at].rstrip("\r\n").split("\t")[2:])
     if not labels:
@@ -112,7 +124,9 @@ def _table(sheet: Sheet, header: _Header, findings: Findings) -> tuple[FloatArra
     start = header.names_at + 1
     if start < len(lines) and _names_axes(lines[start]):
         start += 1
-    values = measured_rows(path, sheet.rows(start), 2 + 3 * len(labels), findings, group=3)
+    values = measured_rows(
+        path, sheet.rows(start), 2 + 3 * len(labels), findings, group=group, cut_off=sheet.cut_off
+    )
     if not len(values):
         raise bad_file(path, "0 frames", "at least one")
     return values, labels
@@ -147,7 +161,7 @@ def _in_time(
     findings: Findings,
 ) -> tuple[float, FloatArray]:
     """Return the rate and the points at even times, shape (T', M, 3)."""
-    said = header.values.get("datarate", "")
+    said = re.sub(r"(?<=\d)\s*(hz|fps)$", "", header.values.get("datarate", ""), flags=re.I)
     rate_hz = (
         number(path, said.replace(",", "."), "DataRate")
         if said or hints.rate_hz is None

@@ -15,7 +15,7 @@ from ..placing.space import Space
 from ..reader import Hints, Reader
 from .asf import read_asf
 from .cmu_humanoid import CMU_SKELETON, cmu_humanoid_recording
-from .skeletal import Column, SkeletalMotion, skeletal_recording
+from .skeletal import Column, SkeletalMotion, are_radians, skeletal_recording
 
 _RATE_HZ = 120.0  # the format has no place for it; this is the database's
 _NAMED_RATES = (30, 50, 60, 100, 120, 200, 240)
@@ -48,7 +48,9 @@ class AMCReader(Reader):
             skeleton = read_asf(skeleton_file)
             name = skeleton_file.name
         values = _arranged(path, skeleton.columns, layout, table, name, findings)
-        values *= _factors(skeleton.columns, skeleton.degrees if degrees is None else degrees)
+        if degrees is None:  # the skeleton's unit, if it can be
+            degrees = skeleton.degrees and not are_radians(values, skeleton.columns, findings)
+        values *= _factors(skeleton.columns, degrees)
         space = Space(skeleton.unit_m, "y", "z", says_unit=skeleton_file is not None, says_up=True)
         motion = SkeletalMotion(skeleton.joints, skeleton.columns, values, rate_hz, space)
         if skeleton_file is None:

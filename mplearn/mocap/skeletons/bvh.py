@@ -25,11 +25,12 @@ from ..reader import Hints, Reader
 from .bvh_hierarchy import parse_hierarchy
 from .bvh_motion import parse_motion
 from .kinematics import Joint
-from .skeletal import SkeletalMotion, skeletal_recording
+from .skeletal import SkeletalMotion, are_radians, skeletal_recording
 
 # the format names neither: centimetres are usual, and so is y up
 _SPACE = Space(0.01, "y", "z", says_unit=False)
 _NEXT_TO_NOTHING = 0.1  # of the offset
+_HIERARCHY = re.compile(r"^[ \t]*HIERARCHY\b", re.IGNORECASE | re.MULTILINE)
 _MOTION = re.compile(r"(?:^|(?<=\}))[ \t]*MOTION[ \t]*$", re.IGNORECASE | re.MULTILINE)
 
 
@@ -51,12 +52,17 @@ class BVHReader(Reader):
         start = _MOTION.search(text)
         if start is None:
             raise bad_file(path, "no line 'MOTION'", "a BVH file: HIERARCHY, then MOTION")
-        joints, columns = parse_hierarchy(path, text[: start.start()], findings)
+        begin = _HIERARCHY.search(text, 0, start.start())
+        begin_at = begin.start() if begin else 0
+        if text[:begin_at].strip():
+            findings.note("text before HIERARCHY is left out")
+        joints, columns = parse_hierarchy(path, text[begin_at : start.start()], findings)
         first_line = text.count("\n", 0, start.end()) + 2
         values, rate_hz = parse_motion(
             path, text[start.end() + 1 :], first_line, len(columns), hints.rate_hz, findings
         )
-        values *= [np.pi / 180.0 if column.rotates else 1.0 for column in columns]
+        turn = 1.0 if are_radians(values, columns, findings) else np.pi / 180.0
+        values *= [turn if column.rotates else 1.0 for column in columns]
         _from_parents(joints, values, findings)
         motion = SkeletalMotion(joints, columns, values, rate_hz, _SPACE)
         return skeletal_recording(path, motion, hints, findings, positions=positions)

@@ -16,7 +16,8 @@ from .kinematics import Joint
 from .skeletal import Column
 
 _WORD = re.compile(r"[{}]|[^\s{}]+")
-_CHANNEL = re.compile(r"([xyz])_?(rotation|position)|(rotation|position)_?([xyz])")
+_KIND = "(rotation|rot|position|pos|translation)"
+_CHANNEL = re.compile(rf"([xyz])_?{_KIND}|{_KIND}_?([xyz])")
 _KEYWORDS = ("ROOT", "JOINT", "END", "ENDSITE", "END_SITE", "OFFSET", "CHANNELS", "{", "}")
 
 
@@ -177,15 +178,17 @@ class _Parser:
         self.n_columns += len(own)
 
     def _column(self, word: str, joint: _Open) -> Column:
-        match = _CHANNEL.fullmatch(word.lower())
+        match = _CHANNEL.fullmatch(word.lower().rstrip(",;"))
         if match is None:
             raise bad_file(
                 self.path, f"channel {word[:40]!r} of {joint.name!r}", "Xrotation, Yposition, ..."
             )
         axis, kind = match[1] or match[4], match[2] or match[3]
-        return Column(joint.name, "xyz".index(axis), kind == "rotation", joint.parent < 0)
+        return Column(joint.name, "xyz".index(axis), kind.startswith("rot"), joint.parent < 0)
 
     def _close(self, joint: _Open) -> None:
+        if joint.offset is None and joint.is_end:
+            joint.offset = [0.0, 0.0, 0.0]
         if joint.offset is None:
             raise bad_file(self.path, f"{joint.name!r} has no OFFSET", "one for each joint")
         if not (joint.says_channels or joint.is_end):

@@ -15,7 +15,9 @@ from ..options import option
 from .bvh_numbers import missing_or_number, split_glued
 
 _HEADER = re.compile(r"\s*(frame\s*time|frames?)\s*:?\s*(?![a-z])(.*)", re.IGNORECASE)
+_STEP = re.compile(r"\s*([-+]?[\d.,]+(?:[edED][-+]?\d+)?)\s*(ms|msec|milliseconds)?", re.I)
 _STEP_S = (1e-5, 1.0)
+_COMMON_HZ = (24, 25, 30, 50, 60, 72, 75, 90, 100, 120, 144, 150, 200, 240)
 _USUAL_HZ = (24, 25, 30, 48, 50, 60, 72, 75, 90, 100, 120, 125, 144, 150, 200, 240, 250, 300, 360,
              400, 480, 500, 600, 1000)  # fmt: skip
 
@@ -56,8 +58,9 @@ def parse_motion(
             break
         at = end + 1
         first_line += 1
-    rate_hz = rate_hz or _rate(path, said.get("Frame Time", ""))
+    rate_hz = rate_hz or _rate(path, said.get("Frame Time", ""), findings)
     flat, counts, lines = _flat(path, text[at:], first_line, findings)
+    flat, counts = _without_extra(flat, counts, width, findings)
     said_frames = said.get("Frames", "")[:12]
     n_said = int(said_frames) if said_frames.isdecimal() else None
     n_frames = _frames_in(path, counts, lines, width, n_said, findings)
@@ -72,12 +75,24 @@ def parse_motion(
     return values, rate_hz
 
 
-def _rate(path: Path, text: str) -> float:
-    """Return the rate of a frame time, a usual one where the digits that are written allow it."""
-    plain = text.split()[0].replace(",", ".") if text else ""
+def _rate(path: Path, text: str, findings: Findings) -> float:
+    """Return the rate of a frame time, a usual one where the digits that are written allow it.
+
+    Where frames a second or milliseconds are written, one of which is usual, that is taken.
+    """
+    match = _STEP.match(text)
+    plain, in_ms = (match[1].replace(",", "."), bool(match[2])) if match else (text, False)
     step_s = missing_or_number(plain) if plain else None
+    if step_s is not None and in_ms:
+        step_s, plain = 1e-3 * step_s, ""
     low, high = _STEP_S
     if step_s is None or not low < step_s <= high:
+        meant = [(step_s, "frames a second"), (1000.0 / step_s, "milliseconds")] if step_s else []
+        usual = [(rate, what) for rate, what in meant if _is_usual(rate)]
+        if len(usual) == 1:
+            (rate_hz, what), said = usual[0], option("rate_hz", f"{step_s:.6g}")
+            findings.warn(f"Frame Time: {text[:40]} is taken as {what} ({said} sets the rate)")
+            return float(min(_USUAL_HZ, key=lambda rate: abs(rate - rate_hz)))
         rates = [1.0 / step_s, 1000.0 / step_s, step_s] if step_s and step_s > 0 else []
         fitting = [f"{rate:.4g}" for rate in rates if 20.0 <= rate <= 1000.0]
         raise bad_file(
@@ -93,10 +108,16 @@ def _rate(path: Path, text: str) -> float:
     return float(near) if off <= 1.001 * 10.0**-decimals and off < 0.02 * step_s else 1.0 / step_s
 
 
+def _is_usual(rate_hz: float) -> bool:
+    return any(abs(rate_hz / usual - 1.0) < 0.02 for usual in _COMMON_HZ)
+
+
 def _flat(
     path: Path, text: str, first_line: int, findings: Findings
 ) -> tuple[FloatArray, IntArray, IntArray]:
     """Return all numbers, how many each line with any has, and which line of the file it is."""
+    if ";" in text:
+        text = text.replace(";", " ")
     if "," in text:
         text = text.replace(",", " " if "." in text else ".")
     with warnings.catch_warnings():
@@ -150,6 +171,23 @@ def _flat_by_line(
         findings.warn(f"text behind the frames, from line {behind[0]} on, is left out")
     counts = np.array([len(part) for part in parts], dtype=np.int64)
     return np.concatenate(parts) if parts else np.zeros(0), counts, np.array(places, dtype=np.int64)
+
+
+def _without_extra(
+    flat: FloatArray, counts: IntArray, width: int, findings: Findings
+) -> tuple[FloatArray, IntArray]:
+    """Leave out a value more in each line if it is plainly no channel: it counts, or is 0."""
+    if len(counts) < 2 or not (counts == width + 1).all():
+        return flat, counts
+    table = flat.reshape(-1, width + 1)
+    first, last = table[:, 0], table[:, -1]
+    if (np.diff(first) > 0).all() and np.ptp(np.diff(first)) < 1e-3 * np.diff(first)[0]:
+        findings.warn("each line begins with a number of its frame, or its time: left out")
+        return table[:, 1:].ravel(), counts - 1
+    if not last.any():
+        findings.warn("each line ends with a 0 that is no channel: left out")
+        return table[:, :-1].ravel(), counts - 1
+    return flat, counts
 
 
 def _frames_in(

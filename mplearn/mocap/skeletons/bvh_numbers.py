@@ -6,7 +6,9 @@ import re
 
 import numpy as np
 
-_UNSIGNED = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"  # in one way only: no backtracking
+from ..numbers import plain_number
+
+_UNSIGNED = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eEdD][-+]?\d+)?"  # in one way only: no backtracking
 _NUMBER = re.compile(rf"[-+]?{_UNSIGNED}")
 _GLUED = re.compile(rf"[-+]?{_UNSIGNED}(?:[-+]{_UNSIGNED})+")
 _MISSING = re.compile(
@@ -38,6 +40,7 @@ def missing_or_number(cell: str) -> float | None:
     """
     if len(cell) > _LONGEST:
         return None
+    cell = plain_number(cell)
     if _MISSING.fullmatch(cell):
         return np.nan
     try:

@@ -18,6 +18,8 @@ from ..reader import Hints
 from .kinematics import Joint, joint_positions, skeleton_of, with_axes
 from .stature import unit_of_skeleton
 
+_MOVES = 1.0  # of an angle, as it stands in the file: for who moves at all, one in radians
+
 
 @dataclass(frozen=True)
 class Column:
@@ -55,6 +57,21 @@ class SkeletalMotion:
     values: FloatArray
     rate_hz: float
     space: Space
+
+
+def are_radians(values: FloatArray, columns: tuple[Column, ...], findings: Findings) -> bool:
+    """Whether a file's angles, shape (T, C), are radians: none beyond a turn, and one travels far.
+
+    In degrees that would be someone who stands in the zero pose to within 6 degrees, and moves.
+    """
+    angles = values[:, [i for i, column in enumerate(columns) if column.rotates]]
+    known = np.nan_to_num(angles)
+    if len(known) < 2 or np.abs(known).max(initial=0.0) > 2.0 * np.pi + 0.01:
+        return False
+    if np.ptp(known, axis=0).max(initial=0.0) < _MOVES:
+        return False
+    findings.warn("the angles are taken as radians: none is beyond a turn of them")
+    return True
 
 
 def skeletal_recording(
