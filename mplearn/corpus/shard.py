@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..errors import MPLearnError, RecordingError, StoreError
+from ..errors import MPLearnError, RecordingError, StoreError, StoreInUseError
 from ..learner import Event, FramesLost, LearnerConfig, MotionLearner
 from ..mocap import TakeFiles
 from ..recording import Recording
@@ -26,6 +26,7 @@ from .reading import Reading
 
 DEATHS = 2  # of the process, while it learns a take, after which that take is left out
 _AT_ONCE = 100  # frames between two looks at whether to stop
+_PATIENCE_S = 20.0
 _CHECKPOINT_S = 300.0  # of stream that may be learned again after a death
 
 
@@ -169,9 +170,7 @@ def learn_shard(task: ShardTask) -> ShardReport:
     left = [take for take in task.takes if not journal.is_done(take.name)]
     if not left:
         return journal.report()
-    life = LifelongLearner.open(
-        task.store, lambda: MotionLearner(task.config), checkpoint_s=_CHECKPOINT_S
-    )
+    life = _opened(task)
     try:
         for take in left:
             if not _learn_take(life, take, task, journal):
@@ -184,6 +183,20 @@ def learn_shard(task: ShardTask) -> ShardReport:
     life.close()
     journal.refresh()
     return journal.report()
+
+
+def _opened(task: ShardTask) -> LifelongLearner:
+    """Open the store; where an earlier worker is about to end with its parent, wait for that."""
+    patience = time.monotonic() + _PATIENCE_S
+    while True:
+        try:
+            return LifelongLearner.open(
+                task.store, lambda: MotionLearner(task.config), checkpoint_s=_CHECKPOINT_S
+            )
+        except StoreInUseError:
+            if time.monotonic() > patience:
+                raise
+            time.sleep(0.2)
 
 
 def _learn_take(
