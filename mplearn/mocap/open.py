@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import RecordingError, RecordingWarning
 from ..recording import ReadReport, Recording
 from .files import bad_file, is_file, is_folder, stem
+from .keypoints.tables import DeepLabCutReader, SLEAPReader
 from .labels import labels_beside
 from .markers.c3d import C3DReader
 from .markers.csv_table import CSVReader
@@ -50,6 +51,8 @@ for _reader in (
     C3DReader(),
     XDFReader(),
     UIPRMDReader(),
+    DeepLabCutReader(),
+    SLEAPReader(),
 ):
     register_reader(_reader)
 

@@ -569,6 +569,40 @@ def write_xdf(
     return path
 
 
+def write_deeplabcut(path: Path) -> Path:
+    values = keypoint_values()
+    heads = [
+        ["scorer", *["net"] * 12],
+        ["bodyparts", *[name for name in KEYPOINTS for _ in range(3)]],
+        ["coords", *["x", "y", "likelihood"] * 4],
+    ]
+    rows = heads + [[str(k), *(f"{x:.6f}" for x in row)] for k, row in enumerate(values)]
+    path.write_text("".join(",".join(row) + "\n" for row in rows))
+    return path
+
+
+def write_sleap(path: Path) -> Path:
+    parts = [f"{name}.{what}" for name in KEYPOINTS for what in ("x", "y", "score")]
+    rows = [["track", "frame_idx", "instance.score", *parts]]
+    rows += [
+        ["mouse", str(k), "0.9", *(f"{x:.6f}" for x in row)]
+        for k, row in enumerate(keypoint_values())
+    ]
+    path.write_text("".join(",".join(row) + "\n" for row in rows))
+    return path
+
+
+KEYPOINTS = ("snout", "left_ear", "right_ear", "tail_base")
+
+
+def keypoint_values() -> np.ndarray:
+    """Return 12 frames of a mouse in a picture: x, y and likelihood of four points."""
+    t = np.arange(12)[:, None]
+    x = 100.0 + 2.0 * t + np.array([[30.0, 20.0, 20.0, -30.0]])
+    y = 200.0 + np.array([[0.0, -8.0, 8.0, 0.0]]) + np.sin(t)
+    return np.stack([x, y, np.full_like(x, 0.95)], axis=2).reshape(12, -1)
+
+
 Writer = Callable[[Path], Path]
 WRITERS: dict[str, tuple[str, Writer]] = {
     "UI-PRMD": (UI_PRMD_NAME, write_ui_prmd),
@@ -584,6 +618,8 @@ WRITERS: dict[str, tuple[str, Writer]] = {
     "Nexus CSV": ("take.csv", write_nexus),
     "Qualisys TSV": ("take.tsv", write_qualisys),
     "XDF": ("take.xdf", write_xdf),
+    "DeepLabCut": ("take.csv", write_deeplabcut),
+    "SLEAP": ("take.csv", write_sleap),
 }
 """For each reader, by its format: a file name, and what writes a small valid file there."""
 

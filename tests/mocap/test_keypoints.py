@@ -1,0 +1,138 @@
+"""Key points of animals: the same wherever they are, however large, however they are turned."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mplearn import LearnerConfig, MotionLearner, open_recording
+from mplearn.errors import RecordingError
+from mplearn.mocap import Hints
+from mplearn.mocap.keypoints.egocentric import seen_from_the_body
+from mplearn.recording import FloatArray
+
+NAMES = ("snout", "left_paw", "right_paw", "tail_base")
+RATE_HZ = 50.0
+
+
+def mouse(seconds: float = 24.0, z: bool = False) -> FloatArray:
+    """Return points, shape (T, 4, 2), of a mouse that raises one paw, then the other, and rests."""
+    t = np.arange(0, seconds, 1 / RATE_HZ)
+    bump = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)
+    left, right = (np.where((t // 2) % 2 == k, bump, 0.0) for k in (0, 1))
+    points = np.zeros((len(t), 4, 3))
+    points[:, :, 0] = [2.0, 0.8, 0.8, -2.0]
+    points[:, 1, 1], points[:, 2, 1] = 0.7 + 0.6 * left, -0.7 - 0.6 * right
+    points[:, 1, 0] += 0.8 * left
+    points[:, 2, 0] += 0.8 * right
+    points[:, 1, 2] = left
+    return points if z else points[..., :2]
+
+
+def placed(points: FloatArray, size: float, turn: float, speed: float = 3.0) -> FloatArray:
+    """Return points turned, enlarged and moved on a curve."""
+    t = np.arange(len(points)) / RATE_HZ
+    angle = turn + 0.4 * np.sin(0.5 * t)
+    c, s = np.cos(angle), np.sin(angle)
+    rotation = np.stack([np.stack([c, -s], 1), np.stack([s, c], 1)], axis=1)
+    moved = points.copy()
+    moved[..., :2] = np.einsum("tij,tkj->tki", rotation, points[..., :2])
+    path = np.cumsum(np.stack([c, s], axis=1), axis=0) * speed / RATE_HZ
+    moved[..., :2] += path[:, None]
+    return size * moved
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.floats(0.01, 500), st.floats(-10, 10), st.booleans())
+def test_where_and_how_large_changes_nothing(size: float, turn: float, z: bool) -> None:
+    plain, channels, length = seen_from_the_body(mouse(4.0, z), NAMES, RATE_HZ)
+    seen, _, larger = seen_from_the_body(placed(mouse(4.0, z), size, turn), NAMES, RATE_HZ)
+    np.testing.assert_allclose(seen, plain, atol=1e-8)
+    assert larger == pytest.approx(size * length)
+    assert length == pytest.approx(4.0)
+    assert channels[:3] == ("snout.ahead", "snout.left", "snout.up" if z else "left_paw.ahead")
+
+
+def test_without_names_the_heading_is_where_it_goes() -> None:
+    for turn in (0.0, 2.0, 4.0):
+        seen, _, _ = seen_from_the_body(
+            placed(mouse(8.0), 1.0, turn), ("a", "b", "c", "d"), RATE_HZ
+        )
+        assert (seen[:, 0] > 0.3).all()  # the snout is ahead
+        assert (seen[:, 3] > 0.1).all()  # the left paw is left
+
+
+def test_short_gaps_are_bridged_and_long_ones_stay() -> None:
+    points = mouse(8.0)
+    likelihood = np.ones(points.shape[:2])
+    likelihood[50:55, 1] = 0.2
+    likelihood[100:150, 2] = 0.2
+    seen, _, _ = seen_from_the_body(points, NAMES, RATE_HZ, likelihood)
+    lost = np.isnan(seen)
+    assert lost[100:150, [4, 5]].all()
+    lost[100:150, [4, 5]] = False
+    assert not lost.any()
+    with pytest.raises(RecordingError, match="three"):
+        seen_from_the_body(points, NAMES, RATE_HZ, np.zeros_like(likelihood))
+    with pytest.raises(RecordingError, match="one place"):
+        seen_from_the_body(np.ones_like(points), NAMES, RATE_HZ)
+
+
+def deeplabcut(path: Path, points: FloatArray, animals: tuple[str, ...] = ()) -> None:
+    """Write a table as DeepLabCut does: by pandas, with heads of several rows."""
+    pixels = points * [1, -1]  # rows are counted downwards
+    values = np.concatenate([pixels, np.full((*points.shape[:2], 1), 0.99)], axis=2)
+    heads = [["net"], list(NAMES), ["x", "y", "likelihood"]]
+    names = ["scorer", "bodyparts", "coords"]
+    flat = values.reshape(len(points), -1)
+    if animals:
+        heads.insert(1, list(animals))
+        names.insert(1, "individuals")
+        rare = np.full_like(flat, np.nan)
+        rare[:10] = flat[:10]
+        flat = np.concatenate([rare, flat], axis=1)
+    columns = pandas.MultiIndex.from_product(heads, names=names)
+    pandas.DataFrame(flat, columns=columns).to_csv(path)
+
+
+def test_a_table_of_deeplabcut_is_learned(tmp_path: Path) -> None:
+    points = 40 * placed(mouse(), 1.0, 1.0) + 300
+    deeplabcut(tmp_path / "mouse.csv", points)
+    take = open_recording(tmp_path / "mouse.csv", hints=Hints(rate_hz=RATE_HZ))
+    expected, channels, _ = seen_from_the_body(mouse(), NAMES, RATE_HZ)
+    assert take.channels == channels
+    np.testing.assert_allclose(take.frames, expected, atol=1e-6)
+    learner = MotionLearner(LearnerConfig(take.channels, take.rate_hz))
+    for _ in learner.learn_recording(take, 100):
+        pass
+    assert 2 <= len(learner.tree.leaves) <= 4  # each paw, up and down
+
+
+def test_of_several_animals_the_one_seen_most_is_read(tmp_path: Path) -> None:
+    deeplabcut(tmp_path / "two.csv", mouse(4.0), ("shy", "bold"))
+    take = open_recording(tmp_path / "two.csv")
+    assert "pictures there are a second" in take.report.notes[0]
+    assert (take.person, take.rate_hz, take.report.left_out) == ("bold", 30.0, ("shy",))
+
+
+def test_sleap_has_a_row_for_each_frame_and_track(tmp_path: Path) -> None:
+    points = mouse(4.0) * [1, -1]
+    rows = [
+        {
+            "track": track, "frame_idx": 7 + k, "instance.score": 0.9,
+            **{f"{name}.{axis}": points[k, p, a] for p, name in enumerate(NAMES)
+               for a, axis in enumerate("xy")},
+            **{f"{name}.score": 0.9 for name in NAMES},
+        }
+        for track, last in (("track_0", 200), ("track_1", 20))
+        for k in range(last) if k != 50
+    ]  # fmt: skip
+    pandas.DataFrame(rows).to_csv(tmp_path / "mouse.analysis.csv", index=False)
+    take = open_recording(tmp_path / "mouse.analysis.csv", hints=Hints(rate_hz=RATE_HZ))
+    expected, _, _ = seen_from_the_body(mouse(4.0), NAMES, RATE_HZ)
+    assert take.person == "track_0"
+    np.testing.assert_allclose(np.delete(take.frames, 50, 0), np.delete(expected, 50, 0), atol=1e-6)
+    assert np.isfinite(take.frames).all()  # one frame is bridged
