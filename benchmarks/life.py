@@ -3,7 +3,7 @@
 The demonstrator's motions come again and again, each time a little different, with new ones now and
 then in the first tenth and none after it: from there on nothing may grow. Prints, and plots over
 the stream: memory, size of the file, time a frame, time of a checkpoint, and for how long the
-stream was ever held up by a checkpoint or by a snapshot for readers.
+stream was ever held up by a checkpoint or by a snapshot for readers (processor time).
 """
 
 import argparse
@@ -78,9 +78,9 @@ def live(hours: float, path: Path, checkpoint_s: float = 30.0) -> Figures:
         append = life.store.append
 
         def timed(*args: object) -> None:
-            begin = time.perf_counter()
+            begin = time.thread_time()
             append(*args)  # type: ignore[arg-type]
-            held.append(time.perf_counter() - begin)
+            held.append(time.thread_time() - begin)
 
         life.store.append = timed  # type: ignore[method-assign, assignment]
         while life.n_frames < n_frames:
@@ -112,12 +112,12 @@ def longest_part(life: LifelongLearner) -> float:
     """Take a snapshot, in parts; return how long the longest of them held the stream up [s]."""
     longest, ready = 0.0, False
     while not ready:
-        begin = time.perf_counter()
+        begin = time.thread_time()
         ready = life.prepare_snapshot()
-        longest = max(longest, time.perf_counter() - begin)
-    begin = time.perf_counter()
+        longest = max(longest, time.thread_time() - begin)
+    begin = time.thread_time()
     life.snapshot()
-    return max(longest, time.perf_counter() - begin)
+    return max(longest, time.thread_time() - begin)
 
 
 def memory_mb() -> float:

@@ -20,10 +20,12 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 from mplearn.demonstrator import Demonstrator
 from mplearn.recording import LabelledSegment
@@ -132,6 +134,10 @@ class Teacher:
         sure, young = (*numbers, 0, 0)[:2]
         return sure, young
 
+    def standing(self) -> bool:
+        """Return whether the page shows the robot."""
+        return self.page.locator("html").get_attribute("data-figures") == "there"
+
     def teach(self, script: Iterator[str]) -> None:
         """Perform a script, which may look at the page between its motions."""
         demonstrator = self.demonstrator
@@ -162,7 +168,9 @@ class Teacher:
                     self.shown.append(name)
                     yield name
             picture(("arms", "bends")[k])
-        for name in SEQUENCE:
+        for k, name in enumerate(SEQUENCE):
+            if k == len(SEQUENCE) // 2:
+                picture("sequencing")
             self.shown.append(name)
             yield name
 
@@ -195,15 +203,29 @@ def session(
     speed: float,
     picture: Callable[[Any, str], None] = lambda page, name: None,
     size: tuple[int, int] = (1280, 720),
+    theme: str = "light",
+    end: Callable[[Any], None] = lambda page: None,
 ) -> dict[str, Any]:
-    """Replay the experiment; return what the page shows at its end."""
+    """Replay the experiment; return what the page shows at its end.
+
+    Args:
+        opened: The browser.
+        speed: Times as fast as a person.
+        picture: Takes the page at certain moments, and what they are called.
+        size: Of the page [px].
+        theme: Light or dark.
+        end: What else is done on the page at the end.
+    """
     port = free_port()
     with live(f"ndjson:{port}") as (url, _):
         page = opened.new_page(viewport={"width": size[0], "height": size[1]})
+        page.add_init_script(f"localStorage.theme ||= '{theme}'")
         teacher = Teacher(page, port, speed)
         page.goto(url)
         state = page.locator("#state")
         until(lambda: "waiting" in state.inner_text(), 120, "the learner waits for frames")
+        until(lambda: teacher.standing(), 60, "the robot stands there")
+        picture(page, "begin")
         teacher.teach(teacher.script(lambda name: picture(page, name)))
         until(lambda: len(teacher.meanings()) >= 4 or teacher.learned()[0] >= 4, 20)
         page.wait_for_timeout(1500)
@@ -214,9 +236,10 @@ def session(
         picture(page, "learned")
         page.keyboard.press("w")
         root = page.locator("html")
-        until(lambda: root.get_attribute("data-robot"), 30, "the robot walks")
+        until(lambda: root.get_attribute("data-robot"), 120, "the robot walks")
         page.wait_for_timeout(1500)
         picture(page, "walk")
+        end(page)
         found = {
             "tree": page.locator("#tree text.name").all_text_contents(),
             "graph": page.locator("#graph .node text").all_text_contents(),
@@ -238,15 +261,37 @@ def main() -> None:
     parser.add_argument("--speed", type=float, default=4.0)
     parser.add_argument("--width", type=int, default=1280)
     parser.add_argument("--height", type=int, default=720)
+    parser.add_argument("--theme", choices=["light", "dark"], default="light")
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
-    numbers = iter(range(1, 100))
 
     def picture(page: Any, name: str) -> None:
-        page.screenshot(path=args.out / f"{next(numbers)}-{name}.png")
+        image = Image.open(BytesIO(page.screenshot()))
+        image.save(args.out / f"session-{name}.webp", quality=82, method=6)
+
+    def end(page: Any) -> None:
+        """Look at a primitive, and then at the screen that is read from afar."""
+        page.keyboard.press("x")
+        page.locator("#tree .row").first.click()
+        root = page.locator("html")
+        until(lambda: root.get_attribute("data-shown"), 60, "the figure")
+        until(lambda: root.get_attribute("data-robot"), 60, "the robot performs it")
+        page.wait_for_timeout(700)
+        picture(page, "click")
+        page.keyboard.press("Escape")
+        page.keyboard.press("f")
+        page.wait_for_timeout(700)
+        picture(page, "screen")
 
     with browser() as opened:
-        found = session(opened, speed=args.speed, picture=picture, size=(args.width, args.height))
+        found = session(
+            opened,
+            speed=args.speed,
+            picture=picture,
+            size=(args.width, args.height),
+            theme=args.theme,
+            end=end,
+        )
     for key, value in found.items():
         print(f"{key}: {value}")
 

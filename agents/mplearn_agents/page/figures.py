@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mplearn.body import feature_channels, human_body, posture_of, robot_body
+from mplearn.errors import InvalidValueError
+from mplearn.library import PrimitiveLibrary
 from mplearn.maths.rotations import matrix_to_quaternion
 from mplearn.recording import FloatArray
 
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 
     from mplearn.body import KinematicTree
 
+CLIP_HZ = 30.0
 _SEEN_GROUPS = 3  # geoms from this group on are for contact, not to be seen
 _KINDS = {2: "sphere", 3: "capsule", 4: "ellipsoid", 5: "cylinder", 6: "box"}
 #: Bodies of the human that the robot lacks, and which of its turn as they do.
@@ -98,6 +101,31 @@ def human_poses(features: FloatArray, channels: Sequence[str]) -> Poses:
     lowest = (places[:, at] + np.einsum("tsij,sj->tsi", turns[:, at], under))[..., 2].min(axis=1)
     places[..., 2] += (larger * soles_z - lowest)[:, None]
     return np.concatenate((places, matrix_to_quaternion(turns)), axis=2, dtype=np.float32)
+
+
+def motions_of(library: PrimitiveLibrary, id: int) -> list[Poses]:
+    """Return the motion of a primitive as a human figure does it, then its demonstrations.
+
+    Args:
+        library: What is known.
+        id: The primitive.
+
+    Returns:
+        Poses at `CLIP_HZ`, shape (T, B, 7) each.
+
+    Raises:
+        InvalidValueError: The library's channels are no body's.
+        UnknownPrimitiveError: There is no such primitive.
+    """
+    primitive, rate_hz = library[id], library.rate_hz
+    if not has_figure(library.channels):
+        raise InvalidValueError("these channels are no body's: there is no figure to show")
+    poses = []
+    for motion in (library.generate([id]).frames, *primitive.exemplars):
+        n = max(2, round(len(motion) / rate_hz * CLIP_HZ))
+        at = np.linspace(0, len(motion) - 1, n).round().astype(np.int64)
+        poses.append(human_poses(motion[at], library.channels))
+    return poses
 
 
 def _turns_and_soles(tree: KinematicTree, postures: FloatArray) -> tuple[FloatArray, FloatArray]:

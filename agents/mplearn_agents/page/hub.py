@@ -25,8 +25,8 @@ MOST_BEHIND = 400  # messages that wait for a client before it is told all anew
 _ROWS = 2048  # of the stream that are kept, 50 a second
 _NO_POSE: Poses = np.empty((0, 7), np.float32)
 #: What a page may ask of the learner, and of the robot.
-LEARNER = {*COMMANDS, "undo", "redo", "history"}
-ROBOT = {"show", "perform", "walk", "path", "stop"}
+LEARNER = {*COMMANDS, "undo", "redo", "history", "show"}
+ROBOT = {"perform", "walk", "path", "stop"}
 
 
 class Client:

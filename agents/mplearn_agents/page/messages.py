@@ -69,6 +69,18 @@ def clip(number: int, rate_hz: float, motions: Sequence[Poses]) -> bytes:
     return head + lengths + b"".join(np.ascontiguousarray(m, "<f4").tobytes() for m in motions)
 
 
+def number(asked: Header, key: str) -> int:
+    """Return a whole number that a request holds.
+
+    Raises:
+        InvalidValueError: It holds none of 32 bits.
+    """
+    value = asked.get(key)
+    if type(value) is not int or not 0 <= value < 2**32:
+        raise InvalidValueError(f"{key} must be a whole number, not {value!r:.40}")
+    return value
+
+
 def request(text: str) -> Header:
     """Return what a page asks for.
 

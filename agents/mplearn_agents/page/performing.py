@@ -1,7 +1,6 @@
-"""The process that performs: the humanoid in MuJoCo, and the figures of primitives.
+"""The process that performs: the humanoid in MuJoCo.
 
-A figure is worked out at once when a teacher asks for it; what the robot does takes longer, and is
-done in a thread of its own (`robot`), while the robot's poses are shown at its own pace.
+What it does is simulated in a thread of its own (`robot`), while its poses are shown at its pace.
 """
 
 from __future__ import annotations
@@ -12,23 +11,19 @@ from collections import deque
 from concurrent.futures import Future
 from multiprocessing.connection import Connection
 
-import numpy as np
-
 from mplearn.body import human_body
 from mplearn.errors import InvalidValueError, MPLearnError
 from mplearn.library import PrimitiveLibrary
-from mplearn.recording import FloatArray
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.robot import humanoid
 
-from .figures import has_figure, human_poses, shapes_of
+from .figures import shapes_of
 from .happenings import happening
-from .messages import Header, Poses, clip, unpack
+from .messages import Header, Poses, number, unpack
 from .outbox import Outbox
 from .robot import SHOWN_HZ, SPEED, PageRobot, Performed, pose_of
 from .shelf import Receiver
 
-CLIP_HZ = 30.0
 MOST_ASKED = 64  # primitives that wait to be performed
 _AHEAD = 5  # frames that are simulated before they are shown
 _STATUS_S = 0.25
@@ -122,43 +117,25 @@ class Stage:
             return "the robot stops after this"
         if library is None or not len(library):
             raise InvalidValueError("nothing is learned yet: there is nothing to perform")
-        if asked["do"] == "show":
-            primitive = library[_number(asked, "id")]
-            self._show(library, primitive.id, asked)
-            return f"{{{primitive.id}}}"
         if self._robot.cannot:
             raise InvalidValueError(f"the robot can perform nothing of this: {self._robot.cannot}")
         match asked["do"]:
             case "perform":
-                id = library[_number(asked, "id")].id
+                id = library[number(asked, "id")].id
                 self._queue([id])
                 return f"the robot performs {{{id}}}"
             case "walk":
-                length = _number(asked, "length")
+                length = number(asked, "length")
                 if not 1 <= length <= MOST_ASKED:
                     raise InvalidValueError(f"a walk has 1 to {MOST_ASKED} steps, not {length}")
                 self._queue([], length)
                 return f"the robot walks {length} steps"
             case "path":
-                goal = library[_number(asked, "id")].id
+                goal = library[number(asked, "id")].id
                 self._paths.append((self._robot.path(goal), reply))
                 return ""
             case other:
                 raise InvalidValueError(f"nobody knows how to {other[:40]!r}")
-
-    def _show(self, library: PrimitiveLibrary, id: int, asked: Header) -> None:
-        """Send the figure of a primitive, with its demonstrations."""
-        if not has_figure(library.channels):
-            raise InvalidValueError("these channels are no body's: there is no figure to show")
-        primitive, rate_hz = library[id], library.rate_hz
-        motions: list[FloatArray] = [library.generate([id]).frames, *primitive.exemplars]
-        poses = []
-        for motion in motions:
-            n = max(2, round(len(motion) / rate_hz * CLIP_HZ))
-            at = np.linspace(0, len(motion) - 1, n).round().astype(np.int64)
-            poses.append(human_poses(motion[at], library.channels))
-        header = {"kind": "clip", "client": asked.get("client")}
-        self._outbox.post(header, clip(_number(asked, "ref"), CLIP_HZ, poses))
 
     def _queue(self, ids: list[int], steps: int = 0) -> None:
         """Let the robot do this next, and nothing else of what it was asked."""
@@ -259,10 +236,3 @@ def _bodies(robot_xml: str) -> Header:
         "person": shapes_of(human_body().model()),
         "robot": shapes_of(mujoco.MjModel.from_xml_string(robot_xml)),
     }
-
-
-def _number(asked: Header, key: str) -> int:
-    value = asked.get(key)
-    if type(value) is not int or not 0 <= value < 2**32:
-        raise InvalidValueError(f"{key} must be a whole number, not {value!r:.40}")
-    return value

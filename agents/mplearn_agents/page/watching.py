@@ -21,13 +21,15 @@ import numpy as np
 from mplearn.demonstrator import demonstrate
 from mplearn.errors import InvalidValueError, MPLearnError, RecordingWarning, StoreWarning
 from mplearn.learner import LearnerConfig, MotionLearner, learnable_rate
+from mplearn.library import PrimitiveLibrary
 from mplearn.sources import Block, Change, Observe, Source, open_source
 from mplearn.store import LifelongLearner, Store
 
 from ..pauses import short_pauses
+from .figures import CLIP_HZ, motions_of
 from .happenings import happening, tell
 from .knowledge import knowledge
-from .messages import Header, unpack
+from .messages import Header, clip, number, unpack
 from .outbox import Message, Outbox
 from .shelf import Sender
 from .teaching import do, history
@@ -84,6 +86,7 @@ class Watcher:
         self._numbers = itertools.count()
         self._room = threading.Semaphore(MOST_WAITING)
         self._lifelong: LifelongLearner | None = None
+        self._library: PrimitiveLibrary | None = None  # what was told last
         self._figure: WatchedFigure | None = None
         self._source: Source | None = None
         self._rate_hz = 0.0
@@ -301,6 +304,7 @@ class Watcher:
             return
         self._told_revision = lifelong.revision
         library, tree = lifelong.snapshot(), lifelong.learner.tree
+        self._library = library
         waiting = tree.most_repeated()
         self._outbox.post(
             knowledge(library, tree)
@@ -382,7 +386,9 @@ class Watcher:
             return
         reply = {"kind": "reply", "client": asked.get("client"), "ref": asked.get("ref")}
         try:
-            if asked["do"] == "history":
+            if asked["do"] == "show":
+                reply["text"] = self._show(asked)
+            elif asked["do"] == "history":
                 reply["lines"] = history(self._known(), asked)
             else:
                 reply["text"] = self._do(asked)
@@ -404,6 +410,15 @@ class Watcher:
         self._tell_forecast()
         return text
 
+    def _show(self, asked: Header) -> str:
+        """Send the figure of a primitive, with its demonstrations; return which it is."""
+        if self._library is None:
+            raise InvalidValueError("nothing is learned yet: there is nothing to show")
+        id = number(asked, "id")
+        blob = clip(number(asked, "ref"), CLIP_HZ, motions_of(self._library, id))
+        self._outbox.post({"kind": "clip", "client": asked.get("client")}, blob)
+        return f"{{{id}}}"
+
     def _known(self) -> LifelongLearner:
         if self._lifelong is None:
             raise InvalidValueError("nothing has been seen yet: there is nothing to change")
@@ -417,7 +432,9 @@ def _warm_up() -> None:
     learner = MotionLearner(LearnerConfig(recording.channels, recording.rate_hz))
     learner.learn_many(recording.frames)
     learner.predict_next(1)
-    knowledge(learner.snapshot(), learner.tree)
+    library = learner.snapshot()
+    knowledge(library, learner.tree)
+    motions_of(library, library.ids[0])
     WatchedFigure(recording.channels, recording.rate_hz).take(recording.frames)
 
 

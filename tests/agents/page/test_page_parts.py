@@ -19,13 +19,14 @@ from mplearn.learner import LearnerConfig, MotionLearner
 from mplearn.maths.rotations import quaternion_to_matrix
 from mplearn.store import LifelongLearner
 from mplearn_agents.page import messages, teaching
-from mplearn_agents.page.figures import has_figure, human_poses, poses_of, shapes_of
+from mplearn_agents.page.figures import CLIP_HZ, has_figure, human_poses, poses_of, shapes_of
 from mplearn_agents.page.happenings import tell
 from mplearn_agents.page.knowledge import knowledge
 from mplearn_agents.page.outbox import Outbox
 from mplearn_agents.page.performing import Stage
 from mplearn_agents.page.shelf import Receiver, Sender
 from mplearn_agents.page.watched_figure import WatchedFigure
+from mplearn_agents.page.watching import Watch, Watcher
 
 SCRIPT = ("BAR", "BAL", "BAD", "BAU") * 5
 
@@ -267,8 +268,36 @@ class Kept:
         self.posted.append((header, blob))
 
 
+def test_a_click_shows_the_figure_with_its_demonstrations(taught):
+    """The learner answers: its own library, as it was told last, whatever the robot does."""
+    life, _ = taught
+    mine, theirs = Pipe()
+    kept = Kept()
+    watcher = Watcher(Watch("demonstrator"), mine, kept)
+    asked = {"do": "show", "client": 1, "id": life.snapshot().ids[0], "ref": 7}
+    watcher._answer(asked)  # nothing was told yet
+    watcher._lifelong = life
+    while not any(h["kind"] == "library" for h, _ in kept.posted):
+        watcher._tell_knowledge()
+    watcher._answer(asked)
+    watcher._answer(asked | {"id": 10**6})
+    replies = [h for h, _ in kept.posted if h["kind"] == "reply"]
+    assert [h["ok"] for h in replies] == [False, True, False]
+    (blob,) = (blob for h, blob in kept.posted if h["kind"] == "clip")
+    primitive = life.snapshot()[asked["id"]]
+    assert np.frombuffer(blob, "<u4", 1, 4)[0] == 7
+    (n,) = np.frombuffer(blob, "<u4", 1, 12)
+    assert n == 1 + len(primitive.exemplars)
+    lengths = np.frombuffer(blob, "<u4", n, 16)
+    seconds = np.array([len(each) for each in primitive.exemplars]) / life.snapshot().rate_hz
+    np.testing.assert_allclose(lengths[1:] / CLIP_HZ, seconds, atol=0.5 / CLIP_HZ)
+    poses = np.frombuffer(blob, "<f4", offset=16 + 4 * n).reshape(lengths.sum(), -1, 7)
+    assert 0.5 < poses[:, 0, 2].min() < poses[:, 0, 2].max() < 1.3  # the pelvis
+    theirs.close()
+
+
 def test_the_robot_performs_what_it_is_asked(taught):
-    """A click: the figure with its demonstrations, and the robot in MuJoCo; then a path."""
+    """The robot in MuJoCo: a primitive, then a path."""
     life, _ = taught
     mine, theirs = Pipe()
     kept = Kept()
@@ -282,7 +311,6 @@ def test_the_robot_performs_what_it_is_asked(taught):
     theirs.send_bytes(messages.pack({"kind": "library", "content": delivery[0]}, delivery[1]))
     running = threading.Thread(target=stage.run)
     running.start()
-    ask("show", id=library.ids[0], ref=7)
     ask("perform", id=library.ids[0], ref=8)
     ask("walk", length=0, ref=9)
     ask("path", id=10**6, ref=10)
@@ -292,20 +320,14 @@ def test_the_robot_performs_what_it_is_asked(taught):
 
     until(performed, 200)  # compiling, the first time
     assert performed() == {library.ids[0]}
-    kinds = [h["kind"] for h, _ in kept.posted]  # the figure comes first
-    assert kinds.index("clip") < next(
-        k for k, (h, _) in enumerate(kept.posted) if h["kind"] == "robot" and h["primitive"]
-    )
     ask("path", id=library.ids[1], ref=11)
     until(lambda: library.ids[1] in performed(), 60)
     theirs.close()
     running.join(10)
     replies = {h["ref"]: h for h, _ in kept.posted if h["kind"] == "reply"}
-    assert replies[7]["ok"] and replies[8]["ok"] and replies[11]["ok"]
+    assert replies[8]["ok"] and replies[11]["ok"]
     assert not replies[9]["ok"] and "1 to" in replies[9]["text"]
     assert not replies[10]["ok"]
-    figures = [blob for h, blob in kept.posted if h["kind"] == "clip"]
-    assert len(figures) == 1 and np.frombuffer(figures[0], "<u4", 1, 4)[0] == 7
     assert library.ids[1] in performed()
     poses = [blob for h, blob in kept.posted if h["kind"] == "robot-pose"]
     heights = [np.frombuffer(p, np.float32).reshape(-1, 7)[0, 2] for p in poses]

@@ -115,7 +115,8 @@ export class Graph {
 
   drawWhole(width, height, size) {
     const n = this.ids.length, r = Math.max(5, Math.min(1.05 * size, 0.24 * Math.sqrt((width * height) / (n * 6))));
-    const margin = { x: 4.2 * size, y: 2 * size };
+    const loops = this.edges.some((e) => e[0] === e[1]); // they rise above their primitive
+    const margin = { x: 4.2 * size, y: (loops ? 3.6 : 2) * size };
     const xs = this.ids.map((id) => this.places.get(id).x), ys = this.ids.map((id) => this.places.get(id).y);
     const box = { x: Math.min(...xs), y: Math.min(...ys), w: Math.max(Math.max(...xs) - Math.min(...xs), 0.25), h: Math.max(Math.max(...ys) - Math.min(...ys), 0.25) };
     const place = (id) => {

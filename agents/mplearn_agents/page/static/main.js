@@ -38,7 +38,7 @@ function heard(message) {
       stream.take(message);
       break;
     case "clip": if (message.ref === asked) { stage.show(message); root.dataset.shown = asked; } break;
-    case "bodies": stage.setBodies(message); break;
+    case "bodies": stage.setBodies(message); root.dataset.figures = "there"; break;
     case "stream": begin(message); break;
     case "knowledge": learn(message); break;
     case "forecast": world.forecast = message.next; present(); break;
@@ -159,7 +159,7 @@ function robot() {
   let text = "robot";
   if (state === "none") text = "no robot";
   else if (state === "stopped") text = "robot: starting again";
-  else if (r.primitive != null) text = `robot: ${label(r.primitive)}${r.left ? `, then ${r.left} more` : ""}`;
+  else if (r.primitive != null) text = `${label(r.primitive)}${r.left ? ` + ${r.left}` : ""}`;
   else if (r.cannot) text = "robot: cannot perform this";
   else if (r.left) text = "robot: planning";
   stage.captions.robot = text;
@@ -292,6 +292,7 @@ function remember(name, value) { localStorage.setItem(name, value); }
 function resized() {
   colours = null;
   tree.draw();
+  side.fit();
   graph.stale = true;
 }
 

@@ -30,8 +30,17 @@ export class Side {
   // Say what is present: the last motion that was recognised, or that none was.
   now({ text, lit, why }) {
     set(this.present, text);
+    this.fit();
     this.present.dataset.lit = lit ? "yes" : "no";
     set(this.why, why);
+  }
+
+  // Write what is present as large as there is room for it in a line.
+  fit() {
+    const { style } = this.present;
+    style.fontSize = "";
+    const { scrollWidth, clientWidth } = this.present;
+    if (scrollWidth > clientWidth) style.fontSize = `${Math.max(0.5, clientWidth / (scrollWidth + 2)) * parseFloat(getComputedStyle(this.present).fontSize)}px`;
   }
 
   coming(forecast, seconds) {

@@ -171,7 +171,7 @@ export class Tree {
     set(name, { x: x + 0.95 * size, y: y + 0.35 * size });
     set(count, { class: provisional ? "dots" : "soft", x: width - 8, y: y + 0.35 * size });
     write(count, provisional ? dots(primitive.n, primitive.of) : `× ${primitive?.n ?? node.n}`);
-    write(name, shortened(primitive?.name ?? `P${node.id}`, (width - x - 5.2 * size) / (0.56 * size)));
+    write(name, shortened(primitive?.name ?? `P${node.id}`, (width - x - 4.6 * size) / (0.53 * size)));
     write(title, `${primitive?.name ?? ""}, ${provisional ? `${primitive.n} of ${primitive.of}` : `shown ${primitive?.n ?? node.n} times`}`);
     return key;
   }
