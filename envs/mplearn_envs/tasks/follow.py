@@ -16,6 +16,7 @@ from mplearn_envs.skills.action_choices import HOLD, Choices
 from mplearn_envs.skills.repertoire import Repertoire
 
 from .base import Choice, Scene, Task
+from .best import Clock, Scale
 
 _LONGEST_TIME = 3.0  # of the time since a motion began, as a share of its usual duration
 
@@ -118,6 +119,8 @@ class FollowTask(Task):
         self._n_recognised = 0
         self._doing: int | None = None
         self._time_s, self._agreed_s = 0.0, 0.0
+        clock = Clock.of(repertoire, scene.discount)
+        self._scale = Scale(self.agree * clock.held(self.deadline_s), 0.0)
         self._go_on(scene.time_s)
 
     def observe(self) -> FloatArray:
@@ -164,11 +167,16 @@ class FollowTask(Task):
         return self._time_s >= self.deadline_s
 
     def report(self) -> dict[str, Any]:
-        """Return the share of time in agreement, and the slot of what the demonstrator does now."""
+        """Return the share of time in agreement, and the slot of what the demonstrator does now.
+
+        ``best_return`` is that of agreement from the start to the deadline, as a twin of the
+        demonstrator would have: no agent reaches it, and what it misses of it is its regret.
+        """
         now = int(np.searchsorted(self._ends_s, self._time_s, side="right"))
         return {
             "agreement": self._agreed_s / self._time_s if self._time_s > 0 else 0.0,
             "demonstrator": self._repertoire.slots[self._ids[now]],
+            **self._scale.report(),
         }
 
     # ---- the demonstrator

@@ -114,3 +114,18 @@ def test_who_knows_the_demonstrator_agrees_more_than_who_does_not():
             agreement.append(info["task"]["agreement"])
         means[knows] = np.mean(agreement)
     assert means[True] > 2 * means[False]
+
+
+def test_what_is_missed_of_the_best_return_is_the_regret():
+    """Nobody agrees more than always; whoever holds has all of it as his regret."""
+    env = make(FollowTask(deadline_s=10.0), discount=0.9)
+    _, info = env.reset(seed=3)
+    best = info["task"]["best_return"]
+    assert best == pytest.approx((1.0 - 0.9**10.0) / -np.log(0.9), rel=0.01)
+    assert info["task"]["idle_return"] == 0.0
+    total, discount, over = 0.0, 1.0, False
+    while not over:
+        _, reward, over, _, info = env.step(legal(info)[-1])
+        total += discount * float(reward)
+        discount *= info["discount"]
+    assert 0.0 <= total < best
