@@ -1,0 +1,53 @@
+"""The page that sets other libraries beside ours, on data whose answer is known."""
+
+import numpy as np
+import pytest
+
+from mplearn.demonstrator import demonstrate
+from mplearn.evaluation.experiments.page_of_peers import (
+    METHODS,
+    activity_peers_table,
+    boundary_peers_table,
+)
+from mplearn.recording import LabelledSegment, Recording
+
+
+@pytest.fixture(scope="module")
+def planted() -> Recording:
+    """Three activities, two of which come back: rhythms around postures of their own."""
+    rng = np.random.default_rng(0)
+    t = np.arange(300) / 30.0
+    frames, labels = [], []
+    for k, kind in enumerate([0, 1, 2, 0, 1]):
+        middle = np.eye(3)[kind] * 1.5
+        wave = np.stack([np.sin(2 * np.pi * (0.5 + 0.3 * kind) * t + p) for p in range(3)], axis=1)
+        frames.append(middle + 0.3 * wave + 0.01 * rng.normal(size=wave.shape))
+        labels.append(LabelledSegment(300 * k, 300 * (k + 1), f"activity {kind}"))
+    return Recording(np.concatenate(frames), 30.0, ("a", "b", "c"), "planted", labels=tuple(labels))
+
+
+def test_what_is_planted_is_found_by_all(planted: Recording) -> None:
+    table = activity_peers_table([planted])
+    assert [row[1] for row in table.rows[:3]] == list(METHODS)[:3]
+    told = {row[1]: row[2] for row in table.rows}
+    assert told["ours, find_activities"] == "nothing"
+    for row in table.rows[:3]:
+        assert float(row[3]) > 0.8, row
+        assert row[-1].endswith(" MB")
+
+
+def test_boundaries_of_each_are_scored_alike() -> None:
+    shown = demonstrate(["BAR", "BAL"] * 8, seed=2, rate_hz=30.0)
+    whole = [
+        LabelledSegment(a.start, b.end, "raise", "anna")
+        for a, b in zip(shown.truth[::2], shown.truth[1::2], strict=True)
+    ]
+    recording = shown.recording
+    take = Recording(
+        recording.frames, 30.0, recording.channels, "raise", "anna", labels=tuple(whole)
+    )
+    table = boundary_peers_table([take])
+    ours = table.rows[0]
+    assert ours[0] == "ours"
+    assert float(ours[4]) > 0.7
+    assert {row[0] for row in table.rows} >= {"ours", "ruptures, PELT"}
