@@ -8,6 +8,7 @@ from . import formats as _formats  # noqa: F401  (registers them)
 from .checking import Verdict as Verdict
 from .checking import check as check
 from .exporting import export as export
+from .format import Dialect as Dialect
 from .format import Format as Format
 from .format import Reading as Reading
 from .motion import RobotMotion as RobotMotion

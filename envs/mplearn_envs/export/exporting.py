@@ -56,6 +56,11 @@ def export(
         raise InvalidValueError("there is no motion to export")
     ready = [motion.resampled(rate_hz or format.rate_hz) for motion in motions]
     if format.many or len(ready) == 1:
+        if not out.name.lower().endswith(format.suffix):
+            raise InvalidValueError(
+                f"{format.name} is written to a file that ends with {format.suffix}, not to "
+                f"{out.name!r}"
+            )
         out.parent.mkdir(parents=True, exist_ok=True)
         jobs = [(out, ready)]
     else:

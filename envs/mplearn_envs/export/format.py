@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -93,6 +93,20 @@ class Reading:
         return self
 
 
+class Dialect(NamedTuple):
+    """Another way to read a file of a format, for `check`.
+
+    Attributes:
+        kind: What kind of fault it is, see `Fault`.
+        problem: What is wrong with the file if this is how it is meant.
+        readings: What it says then.
+    """
+
+    kind: str
+    problem: str
+    readings: tuple[Reading, ...]
+
+
 class Format(ABC):
     """Writes and reads one format.
 
@@ -126,9 +140,9 @@ class Format(ABC):
             RecordingError: It is not of the format, or of another robot.
         """
 
-    def dialects(self, path: Path, model: RobotModel) -> dict[str, tuple[Reading, ...]]:
-        """Return how else the file may be read, by what is wrong with it then; for `check`."""
-        return {}
+    def dialects(self, path: Path, model: RobotModel) -> tuple[Dialect, ...]:
+        """Return how else a file may be read, which only the format can tell."""
+        return ()
 
     def accepts(self, path: Path) -> bool:
         """Whether a file, by its name or a look at it, is one of the format."""

@@ -1,5 +1,6 @@
 """One thing is wrong with a file; the check says what, and by how much."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -79,13 +80,25 @@ def test_two_faults_at_once_are_both_found(
     assert verdict.left.position_m < 1e-5
 
 
-def test_a_bvh_in_radians_or_with_exchanged_names_is_found(
+def test_a_bvh_in_radians_or_metres_or_with_exchanged_names_is_found(
     model: RobotModel, motion: RobotMotion, tmp_path: Path
 ) -> None:
     path = written(tmp_path, motion, model, "bvh")
     right = path.read_text("utf-8")
     head, numbers = right.split("Frame Time: 0.02\n")
     rows = np.loadtxt(numbers.splitlines())
+    metres = rows.copy()
+    metres[:, :3] /= 100.0
+    offsets = re.sub(
+        r"OFFSET (\S+) (\S+) (\S+)",
+        lambda found: "OFFSET " + " ".join(str(float(part) / 100.0) for part in found.groups()),
+        head,
+    )
+    text = "\n".join(" ".join(f"{x:.9g}" for x in row) for row in metres)
+    path.write_text(f"{offsets}Frame Time: 0.02\n{text}\n", "utf-8")
+    (verdict,) = check(path, model)
+    assert "metres taken for centimetres" in verdict.faults[0].problem
+
     rows[:, 3:] = np.radians(rows[:, 3:])
     text = "\n".join(" ".join(f"{x:.9g}" for x in row) for row in rows)
     path.write_text(f"{head}Frame Time: 0.02\n{text}\n", "utf-8")

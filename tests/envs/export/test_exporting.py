@@ -263,8 +263,11 @@ def test_many_motions_need_a_folder_and_get_names_of_their_own(tmp_path: Path) -
     taken.write_text("mine")
     with pytest.raises(InvalidValueError, match="need a folder"):
         export(done.motions, model, format_of("unitree"), taken)
+    (tmp_path / "folder.csv").mkdir()
     with pytest.raises(InvalidValueError, match="one file"):
-        export(done.motions[:1], model, format_of("unitree"), tmp_path / "all")
+        export(done.motions[:1], model, format_of("unitree"), tmp_path / "folder.csv")
+    with pytest.raises(InvalidValueError, match=r"ends with \.npz"):
+        export(done.motions[:1], model, format_of("mjlab"), tmp_path / "walk")
     assert taken.read_text() == "mine"
 
 

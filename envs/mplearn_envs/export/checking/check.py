@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from mplearn.errors import RecordingError
 
 from ..format import Format, Reading
-from ..registry import recognised
+from ..registry import formats, recognised
 from ..robot_model import RobotModel
 from ..sidecar import Meant, Sidecar, read_sidecar
 from .faults import Evidence, Fault, faults
@@ -105,8 +105,6 @@ def check(
     """
     sidecar = read_sidecar(path)
     if format is None:
-        from ..registry import formats
-
         said = None if sidecar is None else formats().get(sidecar.format)
         format = said or recognised(path)
     readings = format.read(path, model)
@@ -118,7 +116,7 @@ def check(
             f"{path.name}" if len(readings) == 1 else f"{path.name} {k}",
             reading,
             Evidence(model, aim),
-            {problem: other[k] for problem, other in dialects.items()},
+            [Fault(other.kind, other.problem, other.readings[k]) for other in dialects],
             tolerance_m,
             tolerance_rad,
         )
@@ -155,7 +153,7 @@ def _verdict(
     name: str,
     reading: Reading,
     evidence: Evidence,
-    dialects: dict[str, Reading],
+    dialects: Sequence[Fault],
     tolerance_m: float,
     tolerance_rad: float,
 ) -> Verdict:
@@ -192,10 +190,9 @@ def _verdict(
     )
 
 
-def _tried(trail: _Trail, evidence: Evidence, dialects: dict[str, Reading]) -> Iterator[Fault]:
+def _tried(trail: _Trail, evidence: Evidence, dialects: Sequence[Fault]) -> Iterator[Fault]:
     if not trail.faults:
-        for problem, reading in dialects.items():
-            yield Fault("degrees", problem, reading)
+        yield from dialects
     taken = {fault.problem for fault in trail.faults}
     for fault in faults(trail.reading, evidence):
         if fault.problem not in taken:

@@ -21,7 +21,11 @@ from ..robot_model import RobotModel
 from ..sidecar import Meant
 from .misfit import angles_between, postures, some
 
-_LENGTHS = {0.01: "centimetres", 0.001: "millimetres", 100.0: "hundreds of metres"}
+_LENGTHS = {
+    0.01: "in centimetres, not metres",
+    0.001: "in millimetres, not metres",
+    100.0: "100 times too small, as metres taken for centimetres are",
+}
 _RATES = (5.0, 1000.0)  # that motions are played at
 _FARTHEST_M = 3.0  # that places are off
 _FEW = 12
@@ -86,7 +90,7 @@ def _degrees(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
     yield Fault("degrees", "joint angles are in degrees, not radians", angles)
     yield Fault(
         "degrees",
-        "joint angles are in radians twice over (degrees were taken for radians)",
+        "joint angles are too small: radians were taken for degrees",
         replace(reading, joint_pos=np.degrees(reading.joint_pos)),
     )
 
@@ -100,7 +104,7 @@ def _unit(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
         ):
             if reading.body_pos is None and bodies != base:
                 continue
-            problem = f"{what} are in {unit}, not metres"
+            problem = f"{what} are {unit}"
             scaled = _scaled(reading, factor, base=base, bodies=bodies)
             yield Fault("unit", problem, scaled)
             if reading.body_lin_vel is not None and bodies:

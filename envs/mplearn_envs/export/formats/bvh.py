@@ -22,7 +22,7 @@ from mplearn.maths.rotations import (
 )
 from mplearn.recording import FloatArray
 
-from ..format import Format, Reading, in_order
+from ..format import Dialect, Format, Reading, in_order
 from ..motion import RobotMotion
 from ..robot_model import RobotModel
 
@@ -63,17 +63,17 @@ class BVH(Format):
         """Return the bodies of a file, by their names."""
         return (_reading(path, model),)
 
-    def dialects(self, path: Path, model: RobotModel) -> dict[str, tuple[Reading, ...]]:
+    def dialects(self, path: Path, model: RobotModel) -> tuple[Dialect, ...]:
         """Return what it says if its angles are radians, or its joints are not what they say."""
-        found: dict[str, tuple[Reading, ...]] = {
-            "angles are in radians, not degrees": (_reading(path, model, float(np.degrees(1.0))),)
-        }
+        radians = _reading(path, model, float(np.degrees(1.0)))
+        found = [Dialect("degrees", "angles are in radians, not degrees", (radians,))]
         ordered = tuple(model.body_names[b] for b in _depth_first(model))
         names = _parsed(path)[0]
         if tuple(names) != ordered and len(names) == len(ordered):
             problem = "joints have other names than their places in the tree say"
-            found[problem] = (_reading(path, model, names=ordered),)
-        return found
+            moved = _reading(path, model, names=ordered)
+            found.append(Dialect("joints permuted", problem, (moved,)))
+        return tuple(found)
 
 
 def _reading(
