@@ -25,5 +25,5 @@ def model(request: pytest.FixtureRequest) -> RobotModel:
 def motion(model: RobotModel) -> RobotMotion:
     """A motion in which both arms, the trunk and a leg move, and which turns out of the middle."""
     assert model.robot is not None
-    path = ("left punch", "left arm raise", "march, right leg raise", "bow down")
+    path = ("left punch", "march, right leg raise", "bow down")
     return perform(None, model.robot, path, speed=1.0).motions[0]

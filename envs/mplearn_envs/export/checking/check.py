@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from mplearn.errors import RecordingError
 
-from ..format import Format, Reading
+from ..format import Dialect, Format, Reading
 from ..registry import formats, recognised
 from ..robot_model import RobotModel
 from ..sidecar import Meant, Sidecar, read_sidecar
@@ -109,14 +110,20 @@ def check(
         format = said or recognised(path)
     readings = format.read(path, model)
     meant = _meant(path, sidecar, model, len(readings))
-    dialects = format.dialects(path, model)
+    found: list[tuple[Dialect, ...]] = []  # what else it may say, if it is asked for
+
+    def dialects(k: int) -> list[Fault]:
+        if not found:
+            found.append(format.dialects(path, model))
+        return [Fault(each.kind, each.problem, each.readings[k]) for each in found[0]]
+
     return tuple(
         _verdict(
             format.name,
             f"{path.name}" if len(readings) == 1 else f"{path.name} {k}",
             reading,
             Evidence(model, aim),
-            [Fault(other.kind, other.problem, other.readings[k]) for other in dialects],
+            partial(dialects, k),
             tolerance_m,
             tolerance_rad,
         )
@@ -153,7 +160,7 @@ def _verdict(
     name: str,
     reading: Reading,
     evidence: Evidence,
-    dialects: Sequence[Fault],
+    dialects: Callable[[], Sequence[Fault]],
     tolerance_m: float,
     tolerance_rad: float,
 ) -> Verdict:
@@ -190,9 +197,11 @@ def _verdict(
     )
 
 
-def _tried(trail: _Trail, evidence: Evidence, dialects: Sequence[Fault]) -> Iterator[Fault]:
+def _tried(
+    trail: _Trail, evidence: Evidence, dialects: Callable[[], Sequence[Fault]]
+) -> Iterator[Fault]:
     if not trail.faults:
-        yield from dialects
+        yield from dialects()
     taken = {fault.problem for fault in trail.faults}
     for fault in faults(trail.reading, evidence):
         if fault.problem not in taken:
