@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mocap_writers import amc_values, bvh_values, write_amc, write_asf, write_bvh
+from mocap_writers import amc_values, bvh_values, write_amc, write_asf, write_bvh, write_mvnx
 
 from mplearn.demonstrator import demonstrate
 from mplearn.errors import RecordingError
@@ -289,3 +289,14 @@ def test_an_amc_in_radians_that_does_not_say_so(tmp_path: Path) -> None:
     found = open_recording(path)
     assert found.frames == pytest.approx(plain.frames, abs=1e-9)
     assert found.report is not None and any("radians" in x for x in found.report.warnings)
+
+
+@pytest.mark.parametrize("cut", [5, 300, 1200])
+def test_an_mvnx_file_that_was_cut_off(tmp_path: Path, cut: int) -> None:
+    path = write_mvnx(tmp_path / "a.mvnx")
+    plain = open_recording(path, positions=True)
+    path.write_text(path.read_text()[:-cut])
+    found = open_recording(path, positions=True)
+    assert len(plain) - 1 <= len(found) <= len(plain)
+    assert found.frames == pytest.approx(plain.frames[: len(found)], abs=1e-8)
+    assert found.report is not None and any("cut off" in x for x in found.report.warnings)

@@ -17,6 +17,7 @@ _MEASURED = {"position": 3, "orientation": 4, "jointAngle": 3}
 _LISTED = {"pos_b": "segments", "connector1": "joints", "connector2": "joints"}
 _TEXTS = (*_MEASURED, *_LISTED)
 _EXPECTED = "an MVNX file: mvnx, subject, segments, frames"
+_CUT_OFF = (3, 5)  # errors of expat: no element found, unclosed token
 _MOST_MISSING = 10  # times as many frames as there are
 
 
@@ -63,7 +64,10 @@ def read_mvnx(path: Path, text: str, findings: Findings) -> MVNXFile:
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
-        raise bad_file(path, f"damaged XML ({error})", _EXPECTED) from error
+        if error.code not in _CUT_OFF or stream.numbers < 3:
+            raise bad_file(path, f"damaged XML ({error})", _EXPECTED) from error
+        stream.leave_out_last()
+        findings.warn(f"the file is cut off: {stream.numbers} frames before that are read")
     file = stream.file
     if not file.segments or not stream.numbers:
         raise bad_file(path, f"{len(file.segments)} segments, {stream.numbers} frames", _EXPECTED)
@@ -142,6 +146,15 @@ class _Stream:
         self._joint: list[str] = []
         self._frame = ""  # type of the frame that is open
         self._parts: list[str] | None = None
+
+    def leave_out_last(self) -> None:
+        """Forget the frame that was begun last, of which a part may be missing."""
+        if self._frame != "normal":
+            return
+        self.numbers -= 1
+        del self.indices[self.numbers :], self.times_ms[self.numbers :]
+        for texts in self.measured.values():
+            del texts[self.numbers :]
 
     def doctype(self, *_: object) -> None:
         raise bad_file(self.path, "a document type, which may declare entities", "none, as in MVNX")
