@@ -97,7 +97,10 @@ def train(
     torch.set_num_threads(1)  # these networks are small: threads cost more than they bring
     envs = DummyVecEnv([make] * n_envs(config))
     tested = make_environment(config)
-    slots = dict(tested.unwrapped.repertoire.slots)  # type: ignore[attr-defined]
+    inner: Any = tested.unwrapped
+    if tested.action_space != gymnasium.spaces.Discrete(inner.capacity):
+        raise InvalidValueError("agents that are trained here choose no speed: give one of speeds")
+    slots = dict(inner.repertoire.slots)
     out.mkdir(parents=True, exist_ok=True)
     ends = ends_of(tested)
     config.save(out / CONFIG, slots, ends)

@@ -106,9 +106,14 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         require_simulated(dynamics, self.body)
         self.repertoire = self._made_repertoire()
         self.capacity = self.repertoire.capacity
-        self.action_space = spaces.Discrete(self.capacity)
+        self._n_speeds = len(self.actions.speeds)
+        self.action_space = spaces.Discrete(self.capacity * self._n_speeds)
         self._builder = ObservationBuilder(
-            len(self.robot.joint_names), self.capacity, self.task.space(self.repertoire), flat
+            len(self.robot.joint_names),
+            self.capacity,
+            self.task.space(self.repertoire),
+            flat,
+            self._n_speeds,
         )
         self.observation_space = self._builder.space
         self._screen = Screen(
@@ -196,7 +201,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         if not self._stepped and self.discount < 1.0:
             self._stepped = True
             warn_of_step_discount(self.discount)
-        slot = self._slot(action, before.choices.mask)
+        slot, speed = self._chosen(action, before.choices.mask)
         legal = bool(before.choices.mask[slot])
         novel = bool(before.choices.novel[slot])
         chosen = self.repertoire.primitive(slot) if legal else None
@@ -208,7 +213,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
             terms["novel"] = -(self.actions.novel_penalty or 0.0)
         watched = self.frame_callback is not None or self.render_mode == "human"
         outcome = self.performer.perform(
-            chosen, self._frame if watched else None, self._frame_steps
+            chosen, self._frame if watched else None, self._frame_steps, speed
         )
         report, duration_s = outcome.report, outcome.report.duration_s
         remaining = self.discount**duration_s
@@ -225,8 +230,8 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         return self._observation(), sum(terms.values()), terminated, False, self._info(step, terms)
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """Return which actions are legal, shape (capacity,): the convention of sb3-contrib."""
-        return self._begun().choices.mask.astype(np.bool_)
+        """Return which actions are legal, shape (A,): the convention of sb3-contrib."""
+        return self._begun().choices.mask_at(self._n_speeds).astype(np.bool_)
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture, shape (height, width, 3), or show the window.
@@ -311,18 +316,16 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
             raise InvalidValueError("the episode has not begun or is over: call reset first")
         return self._episode
 
-    def _slot(self, action: np.int64 | int, mask: NDArray[np.int8]) -> int:
-        """Return a valid action as an integer."""
-        value = np.asarray(action)
-        if value.shape != () or value.dtype.kind not in "iu" or not 0 <= value < self.capacity:
-            raise InvalidValueError(
-                f"an action is an integer in [0, {self.capacity}), not {action!r}"
-            )
-        slot = int(value)
+    def _chosen(self, action: np.int64 | int, mask: NDArray[np.int8]) -> tuple[int, float]:
+        """Return the slot of a valid action, and at which share of the speed."""
+        value, n_actions = np.asarray(action), self.capacity * self._n_speeds
+        if value.shape != () or value.dtype.kind not in "iu" or not 0 <= value < n_actions:
+            raise InvalidValueError(f"an action is an integer in [0, {n_actions}), not {action!r}")
+        block, slot = divmod(int(value), self.capacity)
         if self.actions.illegal == "raise" and not mask[slot]:
-            allowed = np.flatnonzero(mask).tolist()
-            raise InvalidValueError(f"action {slot} is illegal here; legal are {allowed}")
-        return slot
+            allowed = np.flatnonzero(np.tile(mask, self._n_speeds)).tolist()
+            raise InvalidValueError(f"action {int(value)} is illegal here; legal are {allowed}")
+        return slot, self.actions.speeds[block]
 
     def _shared(self) -> dict[int, Any]:
         """Return what copies of a task share with it, for `copy.deepcopy`."""
@@ -358,8 +361,8 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         infeasible = np.zeros(self.capacity, np.int8)
         infeasible[list(choices.refused)] = 1
         info = {
-            "action_mask": choices.mask.copy(),
-            "transition_prior": choices.prior.copy(),
+            "action_mask": choices.mask_at(self._n_speeds),
+            "transition_prior": choices.prior_at(self._n_speeds),
             "infeasible": infeasible,
             "dead_end": choices.dead_end,
             "library_version": self.library.version,

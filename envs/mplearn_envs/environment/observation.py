@@ -19,17 +19,24 @@ class ObservationBuilder:
 
     Args:
         n_joints: Number of joints.
-        capacity: Number of actions.
+        capacity: Number of slots.
         task: Bounds of the task's observation; None if it shows nothing.
         flat: Whether an observation is one array, as `gymnasium.spaces.flatten` would make it.
+        n_speeds: Number of speeds; each has an action for each slot.
 
     Attributes:
         space: The observation space.
     """
 
     def __init__(
-        self, n_joints: int, capacity: int, task: spaces.Box | None, flat: bool = False
+        self,
+        n_joints: int,
+        capacity: int,
+        task: spaces.Box | None,
+        flat: bool = False,
+        n_speeds: int = 1,
     ) -> None:
+        n_actions = capacity * n_speeds
         angles = np.full(n_joints, 2 * np.pi)
         self._high = {
             "posture": np.concatenate(([10.0, np.pi / 2, np.pi], angles)),
@@ -44,14 +51,15 @@ class ObservationBuilder:
             for key, high in self._high.items()
         }
         parts["current_primitive"] = spaces.Discrete(capacity)
-        parts["action_mask"] = spaces.Box(0, 1, (capacity,), np.int8)  # all clients know boxes
-        parts["transition_prior"] = spaces.Box(0.0, 1.0, (capacity,), np.float64)
+        parts["action_mask"] = spaces.Box(0, 1, (n_actions,), np.int8)  # all clients know boxes
+        parts["transition_prior"] = spaces.Box(0.0, 1.0, (n_actions,), np.float64)
         if task is not None:
             parts["task"] = task
         structured = spaces.Dict(parts)
         self._flat = flat
         self._order = tuple(structured.spaces)
         self._capacity = capacity
+        self._n_speeds = n_speeds
         self.space: spaces.Space[Any] = spaces.flatten_space(structured) if flat else structured
 
     def see(self, measured: Measured, slot: int, choices: Choices, task: FloatArray) -> Observation:
@@ -67,8 +75,8 @@ class ObservationBuilder:
         for key, low in self._low.items():
             seen[key] = np.minimum(np.maximum(getattr(measured, key), low), self._high[key])
         seen["current_primitive"] = np.int64(slot)
-        seen["action_mask"] = choices.mask.copy()
-        seen["transition_prior"] = choices.prior.copy()
+        seen["action_mask"] = choices.mask_at(self._n_speeds)
+        seen["transition_prior"] = choices.prior_at(self._n_speeds)
         if self._shows_task:
             seen["task"] = task
         if not self._flat:

@@ -88,6 +88,9 @@ class ActionOptions(Options):
         illegal: What an illegal action does: "hold" or "raise".
         illegal_penalty: Price of an illegal action.
         novel_penalty: Price of a transition that was never observed; None makes it illegal.
+        speeds: Among which speeds the agent chooses, as shares of `MotionOptions.speed`: for S
+            speeds there are S blocks of ``capacity`` actions each. The first is the one of which
+            the transition prior speaks. A plan is slower where balance or the joints ask for it.
     """
 
     capacity: int | None = None
@@ -95,8 +98,14 @@ class ActionOptions(Options):
     illegal: Illegal = "hold"
     illegal_penalty: float = 1.0
     novel_penalty: float | None = None
+    speeds: tuple[float, ...] = (1.0,)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "speeds", tuple(self.speeds))
+        if not self.speeds or len(set(self.speeds)) != len(self.speeds):
+            raise InvalidValueError(f"speeds must be one or more, all different, not {self.speeds}")
+        for speed in self.speeds:
+            require_number("each of speeds", speed, 0.1, 10.0, "in [0.1, 10]")
         require_number("hold_s", self.hold_s, 0.05, 60.0, "in [0.05, 60] s")
         require_one_of("illegal", self.illegal, get_args(Illegal))
         require_number("illegal_penalty", self.illegal_penalty, -1e9, 1e9, "finite")

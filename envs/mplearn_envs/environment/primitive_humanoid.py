@@ -27,7 +27,8 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
 
     ``Discrete(capacity)``. Action 0 is hold: keep the posture for ``hold_s``. Action k performs the
     primitive in slot k; primitives take slots in the order of their ids, and keep them. Free slots
-    are never legal.
+    are never legal. With S ``speeds`` (`ActionOptions`) it is ``Discrete(S * capacity)``: action
+    b * capacity + k is slot k at the speed b, and masks and prior have as many numbers.
 
     ## Observation space
 

@@ -110,7 +110,7 @@ class _Begun(gymnasium.Wrapper[Any, Any, Any, Any]):
         """Return how long what an action stands for takes the robot, legal or not [s]."""
         env = cast(MacroStepEnv, self.unwrapped)
         known = self.action_space.contains(action)
-        id = env.repertoire.primitive(int(action)) if known else None
+        id = env.repertoire.primitive(int(action) % env.capacity) if known else None
         return env.actions.hold_s if id is None else env.repertoire.skills.duration_s(id)
 
     def begin(self, pool: ThreadPoolExecutor, action: np.int64) -> Future[Any]:

@@ -54,14 +54,18 @@ class KinematicPerformer(Performer):
         return self._rest.measured
 
     def perform(
-        self, id: int | None, on_frame: Callable[[], None] | None, frame_steps: int
+        self,
+        id: int | None,
+        on_frame: Callable[[], None] | None,
+        frame_steps: int,
+        speed: float = 1.0,
     ) -> Outcome:
         """Perform a primitive; None holds. See `Performer.perform`."""
-        motion = ("hold", self.hold_s) if id is None else self.repertoire.skills.key(id)
+        motion = ("hold", self.hold_s) if id is None else (*self.repertoire.skills.key(id), speed)
         key = (self._here.key, motion)
         known: _Known | None = self.repertoire.memory.get(key)
         if known is None or on_frame is not None:
-            plan = self._plan(id)
+            plan = self._plan(id, speed)
             known = self._performed(plan)
             self.repertoire.memory.put(key, known)
             if on_frame is not None:

@@ -91,7 +91,11 @@ class Performer(ABC):
 
     @abstractmethod
     def perform(
-        self, id: int | None, on_frame: Callable[[], None] | None, frame_steps: int
+        self,
+        id: int | None,
+        on_frame: Callable[[], None] | None,
+        frame_steps: int,
+        speed: float = 1.0,
     ) -> Outcome:
         """Perform a primitive; None holds.
 
@@ -99,6 +103,7 @@ class Performer(ABC):
             id: The primitive.
             on_frame: Called every ``frame_steps`` steps, to take pictures of ``simulation``.
             frame_steps: See there.
+            speed: As a share of the usual speed.
         """
 
     @abstractmethod
@@ -117,7 +122,7 @@ class Performer(ABC):
     def show(self) -> None:
         """Bring ``simulation`` up to date, to be drawn."""
 
-    def _plan(self, id: int | None) -> Plan:
+    def _plan(self, id: int | None, speed: float = 1.0) -> Plan:
         if id is None:
             return self.repertoire.skills.hold(self.reference, self.hold_s)
-        return self.repertoire.skills.plan(self.reference, id)
+        return self.repertoire.skills.plan(self.reference, id, speed)

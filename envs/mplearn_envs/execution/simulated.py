@@ -31,10 +31,14 @@ class SimulatedPerformer(Performer):
         return self._sensors.read()
 
     def perform(
-        self, id: int | None, on_frame: Callable[[], None] | None, frame_steps: int
+        self,
+        id: int | None,
+        on_frame: Callable[[], None] | None,
+        frame_steps: int,
+        speed: float = 1.0,
     ) -> Outcome:
         """Perform a primitive; None holds. See `Performer.perform`."""
-        plan = self._plan(id)
+        plan = self._plan(id, speed)
         simulation = self.simulation
         pushes = simulation.draw_pushes(self._count, plan.duration_s)
         self._count += 1

@@ -30,6 +30,14 @@ class Choices(NamedTuple):
     refused: dict[int, tuple[str, ...]]
     dead_end: bool
 
+    def mask_at(self, n_speeds: int) -> NDArray[np.int8]:
+        """Return the mask of actions at so many speeds, a block each, fresh."""
+        return np.tile(self.mask, n_speeds)
+
+    def prior_at(self, n_speeds: int) -> FloatArray:
+        """Return the prior of actions at so many speeds: that of the first, fresh."""
+        return np.append(self.prior, np.zeros((n_speeds - 1) * len(self.prior)))
+
 
 def choose_among(
     weights: Mapping[int, float],

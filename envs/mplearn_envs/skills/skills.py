@@ -201,11 +201,17 @@ class Skills:
             return self._foreknown.durations_s[id]
         return self[id].motion.duration_s / self.feasibility(id).tempo
 
-    def plan(self, start: Reference, id: int) -> Plan:
-        """Return the commands that perform a primitive from the present reference."""
+    def plan(self, start: Reference, id: int, speed: float = 1.0) -> Plan:
+        """Return the commands that perform a primitive from the present reference.
+
+        Args:
+            start: Where the reference robot is.
+            id: The primitive.
+            speed: As a share of the speed at which it is usually performed.
+        """
         with self.lock:
-            motion, speed, key = self[id].motion, self.feasibility(id).speed, self.key(id)
-        return self._settled(self.planner.plan(start, motion, speed, key))
+            motion, usual, key = self[id].motion, self.feasibility(id).speed, self.key(id)
+        return self._settled(self.planner.plan(start, motion, usual * speed, key))
 
     def transition_s(self, before: int | None, after: int) -> float:
         """Return how long a primitive takes the robot where another has just ended [s].
