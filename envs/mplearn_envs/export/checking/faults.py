@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mplearn.errors import RobotError
 from mplearn.maths.rotations import matrix_to_quaternion, quaternion_to_matrix
 from mplearn.recording import FloatArray, IntArray
 
@@ -458,13 +459,17 @@ def _assigned_bodies(reading: Reading, model: RobotModel) -> IntArray:
 
 def _true_joints(reading: Reading, evidence: Evidence) -> tuple[IntArray, FloatArray] | None:
     """Return what the angles should be in some frames, from bodies; None where nothing says so."""
-    if evidence.meant is not None:
-        at = np.round(evidence.meant.times_s * reading.rate_hz).astype(np.int64)
-        inside = at < len(reading)
-        return at[inside], evidence.model.angles_of(evidence.meant.quat[inside])[0]
-    if reading.body_quat is not None:
-        frames = some(len(reading), _FEW)
-        return frames, evidence.model.angles_of(reading.body_quat[frames])[0]
+    meant, model = evidence.meant, evidence.model
+    try:
+        if meant is not None:
+            at = np.round(meant.times_s * reading.rate_hz).astype(np.int64)
+            inside = at < len(reading)
+            return at[inside], model.angles_of(meant.quat[inside])[0]
+        if reading.body_quat is not None:
+            frames = some(len(reading), _FEW)
+            return frames, model.angles_of(reading.body_quat[frames])[0]
+    except RobotError:  # bodies do not tell the angles of hinges that are not square
+        pass
     return None
 
 
