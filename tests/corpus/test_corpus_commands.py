@@ -1,10 +1,11 @@
 """Corpora on the command line."""
 
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
-from mplearn.corpus import learn_corpus, recognise_corpus
+from mplearn.corpus import RayTasks, learn_corpus, recognise_corpus
 from mplearn.library import PrimitiveLibrary
 from mplearn.store import StoreReader
 from mplearn.tables import read_segments
@@ -62,3 +63,22 @@ def test_a_folder_is_recognised_by_processes_as_by_one(
     assert "left out: ben/broken" in said.err
     known = [row for row in alone.table if row.primitive is not None]
     assert len(known) > 0.7 * len(alone.table)
+
+
+def test_a_cluster_needs_ray(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    if find_spec("ray") is not None:
+        pytest.skip("ray is installed here")
+    assert main(["learn", str(folder), "--ray", "--out", "x.mplearn"]) == 2
+    assert "mplearn[cluster]" in capsys.readouterr().err
+
+
+def test_tasks_of_ray_learn_the_same(folder: Path, tmp_path: Path) -> None:
+    pytest.importorskip("ray", reason="ray is not installed (extra cluster)")
+    tasks = RayTasks()
+    try:
+        corpus = learn_corpus(folder, tmp_path / "s", executor=tasks)
+    finally:
+        tasks.close()
+    alone = learn_corpus(folder, tmp_path / "t", jobs=0)
+    files = [each.learner.save(tmp_path / "a").read_bytes() for each in (corpus, alone)]
+    assert files[0] == files[1]

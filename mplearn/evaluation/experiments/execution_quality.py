@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 from scipy import stats
 
 from ...learner import LearnerConfig, MotionLearner
-from ...library import PrimitiveLibrary, SegmentTable
+from ...library import PrimitiveLibrary, RecognisedSegment, SegmentTable
 from ...recording import FloatArray, Recording
 from ...statistics import quality
 from ...tables import recognise_recording
@@ -36,7 +37,7 @@ def quality_table(takes: Iterable[Recording], wrong: Iterable[Recording], seed: 
             continue
         library = _learned([first for first, _ in halves], seed)
         right = _recognised(library, [second for _, second in halves])
-        reference, judged = SegmentTable(right[::2]), SegmentTable(right[1::2])
+        reference, judged = _alternately(right)
         good = _known(quality(judged, reference))
         bad = _known(quality(_recognised(library, wrongly[person]), reference))
         if not (len(good) and len(bad)):
@@ -61,10 +62,11 @@ def quality_table(takes: Iterable[Recording], wrong: Iterable[Recording], seed: 
             *("right, below 5 %", "wrong, below 5 %", "right above wrong"),
         ),
         tuple(rows),
-        "The first half of each take is learned. Every second segment of the other half is the "
-        "reference, the others are judged by it, and so are the segments of motions performed "
-        "wrongly on purpose. Right above wrong: chance that a right one is judged better than a "
-        "wrong one (area under the curve). A wrong execution holds segments that are right.",
+        "The first half of each take is learned. Of the other half, every second execution of a "
+        "primitive is the reference, the others are judged by it, and so are the segments of "
+        "motions performed wrongly on purpose. Right above wrong: chance that a right one is "
+        "judged better than a wrong one (area under the curve). A wrong execution holds segments "
+        "that are right.",
     )
 
 
@@ -83,6 +85,16 @@ def _learned(takes: Sequence[Recording], seed: int) -> PrimitiveLibrary:
 
 def _recognised(library: PrimitiveLibrary, takes: Iterable[Recording]) -> SegmentTable:
     return SegmentTable(row for take in takes for row in recognise_recording(library, take))
+
+
+def _alternately(table: SegmentTable) -> tuple[SegmentTable, SegmentTable]:
+    """Deal the executions of each primitive to two tables in turn."""
+    parts: tuple[list[RecognisedSegment], list[RecognisedSegment]] = [], []
+    turns: Counter[str] = Counter()
+    for row in table:
+        parts[turns[row.nearest] % 2].append(row)
+        turns[row.nearest] += 1
+    return SegmentTable(parts[0]), SegmentTable(parts[1])
 
 
 def _known(shares: FloatArray) -> FloatArray:
