@@ -224,7 +224,7 @@ def session(
         page.goto(url)
         state = page.locator("#state")
         until(lambda: "waiting" in state.inner_text(), 120, "the learner waits for frames")
-        until(lambda: teacher.standing(), 60, "the robot stands there")
+        until(teacher.standing, 120, "the robot stands there")
         picture(page, "begin")
         teacher.teach(teacher.script(lambda name: picture(page, name)))
         until(lambda: len(teacher.meanings()) >= 4 or teacher.learned()[0] >= 4, 20)
