@@ -212,7 +212,7 @@ def duration(seconds: float) -> str:
     """Return a time as people say it.
 
     >>> duration(42.0), duration(200.0), duration(7000.0)
-    ('42 s', '3 min 20 s', '1 h 57 min')
+    ('42 s', '3 min 20 s', '1 h 56 min')
     """
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)

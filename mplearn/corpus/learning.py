@@ -120,7 +120,7 @@ def learn_corpus(
         ...     _ = Path("swings", person, "slow.csv").write_text("time_s,elbow\n" + rows)
         >>> corpus = learn_corpus("swings", "swings-learned", jobs=0)
         >>> len(corpus.shards), corpus.progress.learned, len(corpus.learner.snapshot())
-        (2, 2, 1)
+        (2, 2, 2)
     """
     folder, into, reading = Path(folder), Path(into), reading or Reading()
     found = find_takes(folder)
