@@ -147,7 +147,7 @@ def test_a_frozen_primitive_does_not_change(taught: MotionLearner, motions: Reco
     for each in (life, free):
         events = each.learn_many(motions.frames)
         each.end_stream()
-        wide = 1.3 * motions.frames + 0.02 * rng.standard_normal(motions.frames.shape[1])
+        wide = 2.0 * motions.frames + 0.02 * rng.standard_normal(motions.frames.shape[1])
         each.learn_many(wide)  # what all motion varies by changes, and with it all models
     assert any(isinstance(e, Recognised) and e.primitive == 1 for e in events)
     after, other = life.snapshot()[1], free.snapshot()[1]
