@@ -6,6 +6,7 @@ import pytest
 from mplearn.body import MotionObserver
 from mplearn.body.marker_sets.rigid import distances_of, rigid_pairs
 from mplearn.body.observer.identity import BodyIdentity, IdentityConfig
+from mplearn.body.observer.observer import BLOCK_FRAMES
 from mplearn.demonstrator import Person, demonstrate
 from mplearn.errors import BodyError, InvalidValueError
 from mplearn.recording import Recording
@@ -75,6 +76,28 @@ def test_one_person_is_one_person(people):
         observer = MotionObserver(recording.marker_names, 100.0)
         _, seen = watch(observer, recording.frames)
         assert seen == [(0, 0)]
+
+
+def calls(observer: MotionObserver, frames: np.ndarray) -> int:
+    """Return in how many steps frames were taken: one a frame while there is a doubt."""
+    n = 0
+    while len(frames):
+        frames = frames[observer.watch(frames[:BLOCK_FRAMES]).taken :]
+        n += 1
+    return n
+
+
+@pytest.mark.parametrize("noise", [0.005, 0.01, 0.02])
+def test_noise_in_the_markers_raises_one_doubt_and_is_learned(people, noise):
+    recording = people["middle"]
+    shaken = recording.frames + np.random.default_rng(3).normal(0, noise, recording.frames.shape)
+    clean, observer = (MotionObserver(recording.marker_names, 100.0) for _ in range(2))
+    fewest, look = calls(clean, recording.frames), observer.identity.look_frames
+    assert calls(observer, shaken) <= fewest + 2 * look
+    assert observer.person == 0 and observer.identity.n_people == 1
+    spread = np.sqrt(observer.state().identity.memory.spread)
+    expected = np.sqrt(2) * noise  # of the difference of two places, along the line between them
+    assert 0.8 * expected < np.median(spread) < 1.4 * expected
 
 
 def test_a_saved_observer_goes_on_in_the_middle_of_a_doubt(people, stream):

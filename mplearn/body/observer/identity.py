@@ -163,8 +163,7 @@ class BodyIdentity:
         if 3 * np.count_nonzero((seen == seen).any(axis=0)) < seen.shape[1]:
             return None
         middle = middle_of(seen)
-        swing = 1.4826 * middle_of(np.abs(seen - middle))
-        noise = 0.5 * np.pi * swing**2 / np.maximum((seen == seen).sum(axis=0), 1)
+        noise = 0.5 * np.pi * _variance(seen, middle) / np.maximum((seen == seen).sum(axis=0), 1)
         scores = self.bodies.scores(middle, noise)
         if self.person >= 0:
             own = max(scores[self.person], self._unchanged(seen, middle))
@@ -236,7 +235,11 @@ class BodyIdentity:
         return bool(0.5 < size < 2.0 and not jump)
 
     def stay(self, frames: FloatArray) -> None:
-        """Go on with the same person after a doubt, from the frames of it, shape (k, M, 3)."""
+        """Go on with the same person after a doubt, from the frames of it, shape (k, M, 3).
+
+        Where these are in doubt among themselves, the distances vary more than was known, as with
+        noise in the markers. It is learned from them: else every frame would raise a doubt again.
+        """
         memory = self._memory
         self._strikes = 0
         memory.begin_block()
@@ -246,6 +249,8 @@ class BodyIdentity:
             memory.counts[ABSENT] = 0
             if follow_steadily(frames, self._pairs, memory, self._rules)[0] == len(frames):
                 break
+            seen = self._distances(frames)
+            np.fmax(memory.spread, _variance(seen, middle_of(seen)), out=memory.spread)
             frames = frames[:0]
         memory.begin_block()
 
@@ -327,6 +332,11 @@ class BodyIdentity:
 
 
 NOBODY = -2
+
+
+def _variance(seen: FloatArray, middle: FloatArray) -> FloatArray:
+    """Return the variance of distances, shape (k, K), about their medians, but for outliers."""
+    return np.asarray((1.4826 * middle_of(np.abs(seen - middle))) ** 2)
 
 
 def _median(values: FloatArray) -> float:
