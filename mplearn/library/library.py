@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
@@ -134,6 +134,10 @@ class PrimitiveLibrary:
     def __contains__(self, key: object) -> bool:
         """Whether there is a primitive of this id or name."""
         return key in self._by_key
+
+    def __iter__(self) -> Iterator[Primitive]:
+        """Go through the primitives."""
+        return iter(self.primitives)
 
     @property
     def ids(self) -> tuple[int, ...]:

@@ -14,6 +14,7 @@ LIBRARY = example_library()
 def test_primitives_are_found_by_id_and_by_name():
     assert LIBRARY[3] is LIBRARY["P3"]
     assert LIBRARY.names == tuple(f"P{id}" for id in LIBRARY.ids)
+    assert [primitive.id for primitive in LIBRARY] == list(LIBRARY.ids)
     assert "P3" in LIBRARY
     assert "bow" not in LIBRARY
     with pytest.raises(UnknownPrimitiveError, match="no primitive 'bow' in the library; it holds"):
