@@ -51,6 +51,9 @@ def run(args: argparse.Namespace) -> None:
     from mplearn_agents.page.serve import serve
     from mplearn_agents.page.watching import Watch
 
+    if args.store is not None:
+        args.store.parent.mkdir(parents=True, exist_ok=True)
+
     def ready(url: str) -> None:
         print(f"open {printable(url)}   (Ctrl-C ends it)", flush=True)
 
