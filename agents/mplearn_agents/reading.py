@@ -32,6 +32,11 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         "--skeleton", type=Path, metavar="ASF", help="the skeleton that belongs to AMC files"
     )
     group.add_argument(
+        "--angles",
+        choices=["degrees", "radians"],
+        help="what angles of BVH and AMC files are in (default: found from the motion)",
+    )
+    group.add_argument(
         "--map",
         type=Path,
         metavar="FILE",
@@ -88,6 +93,7 @@ def hints_of(args: argparse.Namespace, *, joint_axes: bool = False) -> Hints:
         unit_m=unit_m,
         up_axis=args.up,
         skeleton=args.skeleton,
+        angle_unit=args.angles,
         joint_axes=joint_axes,
     )
 

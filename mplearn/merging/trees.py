@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InvalidValueError
-from ..recording import FloatArray, IntArray
+from ..recording import IntArray
 from ..state import Blob
 from ..tree import ROOT, Change, PrimitiveTree
 from ..tree.exemplars.spread import SampleState, SpreadState
@@ -108,13 +108,8 @@ def _joined(
         spread=spread,
         sample=_sampled(a, b, config.n_sampled, config.seed),
         nodes=_with_one_root(a.nodes, nodes, config.max_unplaced),
-        neighbours=_both(a.neighbours, b.neighbours),
+        neighbours=a.neighbours + b.neighbours,
     )
-
-
-def _both(a: FloatArray | None, b: FloatArray | None) -> FloatArray | None:
-    """Return the sum of what is there."""
-    return a + b if a is not None and b is not None else b if a is None else a
 
 
 def _added(a: SpreadState, b: SpreadState) -> SpreadState:

@@ -11,6 +11,7 @@ _COMMAND_LINE = {
     "up_axis": "--up",
     "rate_hz": "--rate",
     "skeleton": "--skeleton",
+    "angle_unit": "--angles",
     "names": "--map",
     "person": "--person",
 }

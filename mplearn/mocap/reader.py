@@ -18,6 +18,9 @@ DIRECTIONS = ("x", "-x", "y", "-y", "z", "-z")
 """Axes of a file that may point up."""
 
 
+ANGLE_UNITS = ("degrees", "radians")
+
+
 @dataclass(frozen=True)
 class Hints:
     """What a file does not say about itself, or says wrongly: a value given here wins.
@@ -27,6 +30,7 @@ class Hints:
         unit_m: Length of the file's unit of length [m].
         up_axis: The file's axis that points up: ``"x"``, ``"y"``, ``"z"``, or ``"-x"``, ...
         skeleton: The ASF file that belongs to an AMC file.
+        angle_unit: What the angles of a BVH or AMC file are in: ``"degrees"`` or ``"radians"``.
         joint_axes: With joint positions, also how each joint is turned: three points more
             (``Head>x``), 0.1 m along axes that turn with it.
     """
@@ -35,6 +39,7 @@ class Hints:
     unit_m: float | None = None
     up_axis: str | None = None
     skeleton: Path | str | None = None
+    angle_unit: str | None = None
     joint_axes: bool = False
 
     def __post_init__(self) -> None:
@@ -45,6 +50,10 @@ class Hints:
         if self.up_axis is not None and self.up_axis not in DIRECTIONS:
             raise InvalidValueError(
                 f"up_axis must be one of {', '.join(DIRECTIONS)}, not {self.up_axis!r}"
+            )
+        if self.angle_unit not in (None, *ANGLE_UNITS):
+            raise InvalidValueError(
+                f"angle_unit must be one of {', '.join(ANGLE_UNITS)}, not {self.angle_unit!r}"
             )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
@@ -61,7 +61,7 @@ class TreeState(State):
         sample: Some of all segments.
         nodes: The nodes, the root first.
         renewal: Models on their way that will take the place of these; None for none.
-        neighbours: See `exemplars.neighbours`; None for none.
+        neighbours: See `exemplars.neighbours`; zeros in what was kept before there were any.
     """
 
     n_seen: Count
@@ -71,12 +71,16 @@ class TreeState(State):
     sample: SampleState
     nodes: tuple[NodeState, ...]
     renewal: RenewalState | None = None
-    neighbours: Annotated[FloatArray, Array(N_STEPS + 1, low=0.0)] | None = None
+    neighbours: Annotated[FloatArray, Array(N_STEPS + 1, low=0.0)] = field(
+        default_factory=lambda: np.zeros(N_STEPS + 1)
+    )
 
     def check(self) -> None:
         """Check that the nodes make one tree, and that equal numbers are the same segment."""
         width = len(self.floor)
         require(len(self.spread.count) == width, "spread.count", f"must have shape ({width},)")
+        growing = bool((np.diff(self.neighbours) >= 0).all())
+        require(growing, "neighbours", "must not fall with the distance")
         _check_nodes(self.nodes, self.next_id)
         frames: dict[int, Blob] = {}
         parts: dict[str, NodeState | SampleState] = {"sample": self.sample}
@@ -500,8 +504,7 @@ class PrimitiveTree:
             state.sample,
             [each for node in state.nodes for each in node.exemplars()],
         )
-        if state.neighbours is not None:
-            memory.neighbours.counts = state.neighbours.copy()
+        memory.neighbours.counts = state.neighbours.copy()
         self.n_seen = state.n_seen
         self._memory = memory
         self._structure = Structure(self.config, memory)

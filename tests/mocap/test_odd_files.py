@@ -16,8 +16,8 @@ import pytest
 from mocap_writers import amc_values, bvh_values, write_amc, write_asf, write_bvh, write_mvnx
 
 from mplearn.demonstrator import demonstrate
-from mplearn.errors import RecordingError
-from mplearn.mocap import open_recording
+from mplearn.errors import InvalidValueError, RecordingError
+from mplearn.mocap import Hints, open_recording
 from mplearn.recording import Recording
 
 pytestmark = pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")
@@ -269,6 +269,21 @@ def test_bvh(tmp_path: Path, kind: str) -> None:
     assert found.report is not None
     said = [*found.report.notes, *found.report.warnings]
     assert not says or any(says in text for text in said)
+
+
+def test_what_the_angles_are_in_can_be_said(tmp_path: Path) -> None:
+    values = bvh_values()
+    values[:, 3:12] = 0.0
+    values[:, 15:] = 0.0
+    values[:, 9] += np.linspace(0.0, 3.0, len(values))  # degrees, of somebody who hardly moves
+    path = write_bvh(tmp_path / "a.bvh", values)
+    said = {unit: Hints(angle_unit=unit) for unit in ("degrees", "radians")}
+    angles = {unit: open_recording(path, hints=hints).frames for unit, hints in said.items()}
+    moved = np.ptp(angles["degrees"], axis=0).max()
+    assert moved == pytest.approx(np.radians(3.0), rel=1e-4)
+    assert np.ptp(angles["radians"], axis=0).max() == pytest.approx(3.0, rel=1e-4)
+    with pytest.raises(InvalidValueError, match="angle_unit must be one of degrees, radians"):
+        Hints(angle_unit="gon")
 
 
 def test_an_amc_in_radians_that_does_not_say_so(tmp_path: Path) -> None:

@@ -48,8 +48,12 @@ class AMCReader(Reader):
             skeleton = read_asf(skeleton_file)
             name = skeleton_file.name
         values = _arranged(path, skeleton.columns, layout, table, name, findings)
-        if degrees is None:  # the skeleton's unit, if it can be
-            degrees = skeleton.degrees and not are_radians(values, skeleton.columns, findings)
+        if hints.angle_unit is not None:
+            degrees = hints.angle_unit == "degrees"
+        elif degrees is None:  # the skeleton's unit, if it can be
+            degrees = skeleton.degrees and not are_radians(
+                values, skeleton.columns, hints, findings
+            )
         values *= _factors(skeleton.columns, degrees)
         space = Space(skeleton.unit_m, "y", "z", says_unit=skeleton_file is not None, says_up=True)
         motion = SkeletalMotion(skeleton.joints, skeleton.columns, values, rate_hz, space)

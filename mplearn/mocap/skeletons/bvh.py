@@ -61,7 +61,7 @@ class BVHReader(Reader):
         values, rate_hz = parse_motion(
             path, text[start.end() + 1 :], first_line, len(columns), hints.rate_hz, findings
         )
-        turn = 1.0 if are_radians(values, columns, findings) else np.pi / 180.0
+        turn = 1.0 if are_radians(values, columns, hints, findings) else np.pi / 180.0
         values *= [turn if column.rotates else 1.0 for column in columns]
         _from_parents(joints, values, findings)
         motion = SkeletalMotion(joints, columns, values, rate_hz, _SPACE)

@@ -67,7 +67,8 @@ class G1CSVReader(Reader):
         if row is None or not _WIDTH <= len(row) <= _WIDTH + _MOST_BEFORE:
             return False
         pose = row[-_WIDTH:]
-        turned = abs(float(np.linalg.norm(pose[3:7])) - 1.0) < 0.01
+        with np.errstate(over="ignore"):
+            turned = abs(float(np.linalg.norm(pose[3:7])) - 1.0) < 0.01
         return turned and bool(np.abs(pose[7:]).max() < 2 * np.pi)
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:

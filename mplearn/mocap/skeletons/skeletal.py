@@ -12,12 +12,14 @@ from ...maths.rotations import matrix_to_euler
 from ...recording import FloatArray, Recording, marker_channels
 from ..files import bad_file, cmu_subject, stem
 from ..findings import Findings
+from ..options import option
 from ..placing.part_names import HEIGHTS, place_of
 from ..placing.space import Space, placed
 from ..reader import Hints
 from .kinematics import Joint, joint_positions, skeleton_of, with_axes
 from .stature import unit_of_skeleton
 
+_FEW = 10  # frames, which tell nothing
 _MOVES = 1.0  # of an angle, as it stands in the file: for who moves at all, one in radians
 
 
@@ -59,18 +61,25 @@ class SkeletalMotion:
     space: Space
 
 
-def are_radians(values: FloatArray, columns: tuple[Column, ...], findings: Findings) -> bool:
+def are_radians(
+    values: FloatArray, columns: tuple[Column, ...], hints: Hints, findings: Findings
+) -> bool:
     """Whether a file's angles, shape (T, C), are radians: none beyond a turn, and one travels far.
 
     In degrees that would be someone who stands in the zero pose to within 6 degrees, and moves.
     """
+    if hints.angle_unit is not None:
+        return hints.angle_unit == "radians"
     angles = values[:, [i for i, column in enumerate(columns) if column.rotates]]
     known = np.nan_to_num(angles)
-    if len(known) < 2 or np.abs(known).max(initial=0.0) > 2.0 * np.pi + 0.01:
+    if len(known) < _FEW or np.abs(known).max(initial=0.0) > 2.0 * np.pi + 0.01:
         return False
     if np.ptp(known, axis=0).max(initial=0.0) < _MOVES:
         return False
-    findings.warn("the angles are taken as radians: none is beyond a turn of them")
+    findings.warn(
+        "the angles are taken as radians: none is beyond a turn of them "
+        f"({option('angle_unit', 'degrees')} says otherwise)"
+    )
     return True
 
 
