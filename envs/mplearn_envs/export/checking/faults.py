@@ -6,7 +6,7 @@ it would be if the fault were there, or nothing where that makes no sense.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -131,14 +131,15 @@ def _bodies(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
             both,
         )
         found = _assigned_bodies(reading, model)
-        if (found != np.arange(len(found))).any():
-            wrong = [model.body_names[b] for b in np.flatnonzero(found != np.arange(len(found)))]
-            yield Fault(
-                "bodies permuted",
-                f"{len(wrong)} bodies are permuted: {', '.join(wrong[:4])}"
-                + (", ..." if len(wrong) > 4 else ""),
-                _body_order(reading, found),
-            )
+        if said := _permuted("bodies", found, model.body_names):
+            yield Fault("bodies permuted", said, _body_order(reading, found))
+
+
+def _permuted(what: str, found: IntArray, names: Sequence[str]) -> str:
+    """Say which parts stand in others' places, given where each was found, shape (n,)."""
+    wrong = [names[k] for k in np.flatnonzero(found != np.arange(len(found))).tolist()]
+    more = ", ..." if len(wrong) > 4 else ""
+    return f"{len(wrong)} {what} are permuted: {', '.join(wrong[:4])}{more}" if wrong else ""
 
 
 def _joints(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
@@ -156,14 +157,8 @@ def _joints(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
     frames, angles = true
     apart = np.abs(angles[:, :, None] - reading.joint_pos[frames][:, None, :]).mean(axis=0)
     found = _assigned(apart)
-    if (found != np.arange(len(found))).any():
-        wrong = [model.joint_names[j] for j in np.flatnonzero(found != np.arange(len(found)))]
-        yield Fault(
-            "joints permuted",
-            f"{len(wrong)} joints are permuted: {', '.join(wrong[:4])}"
-            + (", ..." if len(wrong) > 4 else ""),
-            _joint_order(reading, found),
-        )
+    if said := _permuted("joints", found, model.joint_names):
+        yield Fault("joints permuted", said, _joint_order(reading, found))
 
 
 def _mirrored(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
