@@ -2,25 +2,70 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from ..recording import FloatArray, IntArray
-from .kernels import backward, forward, log_add, log_densities, log_norms
+from .kernels import Gaussians, backward, forward, log_add, log_densities, log_norms
+from .sequences import SequenceBatch
 
 # posterior weights below this cannot change a sum of order 1
 _NEGLIGIBLE_SHARE = 1e-17
 
 
+class Parameters(NamedTuple):
+    """A model under way: arrays that are written in place.
+
+    Attributes:
+        means: Shape (N, D).
+        variances: Shape (N, D).
+        log_stay: Shape (N,).
+        log_next: Shape (N,).
+    """
+
+    means: FloatArray
+    variances: FloatArray
+    log_stay: FloatArray
+    log_next: FloatArray
+
+
+class Emitted(NamedTuple):
+    """What each state emitted: posterior-weighted sums over frames.
+
+    Attributes:
+        mass: Of 1 where a channel was measured, shape (N, D).
+        first: Of the channel, shape (N, D).
+        second: Of its square, shape (N, D).
+    """
+
+    mass: FloatArray
+    first: FloatArray
+    second: FloatArray
+
+
+class Statistics(NamedTuple):
+    """Expected sufficient statistics.
+
+    Attributes:
+        emitted: What each state emitted.
+        stays: How often it was stayed in, shape (N,).
+        moves: How often it was left, shape (N,).
+    """
+
+    emitted: Emitted
+    stays: FloatArray
+    moves: FloatArray
+
+
 @njit(cache=True)
 def equal_split(
-    frames: FloatArray, weights: FloatArray, offsets: IntArray, statistics: Any
+    frames: FloatArray, weights: FloatArray, offsets: IntArray, statistics: Statistics
 ) -> None:
     """Add the statistics of each sequence cut into N equal parts."""
-    mass, first, second, stays, moves = statistics
-    n_states = len(mass)
+    stays, moves = statistics.stays, statistics.moves
+    n_states = len(stays)
     for s in range(len(offsets) - 1):
         n_frames = offsets[s + 1] - offsets[s]
         for t in range(n_frames):
@@ -31,33 +76,26 @@ def equal_split(
                 else:
                     moves[n] += 1
             row = offsets[s] + t
-            accumulate(frames, row, weights[row], n, mass, first, second)
+            accumulate(frames, row, weights[row], n, statistics.emitted)
 
 
 @njit(cache=True)
 def expectation(
-    frames: FloatArray,
-    columns: FloatArray,
-    weights: FloatArray,
-    offsets: IntArray,
-    model: Any,
-    complete: bool,
-    statistics: Any,
+    batch: SequenceBatch, model: Parameters, complete: bool, statistics: Statistics
 ) -> float:
     """Add the expected sufficient statistics of all sequences, and return their log-likelihood.
 
-    ``mass``, ``first`` and ``second`` (N, D) gain the posterior-weighted count, sum and sum of
-    squares of each channel; ``stays`` and ``moves`` (N,) the expected transitions. An impossible
-    sequence adds nothing but its likelihood, -inf.
+    An impossible sequence adds nothing but its likelihood, -inf.
     """
-    means, variances, log_stay, log_next = model
-    mass, first, second, stays, moves = statistics
-    n_states = len(means)
-    norms = log_norms(variances)
+    offsets, weights = batch.offsets, batch.weights
+    log_stay, log_next = model.log_stay, model.log_next
+    stays, moves = statistics.stays, statistics.moves
+    n_states = len(model.means)
+    gaussians = Gaussians(model.means, model.variances, log_norms(model.variances))
     likelihood = 0.0
     for s in range(len(offsets) - 1):
         begin, end = offsets[s], offsets[s + 1]
-        densities = log_densities(columns, weights, begin, end, means, variances, norms, n_states)
+        densities = log_densities(batch.columns, weights, begin, end, gaussians)
         alpha = forward(densities, log_stay, log_next)
         beta = backward(densities, log_stay, log_next, complete)
         total = alpha[end - begin - 1, n_states - 1]
@@ -79,20 +117,17 @@ def expectation(
                         moves[n] += _exp(
                             arrival + log_next[n] + densities[n + 1, t + 1] + beta[t + 1, n + 1]
                         )
-                accumulate(frames, begin + t, share * weights[begin + t], n, mass, first, second)
+                row = begin + t
+                accumulate(batch.frames, row, share * weights[row], n, statistics.emitted)
     return likelihood
 
 
 @njit(cache=True)
 def maximise_gaussians(
-    mass: FloatArray,
-    first: FloatArray,
-    second: FloatArray,
-    floor: FloatArray,
-    means: FloatArray,
-    variances: FloatArray,
+    emitted: Emitted, floor: FloatArray, means: FloatArray, variances: FloatArray
 ) -> None:
     """Write the most probable Gaussians, a state's unseen channels taking its neighbours' mean."""
+    mass, first, second = emitted.mass, emitted.first, emitted.second
     n_states, n_channels = mass.shape
     for n in range(n_states):
         for d in range(n_channels):
@@ -108,14 +143,16 @@ def maximise_gaussians(
 
 
 @njit(cache=True)
-def maximisation(statistics: Any, floor: FloatArray, duration_prior: float, model: Any) -> None:
+def maximisation(
+    statistics: Statistics, floor: FloatArray, duration_prior: float, model: Parameters
+) -> None:
     """Write the most probable model."""
-    mass, first, second, stays, moves = statistics
-    means, variances, log_stay, log_next = model
-    n_states = len(mass)
-    maximise_gaussians(mass, first, second, floor, means, variances)
+    log_stay, log_next = model.log_stay, model.log_next
+    n_states = len(log_stay)
+    maximise_gaussians(statistics.emitted, floor, model.means, model.variances)
     for n in range(n_states):
-        stay, move = stays[n] + duration_prior, moves[n] + duration_prior
+        stay = statistics.stays[n] + duration_prior
+        move = statistics.moves[n] + duration_prior
         log_stay[n] = np.log(stay / (stay + move))
         log_next[n] = np.log(move / (stay + move))
     log_stay[n_states - 1], log_next[n_states - 1] = 0.0, -np.inf
@@ -123,32 +160,29 @@ def maximisation(statistics: Any, floor: FloatArray, duration_prior: float, mode
 
 @njit(cache=True)
 def em(
-    frames: FloatArray,
-    columns: FloatArray,
-    weights: FloatArray,
-    offsets: IntArray,
+    batch: SequenceBatch,
     floor: FloatArray,
     duration_prior: float,
     complete: bool,
     n_steps: int,
     gain: float,
-    model: Any,
+    model: Parameters,
 ) -> float:
     """Fit ``model`` in place from the equal split; return the last log-likelihood seen.
 
     Ends early when a step gains less than ``gain``, or when a sequence is impossible.
     """
-    n_states, n_channels = model[0].shape
+    n_states, n_channels = model.means.shape
     sums = np.zeros((3, n_states, n_channels))
     counts = np.zeros((2, n_states))
-    statistics = (sums[0], sums[1], sums[2], counts[0], counts[1])
-    equal_split(frames, weights, offsets, statistics)
+    statistics = Statistics(Emitted(sums[0], sums[1], sums[2]), counts[0], counts[1])
+    equal_split(batch.frames, batch.weights, batch.offsets, statistics)
     maximisation(statistics, floor, duration_prior, model)
     before = -np.inf
     for _ in range(n_steps):
         sums[:] = 0.0
         counts[:] = 0.0
-        now = expectation(frames, columns, weights, offsets, model, complete, statistics)
+        now = expectation(batch, model, complete, statistics)
         if now == -np.inf:
             return now
         maximisation(statistics, floor, duration_prior, model)
@@ -170,11 +204,10 @@ def accumulate(
     row: int,
     share: float,
     n: int,
-    mass: FloatArray,
-    first: FloatArray,
-    second: FloatArray,
+    emitted: Emitted,
 ) -> None:
     """Add a frame of a certain share to the sums of state n, its missing channels left out."""
+    mass, first, second = emitted.mass, emitted.first, emitted.second
     for d in range(frames.shape[1]):
         x = frames[row, d]
         seen = share if x == x else 0.0

@@ -59,7 +59,7 @@ def fit(
     floor = as_floor(variance_floor, batch.n_channels)
     parameters = empty_parameters(n_states, batch.n_channels)
     gain = tolerance * len(batch.frames)
-    likelihood = em(*batch, floor, duration_prior, complete, n_steps, gain, parameters)
+    likelihood = em(batch, floor, duration_prior, complete, n_steps, gain, parameters)
     if n_steps and not np.isfinite(likelihood):
         raise ModelError("a sequence became impossible: check its values and the variance floor")
     return as_model(parameters)

@@ -11,7 +11,7 @@ drops out of the density of its frame (it is marginalised); a frame of weight w 
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -21,6 +21,20 @@ from ..recording import FloatArray, IntArray
 # exp(-38) is less than half a unit in the last place of a sum whose larger term is 1
 _NEGLIGIBLE = 38.0
 _LOG_2PI = np.log(2 * np.pi)
+
+
+class Gaussians(NamedTuple):
+    """What a model's states emit.
+
+    Attributes:
+        means: Shape (N, D).
+        variances: Shape (N, D).
+        log_norms: `log_norms` of the variances, shape (N, D).
+    """
+
+    means: FloatArray
+    variances: FloatArray
+    log_norms: FloatArray
 
 
 @njit(cache=True, inline="always")
@@ -54,10 +68,7 @@ def log_densities(
     weights: FloatArray,
     begin: int,
     end: int,
-    means: FloatArray,
-    variances: FloatArray,
-    log_norms: FloatArray,
-    n_states: int,
+    gaussians: Gaussians,
 ) -> FloatArray:
     """Return the weighted log-density of frames [begin, end) in each state, shape (N, T).
 
@@ -66,12 +77,10 @@ def log_densities(
         weights: Shape (at least ``end``,).
         begin: First frame.
         end: One past the last.
-        means: Shape (N or more, D).
-        variances: Likewise.
-        log_norms: `log_norms` of the variances.
-        n_states: N.
+        gaussians: Of the N states.
     """
-    n_frames = end - begin
+    means, variances, norms = gaussians.means, gaussians.variances, gaussians.log_norms
+    n_states, n_frames = len(means), end - begin
     out = np.zeros((n_states, n_frames))
     weight = weights[begin:end]
     for n in range(n_states):
@@ -79,7 +88,7 @@ def log_densities(
         for d in range(columns.shape[0]):
             column = columns[d, begin:end]
             mean = means[n, d]
-            norm = log_norms[n, d]
+            norm = norms[n, d]
             scale = -0.5 / variances[n, d]
             for t in range(n_frames):
                 offset = column[t] - mean
@@ -176,28 +185,25 @@ def viterbi(
 
 @njit(cache=True)
 def _score(models: Any, batch: Any, m: int, s: int, complete: bool) -> float:
-    means, variances, norms, log_stay, log_next, n_states = models
-    columns, weights, offsets = batch
-    densities = log_densities(
-        columns, weights, offsets[s], offsets[s + 1], means[m], variances[m], norms[m], n_states[m]
-    )
-    return log_likelihood(densities, log_stay[m], log_next[m], complete)
+    n = models.n_states[m]
+    gaussians = Gaussians(models.means[m, :n], models.variances[m, :n], models.log_norms[m, :n])
+    begin, end = batch.offsets[s], batch.offsets[s + 1]
+    densities = log_densities(batch.columns, batch.weights, begin, end, gaussians)
+    return log_likelihood(densities, models.log_stay[m], models.log_next[m], complete)
 
 
 @njit(cache=True)
 def score_frames(
     frames: FloatArray,
     weights: FloatArray,
-    means: FloatArray,
-    variances: FloatArray,
-    norms: FloatArray,
+    gaussians: Gaussians,
     log_stay: FloatArray,
     log_next: FloatArray,
     complete: bool,
 ) -> float:
     """Return log P(O) of frames (T, D) under one model: one call, since calls cost as much."""
     columns = frames.T.copy()
-    densities = log_densities(columns, weights, 0, len(frames), means, variances, norms, len(means))
+    densities = log_densities(columns, weights, 0, len(frames), gaussians)
     return float(log_likelihood(densities, log_stay, log_next, complete))
 
 
@@ -206,8 +212,8 @@ def score_pairs(models: Any, batch: Any, pairs: IntArray, complete: bool) -> Flo
     """Return log P(O_s | lambda_m) for each pair (m, s), shape (P, 2) -> (P,), on one core.
 
     Args:
-        models: The arrays of a `ModelStack`.
-        batch: Columns, weights and offsets of a `SequenceBatch`.
+        models: A `ModelStack`.
+        batch: A `SequenceBatch`.
         pairs: Model and sequence of each score.
         complete: Whether chains end in their last state.
     """

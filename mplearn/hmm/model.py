@@ -92,6 +92,11 @@ class LeftRightHMM:
         """Log of each Gaussian's normalisation, -log(2 pi variance) / 2, shape (N, D)."""
         return np.asarray(kernels.log_norms(self.variances))
 
+    @cached_property
+    def gaussians(self) -> kernels.Gaussians:
+        """What the states emit."""
+        return kernels.Gaussians(self.means, self.variances, self.log_norms)
+
     @property
     def durations_frames(self) -> FloatArray:
         """Expected frames in each state but the last, 1 / (1 - stay), shape (N - 1,)."""
@@ -124,8 +129,8 @@ class LeftRightHMM:
         """
         frames = as_frames(frames, self.n_channels)
         weights = as_weights(weights, len(frames))
-        parameters = self.means, self.variances, self.log_norms, self.log_stay, self.log_next
-        return float(kernels.score_frames(frames, weights, *parameters, complete))
+        steps = self.log_stay, self.log_next
+        return float(kernels.score_frames(frames, weights, self.gaussians, *steps, complete))
 
     def decode(
         self, frames: FloatArray, weights: FloatArray | None = None, *, complete: bool = True
@@ -169,10 +174,7 @@ class LeftRightHMM:
                 as_weights(weights, len(frames)),
                 0,
                 len(frames),
-                self.means,
-                self.variances,
-                self.log_norms,
-                self.n_states,
+                self.gaussians,
             )
         )
 

@@ -6,26 +6,27 @@ import numpy as np
 
 from ..errors import ModelError
 from ..recording import FloatArray
+from .em import Parameters
 from .model import LeftRightHMM
 from .sequences import SequenceBatch
 
 
-def empty_parameters(n_states: int, n_channels: int) -> tuple[FloatArray, ...]:
-    """Return arrays for the kernels to write means, variances, log_stay and log_next into."""
+def empty_parameters(n_states: int, n_channels: int) -> Parameters:
+    """Return arrays for the kernels to write into."""
     shapes = (n_states, n_channels), (n_states, n_channels), (n_states,), (n_states,)
-    return tuple(np.zeros(shape) for shape in shapes)
+    return Parameters(*(np.zeros(shape) for shape in shapes))
 
 
-def as_model(parameters: tuple[FloatArray, ...]) -> LeftRightHMM:
+def as_model(parameters: Parameters) -> LeftRightHMM:
     """Return the model of what the kernels wrote.
 
     Raises:
         ModelError: A channel was never measured.
     """
-    unknown = np.flatnonzero(np.isnan(parameters[0][0]))
+    unknown = np.flatnonzero(np.isnan(parameters.means[0]))
     if len(unknown):
         raise ModelError(f"channels {unknown.tolist()} were never measured")
-    return LeftRightHMM(*parameters[:3])
+    return LeftRightHMM(parameters.means, parameters.variances, parameters.log_stay)
 
 
 def as_floor(variance_floor: float | FloatArray, n_channels: int) -> FloatArray:

@@ -105,4 +105,4 @@ def score_pairs(
     lengths = np.diff(batch.offsets)
     work = int(lengths[pairs[:, 1]].sum()) * stack.means[0].size
     kernel = kernels.score_pairs_parallel if work > _WORTH_THREADS else kernels.score_pairs
-    return np.asarray(kernel(tuple(stack), tuple(batch[1:]), pairs, complete))
+    return np.asarray(kernel(stack, batch, pairs, complete))

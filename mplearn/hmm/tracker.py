@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numba import njit
@@ -49,7 +48,7 @@ class MotionTracker:
         frame = np.ascontiguousarray(frame, dtype=np.float64)
         if frame.shape != (self.n_channels,):
             raise FrameError(f"a frame must have shape ({self.n_channels},), not {frame.shape}")
-        _advance(frame, tuple(self._stack), self.n_frames == 0, self.alpha)
+        _advance(frame, self._stack, self.n_frames == 0, self.alpha)
         self.n_frames += 1
 
     @property
@@ -68,14 +67,15 @@ class MotionTracker:
 
 
 @njit(cache=True)
-def _advance(frame: FloatArray, models: Any, first: bool, alpha: FloatArray) -> None:
-    means, variances, norms, log_stay, log_next, n_states = models
-    for m in range(len(n_states)):
-        for n in range(n_states[m] - 1, -1, -1):
+def _advance(frame: FloatArray, models: ModelStack, first: bool, alpha: FloatArray) -> None:
+    log_stay, log_next = models.log_stay, models.log_next
+    for m in range(len(models.n_states)):
+        for n in range(models.n_states[m] - 1, -1, -1):
             density = 0.0
             for d in range(frame.shape[0]):
-                offset = frame[d] - means[m, n, d]
-                term = norms[m, n, d] - 0.5 * offset * offset / variances[m, n, d]
+                offset = frame[d] - models.means[m, n, d]
+                scaled = 0.5 * offset * offset / models.variances[m, n, d]
+                term = models.log_norms[m, n, d] - scaled
                 density += term if term == term else 0.0
             if first:
                 reached = 0.0 if n == 0 else -np.inf

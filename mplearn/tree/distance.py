@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from ..errors import InvalidValueError
-from ..hmm.kernels import log_densities, log_likelihood
+from ..hmm.kernels import Gaussians, log_densities, log_likelihood
 from ..recording import FloatArray, IntArray
 from .config import TreeConfig
 
@@ -104,7 +104,7 @@ class LikelihoodDistance(Distance):
         self, exemplar: Exemplar, others: Exemplar, rows: IntArray, weights: FloatArray
     ) -> FloatArray:
         """Return eq. 5 in both directions, averaged, per unit of weight."""
-        return _likelihood(tuple(exemplar), tuple(others), rows, weights)
+        return _likelihood(exemplar, others, rows, weights)
 
 
 class MonteCarloDistance(Distance):
@@ -125,7 +125,7 @@ class MonteCarloDistance(Distance):
         """Return eq. 5 in both directions, averaged over draws, per unit of weight."""
         width = exemplar.means.shape[1]
         noise = np.random.default_rng(_SEED).standard_normal((_N_DRAWS, width, self._n_points))
-        return _monte_carlo(tuple(exemplar), tuple(others), rows, weights, self._moves, noise)
+        return _monte_carlo(exemplar, others, rows, weights, self._moves, noise)
 
 
 #: Distances by the name that `TreeConfig.distance` gives; see `register_distance`.
@@ -161,40 +161,57 @@ def make_distance(config: TreeConfig) -> Distance:
     return _KINDS[config.distance](config)
 
 
-@njit(cache=True)
-def _score(columns: FloatArray, model: Any, weights: FloatArray) -> float:
-    means, variances, norms, stay, following = model
-    densities = log_densities(
-        columns, weights, 0, len(weights), means, variances, norms, len(means)
-    )
-    return log_likelihood(densities, stay, following, True)
+class _Chain(NamedTuple):
+    """The model of an exemplar."""
+
+    gaussians: Gaussians
+    log_stay: FloatArray
+    log_next: FloatArray
 
 
 @njit(cache=True)
-def _likelihood(exemplar: Any, others: Any, rows: IntArray, weights: FloatArray) -> FloatArray:
-    columns, means, variances, norms, stay, following, own, _, _ = others
-    mine = exemplar[1:6]
+def _of_one(exemplar: Exemplar) -> _Chain:
+    gaussians = Gaussians(exemplar.means, exemplar.variances, exemplar.log_norms)
+    return _Chain(gaussians, exemplar.log_stay, exemplar.log_next)
+
+
+@njit(cache=True)
+def _of_many(others: Exemplar, row: int) -> _Chain:
+    gaussians = Gaussians(others.means[row], others.variances[row], others.log_norms[row])
+    return _Chain(gaussians, others.log_stay[row], others.log_next[row])
+
+
+@njit(cache=True)
+def _score(columns: FloatArray, model: _Chain, weights: FloatArray) -> float:
+    densities = log_densities(columns, weights, 0, len(weights), model.gaussians)
+    return log_likelihood(densities, model.log_stay, model.log_next, True)
+
+
+@njit(cache=True)
+def _likelihood(
+    exemplar: Exemplar, others: Exemplar, rows: IntArray, weights: FloatArray
+) -> FloatArray:
+    mine = _of_one(exemplar)
     mass = weights.sum()
     out = np.empty(len(rows))
     for k, row in enumerate(rows):
-        theirs = (means[row], variances[row], norms[row], stay[row], following[row])
-        forth = exemplar[6].item() - _score(exemplar[0], theirs, weights)
-        back = own[row] - _score(columns[row], mine, weights)
+        forth = exemplar.own.item() - _score(exemplar.columns, _of_many(others, row), weights)
+        back = others.own[row] - _score(others.columns[row], mine, weights)
         out[k] = 0.5 * (forth + back) / mass
     return out
 
 
 @njit(cache=True)
-def _generated(model: Any, moves: FloatArray, noise: FloatArray) -> FloatArray:
+def _generated(model: _Chain, moves: FloatArray, noise: FloatArray) -> FloatArray:
     """Return a sequence of a left-right model that ends in its last state, shape (D, P)."""
-    means, variances, _, stay, _ = model
+    means, variances = model.gaussians.means, model.gaussians.variances
     n_states, n_points = len(means), len(moves)
     out = np.empty_like(noise)
     state = 0
     for t in range(n_points):
         left = n_points - t
         must = n_states - state >= left  # no more points than states to go through
-        if t and state < n_states - 1 and (must or moves[t] > np.exp(stay[state])):
+        if t and state < n_states - 1 and (must or moves[t] > np.exp(model.log_stay[state])):
             state += 1
         for d in range(len(noise)):
             out[d, t] = means[state, d] + np.sqrt(variances[state, d]) * noise[d, t]
@@ -203,19 +220,18 @@ def _generated(model: Any, moves: FloatArray, noise: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def _monte_carlo(
-    exemplar: Any,
-    others: Any,
+    exemplar: Exemplar,
+    others: Exemplar,
     rows: IntArray,
     weights: FloatArray,
     moves: FloatArray,
     noise: FloatArray,
 ) -> FloatArray:
-    means, variances, norms, stay, following = others[1:6]
-    mine = exemplar[1:6]
+    mine = _of_one(exemplar)
     mass = weights.sum() * len(moves)
     out = np.zeros(len(rows))
     for k, row in enumerate(rows):
-        theirs = (means[row], variances[row], norms[row], stay[row], following[row])
+        theirs = _of_many(others, row)
         for draw in range(len(moves)):
             here = _generated(mine, moves[draw], noise[draw])
             there = _generated(theirs, moves[draw], noise[draw])

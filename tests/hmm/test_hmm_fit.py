@@ -81,7 +81,7 @@ def test_fit_equals_its_steps_taken_one_by_one():
     batch = SequenceBatch.of(sequences, weights)
     split = no_statistics(5, 5)
     em.equal_split(batch.frames, batch.weights, batch.offsets, split)
-    model = model_of(split, 1e-3)
+    model = model_of((*split.emitted, split.stays, split.moves), 1e-3)
     for _ in range(3):
         model = model_of(expected_statistics(model, sequences, weights)[:5], 1e-3)
     direct = fit(sequences, 5, weights=weights, n_steps=3, tolerance=-np.inf, variance_floor=1e-3)

@@ -53,10 +53,7 @@ def exact_moments(
         weights,
         0,
         len(frames),
-        means,
-        variances,
-        kernels.log_norms(variances),
-        len(means),
+        kernels.Gaussians(means, variances, kernels.log_norms(variances)),
     )
     alpha = product_chain.forward(densities, joint.before, joint.log_steps)
     beta = product_chain.backward(densities, joint.before, joint.log_steps, complete)

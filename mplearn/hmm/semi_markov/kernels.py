@@ -6,14 +6,29 @@ the first t frames with state n ending there. Costs O(N T^2).
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from ...recording import FloatArray
-from ..em import accumulate
-from ..kernels import log_densities, log_norms
+from ..em import Emitted, accumulate
+from ..kernels import Gaussians, log_densities
+from ..sequences import SequenceBatch
+
+
+class Statistics(NamedTuple):
+    """Expected sufficient statistics.
+
+    Attributes:
+        emitted: What each state emitted.
+        lengths: Sum of its durations [frame], shape (N,).
+        squares: Sum of their squares, shape (N,).
+    """
+
+    emitted: Emitted
+    lengths: FloatArray
+    squares: FloatArray
 
 
 @njit(cache=True)
@@ -113,28 +128,20 @@ def log_likelihood(
 
 @njit(cache=True)
 def expectation(
-    frames: FloatArray,
-    columns: FloatArray,
-    weights: FloatArray,
-    offsets: Any,
-    model: Any,
+    batch: SequenceBatch,
+    gaussians: Gaussians,
     log_durations: FloatArray,
-    statistics: Any,
+    statistics: Statistics,
 ) -> float:
-    """Add the expected statistics of all sequences; return their log-likelihood.
-
-    ``statistics`` are mass, first and second (N, D), as in `em`, and the sums of the durations and
-    of their squares, (N,).
-    """
-    means, variances = model
-    mass, first, second, lengths, squares = statistics
-    norms = log_norms(variances)
-    n_states = len(means)
+    """Add the expected statistics of all sequences; return their log-likelihood."""
+    offsets, weights = batch.offsets, batch.weights
+    lengths, squares = statistics.lengths, statistics.squares
+    n_states = len(gaussians.means)
     likelihood = 0.0
     for s in range(len(offsets) - 1):
         begin, end = offsets[s], offsets[s + 1]
         n_frames = end - begin
-        densities = log_densities(columns, weights, begin, end, means, variances, norms, n_states)
+        densities = log_densities(batch.columns, weights, begin, end, gaussians)
         sums = _running_sums(densities)
         alpha, beta = ends(log_durations, sums), starts(log_durations, sums)
         total = alpha[n_states - 1, n_frames]
@@ -164,5 +171,6 @@ def expectation(
                 occupied += change[n, t]
                 if occupied > 1e-14:
                     row = begin + t
-                    accumulate(frames, row, occupied * weights[row], n, mass, first, second)
+                    share = occupied * weights[row]
+                    accumulate(batch.frames, row, share, n, statistics.emitted)
     return likelihood

@@ -14,9 +14,9 @@ import numpy as np
 
 from ...errors import InvalidValueError, ModelError
 from ...recording import FloatArray
-from ..em import maximise_gaussians
+from ..em import Emitted, maximise_gaussians
 from ..fit import fit
-from ..kernels import log_densities, log_norms
+from ..kernels import Gaussians, log_densities, log_norms
 from ..model import SHORTEST_STAY, LeftRightHMM, checked_gaussians
 from ..motion_model import held
 from ..parameters import as_floor
@@ -68,9 +68,9 @@ class SemiMarkovHMM:
         return int(self.means.shape[1])
 
     @cached_property
-    def log_norms(self) -> FloatArray:
-        """Log of each Gaussian's normalisation, shape (N, D)."""
-        return np.asarray(log_norms(self.variances))
+    def gaussians(self) -> Gaussians:
+        """What the states emit."""
+        return Gaussians(self.means, self.variances, log_norms(self.variances))
 
     def log_durations(self, longest: int) -> FloatArray:
         """Return the log-probability of each state lasting d frames, d = 0..longest at least.
@@ -94,10 +94,7 @@ class SemiMarkovHMM:
             as_weights(weights, longest),
             0,
             longest,
-            self.means,
-            self.variances,
-            self.log_norms,
-            self.n_states,
+            self.gaussians,
         )
         durations = self.log_durations(longest)
         survivals = np.ascontiguousarray(
@@ -175,13 +172,13 @@ def fit_semi_markov(
     for _ in range(n_steps):
         sums, times = np.zeros((3, n_states, batch.n_channels)), np.zeros((2, n_states))
         table = model.log_durations(longest)
-        likelihood = kernels.expectation(
-            *batch, (model.means, model.variances), table, (*sums, *times)
-        )
+        emitted = Emitted(*sums)
+        statistics = kernels.Statistics(emitted, *times)
+        likelihood = kernels.expectation(batch, model.gaussians, table, statistics)
         if not np.isfinite(likelihood):
             raise ModelError("a sequence became impossible: check its values and the floor")
         means, variances = np.empty((2, n_states, batch.n_channels))
-        maximise_gaussians(sums[0], sums[1], sums[2], floor, means, variances)
+        maximise_gaussians(emitted, floor, means, variances)
         mean = times[0] / batch.n_sequences
         variance = times[1] / batch.n_sequences - mean**2
         least = np.maximum(LEAST_SPREAD, duration_spread * mean)
