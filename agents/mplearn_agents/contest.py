@@ -10,6 +10,7 @@ from typing import Any
 import gymnasium
 
 import mplearn_envs  # noqa: F401  (registers the environment)
+from mplearn_envs.tasks import FreeTask
 
 from .episodes import Episode, play
 from .policies import POLICIES, Policy
@@ -75,7 +76,8 @@ class Contest:
         return [self._played(game, folder) for game in self.games]
 
     def _played(self, game: Game, folder: Path) -> list[Episode]:
-        options: dict[str, Any] = {"task": self.task, "dynamics": game.dynamics, "body": game.body}
+        task = FreeTask(ceiling=True) if self.task == "free" else self.task
+        options: dict[str, Any] = {"task": task, "dynamics": game.dynamics, "body": game.body}
         options |= {"library": self.library} if self.env == "v0" else {"people": game.people}
         name = f"mplearn/PrimitiveHumanoid-{self.env}"
         env = gymnasium.make(name, disable_env_checker=True, **options)

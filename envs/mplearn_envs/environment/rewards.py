@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from mplearn_envs.execution.tracking_report import TrackingReport
 from mplearn_envs.tasks import Task
+from mplearn_envs.tasks.best import weights
 
 
 def earned_meanwhile(task: Task, report: TrackingReport, discount: float) -> dict[str, float]:
@@ -16,10 +17,7 @@ def earned_meanwhile(task: Task, report: TrackingReport, discount: float) -> dic
         report: What happened in the macro step.
         discount: Discount per second.
     """
-    time_s = report.time_s
-    weight = discount**time_s
-    weight[1:] *= time_s[1:] - time_s[:-1]
-    weight[0] *= time_s[0]
+    weight = weights(report.time_s, discount)
     terms = {name: float(rate @ weight) for name, rate in task.rates(report).items()}
     if report.fallen:
         terms["fall"] = task.fall() * discount**report.duration_s

@@ -89,15 +89,7 @@ class KinematicPerformer(Performer):
         self._sensors.at(self.reference.q)
 
     def _performed(self, plan: Plan) -> _Known:
-        n_knots = len(plan.q) - 1
-        report = TrackingReport(
-            np.arange(1.0, n_knots + 1.0) * plan.knot_s,
-            np.zeros(n_knots),
-            np.zeros(n_knots),
-            plan.zmp_margin_m[1:],
-            False,
-            plan.duration_s,
-        )
+        report = TrackingReport.as_planned(plan)
         place = self._arrive(plan.end, velocities(plan.q[-2:], plan.knot_s)[-1])
         return _Known(Outcome.of(report, place.measured, plan.speed), place)
 

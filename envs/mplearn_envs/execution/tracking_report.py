@@ -46,6 +46,19 @@ class TrackingReport(NamedTuple):
     n_steps: int = 0
     end: Reference | None = None
 
+    @classmethod
+    def as_planned(cls, plan: Plan) -> TrackingReport:
+        """Return what happens where a plan is taken at its word."""
+        n_knots = len(plan.q) - 1
+        return cls(
+            np.arange(1.0, n_knots + 1.0) * plan.knot_s,
+            np.zeros(n_knots),
+            np.zeros(n_knots),
+            plan.zmp_margin_m[1:],
+            False,
+            plan.duration_s,
+        )
+
 
 def assess(robot: Robot, plan: Plan, q: FloatArray, v: FloatArray, fallen: bool) -> TrackingReport:
     """Compare what was recorded with what was planned.

@@ -228,12 +228,13 @@ class Skills:
         with self.lock:
             key = (None if before is None else self.key(before), self.key(after))
             if key not in self._transitions_s:
-                start = self._rest if before is None else self._end(before)
-                self._transitions_s[key] = self.plan(start, after).duration_s
+                self._transitions_s[key] = self.plan(self.end(before), after).duration_s
             return self._transitions_s[key]
 
-    def _end(self, id: int) -> Reference:
-        """Return where a primitive ends."""
+    def end(self, id: int | None) -> Reference:
+        """Return where a primitive ends; None: where the robot stands at rest."""
+        if id is None:
+            return self._rest
         key = self.key(id)
         if key not in self._ends:
             self._ends[key] = self.plan(self._check.posture(self[id].motion), id).end

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from mplearn.recording import FloatArray
 from mplearn_envs.skills.repertoire import Repertoire
 
 
@@ -63,3 +64,16 @@ class Clock(NamedTuple):
 def time_held(deadline_s: float, hold_s: float) -> float:
     """Return how long who only holds is at it when the deadline is over [s]."""
     return math.ceil(deadline_s / hold_s - 1e-9) * hold_s
+
+
+def weights(time_s: FloatArray, discount: float) -> FloatArray:
+    """Return what a reward of 1 per second at each moment adds to the discounted integral, (S,).
+
+    Args:
+        time_s: Time of the moments since the start, shape (S,) [s].
+        discount: Per second.
+    """
+    weight = discount**time_s
+    weight[1:] *= time_s[1:] - time_s[:-1]
+    weight[0] *= time_s[0]
+    return weight

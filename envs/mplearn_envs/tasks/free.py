@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
@@ -13,6 +13,7 @@ from mplearn_envs.execution.tracking_report import TrackingReport
 from mplearn_envs.skills.repertoire import Repertoire
 
 from .base import Choice, Scene, Task
+from .wandering import wandering
 
 
 @dataclass
@@ -42,6 +43,10 @@ class FreeTask(Task):
         fallen: Price of a fall.
         safe_m: Margin of the zero-moment point that is safe [m].
         memory: Number of primitives in which repetitions count.
+        ceiling: Whether ``report`` has ``best_return``, ``idle_return`` and ``best_rate`` (the
+            greatest reward per second in the long run): the best that is possible where plans are
+            taken at their word, see `mplearn_envs.tasks.wandering`. It takes some seconds, once for
+            each library.
     """
 
     alive: float = 0.05
@@ -51,6 +56,7 @@ class FreeTask(Task):
     fallen: float = 10.0
     safe_m: float = 0.05
     memory: int = 10
+    ceiling: bool = False
     terms: ClassVar[tuple[str, ...]] = ("likely", "varied", "alive", "balanced")
 
     def space(self, repertoire: Repertoire) -> spaces.Box:
@@ -60,6 +66,7 @@ class FreeTask(Task):
     def reset(self, scene: Scene) -> None:
         """Nothing was performed yet."""
         self.arrive(scene)
+        self._best = wandering(self, self.memory, scene) if self.ceiling else None
 
     def observe(self) -> FloatArray:
         """Return the share of each slot among the last primitives."""
@@ -91,3 +98,9 @@ class FreeTask(Task):
                 self._shares[slot] += 1.0
         self._shares /= max(len(lately), 1)
         return {}
+
+    def report(self) -> dict[str, Any]:
+        """Return the best that is possible, where that is asked for."""
+        if self._best is None:
+            return {}
+        return {**self._best.scale.report(), "best_rate": self._best.rate}
