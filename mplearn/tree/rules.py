@@ -151,7 +151,7 @@ def split_mixed(structure: Structure, leaf: Node, when: int) -> Change:
     config = structure.config
     if leaf.whole or leaf.frozen or len(leaf.members) < config.max_exemplars:
         return Change()
-    matrix = structure.memory.bank.matrix(leaf.members, without_tempo=True)
+    matrix = structure.memory.bank.without_tempo(leaf.members, leaf.matrix)
     branches = two_branches(matrix, config.min_branch)
     if branches is None:
         return Change()
@@ -174,7 +174,7 @@ def shed_strangers(structure: Structure, leaf: Node, when: int) -> Change:
     config, limit = structure.config, structure.memory.valley()
     if leaf.whole or leaf.frozen or leaf.diameter <= limit:
         return Change()
-    matrix = structure.memory.bank.matrix(leaf.members, without_tempo=True)
+    matrix = structure.memory.bank.without_tempo(leaf.members, leaf.matrix)
     groups = clusters_below(matrix, limit, 1)
     core = max(groups, key=len, default=np.zeros(0, np.int64))
     if len(core) < 2 or len(groups) < 2:

@@ -9,7 +9,10 @@ from typing import Annotated
 
 import numpy as np
 
-from ...hmm import fit
+from ...hmm import SequenceBatch, fit
+from ...hmm.em import em
+from ...hmm.kernels import Gaussians, log_norms, score_frames
+from ...hmm.parameters import empty_parameters
 from ...recording import FloatArray, IntArray
 from ...state import Array, State, require
 from ..config import TreeConfig
@@ -17,6 +20,7 @@ from ..distance import Exemplar, make_distance
 from . import normalisation
 from .slot_arrays import SlotArrays
 
+_PRIOR = 1.0  # transitions of either kind added to each state's count
 _STEEPNESS = 4.0  # a segment twice as long, as two motions in one are, is three times as far
 
 
@@ -60,7 +64,10 @@ class ExemplarBank:
         self.distance = make_distance(config)
         self._weights = normalisation.weights(config.normalisation)
         self._roots = np.sqrt(self._weights)
+        self._whole = np.array([0, config.normalisation.n_points])
         self._slots: dict[int, int] = {}
+        self._latest: tuple[int, Exemplar | None] = -1, None
+        self._met = np.zeros(0)  # divergences of the latest from what is in each slot, NaN: unknown
         per_state, per_transition = (config.n_states, n_channels), (config.n_states,)
         self._arrays = SlotArrays(
             (n_channels, config.normalisation.n_points),
@@ -79,6 +86,9 @@ class ExemplarBank:
 
     def __getitem__(self, number: int) -> Exemplar:
         """Return an exemplar."""
+        number_of_latest, latest = self._latest
+        if number == number_of_latest and latest is not None:
+            return latest
         return Exemplar(*self._arrays.read(self._slots[number]))
 
     def model(self, points: FloatArray, duration: float = 1.0) -> Exemplar:
@@ -103,31 +113,45 @@ class ExemplarBank:
         return exemplar._replace(extent=self.distance.length(apart)[0])
 
     def _modelled(self, points: FloatArray, duration: float) -> Exemplar:
-        """Model points as they are; how far they are from standing still is not known yet."""
-        model = fit(
-            [points],
-            self.config.n_states,
-            weights=[self._weights],
-            n_steps=1,
-            variance_floor=self.floor,
-        )
-        own = np.array(model.score(points, self._weights))
-        columns = np.ascontiguousarray(points.T)
-        parts = model.means, model.variances, model.log_norms, model.log_stay, model.log_next
-        return Exemplar(columns, *parts, own, np.array(float(duration)), np.array(np.inf))
+        """Model points as they are; how far they are from standing still is not known yet.
+
+        As `fit` in one step does, but for its checks, which take longer than the kernels.
+        """
+        points, columns, weights = np.ascontiguousarray(points), points.T.copy(), self._weights
+        batch = SequenceBatch(points, columns, weights, self._whole)
+        model = empty_parameters(self.config.n_states, self.n_channels)
+        likelihood = em(batch, self.floor, _PRIOR, True, 1, 0.0, model)
+        if not np.isfinite(likelihood + model.means[0].sum()):  # says what is wrong
+            n_states = self.config.n_states
+            fit([points], n_states, weights=[weights], n_steps=1, variance_floor=self.floor)
+        stay, following = model.log_stay, model.log_next
+        following[:-1] = np.log(-np.expm1(stay[:-1]))
+        gaussians = Gaussians(model.means, model.variances, log_norms(model.variances))
+        own = score_frames(points, weights, gaussians, stay, following, True)
+        scalars = np.array(own), np.array(float(duration)), np.array(np.inf)
+        return Exemplar(columns, *gaussians, stay, following, *scalars)
 
     def add(self, number: int, exemplar: Exemplar) -> None:
         """Remember an exemplar."""
         self._slots[number] = self._arrays.take()
         self._arrays.write(self._slots[number], exemplar)
+        self._latest = -1, None
+        self._latest = number, self[number]
+        self._met = np.full(self._arrays.n_slots, np.nan)
 
     def drop(self, number: int) -> None:
         """Forget an exemplar."""
-        self._arrays.release(self._slots.pop(number))
+        slot = self._slots.pop(number)
+        self._arrays.release(slot)
+        if slot < len(self._met):
+            self._met[slot] = np.nan
+        if number == self._latest[0]:
+            self._latest = -1, None
 
     def take_over(self, other: ExemplarBank) -> None:
         """Hold what another bank holds, from now on instead of it."""
         self.floor, self._slots, self._arrays = other.floor, other._slots, other._arrays
+        self._latest = -1, None
 
     def profile(self, exemplar: Exemplar) -> FloatArray:
         """Return the points times the root of their weights, shape (D * P,); 0 where missing."""
@@ -150,18 +174,42 @@ class ExemplarBank:
         """Return how far an exemplar is from others of the bank, shape (k,).
 
         It is the length of their distance (`Distance.length`); it grows where one lasts longer than
-        the other by more than motions do, unless tempo does not count.
+        the other by more than motions do, unless tempo does not count. What was measured of the
+        latest that came is not measured again.
         """
         slots = self._slots_of(others)
-        raw = np.empty(len(slots))
-        for arrays, rows, here in self._arrays.parted(slots):
-            raw[here] = self.distance.divergence(exemplar, Exemplar(*arrays), rows, self._weights)
+        if exemplar is self._latest[1]:
+            unknown = slots[np.isnan(self._met[slots])]
+            if len(unknown):
+                self._met[unknown] = self._divergences(exemplar, unknown)
+            raw = self._met[slots]
+        else:
+            raw = self._divergences(exemplar, slots)
         distances = self.distance.length(raw)
         if not without_tempo and np.isfinite(self.config.tempo):
             one, other = exemplar.duration, self._arrays.gather(slots, _DURATION)
             beyond = np.maximum(one, other) / np.minimum(one, other) / self.config.tempo
             distances *= np.maximum(beyond, 1.0) ** _STEEPNESS
         return np.asarray(distances)
+
+    def _divergences(self, exemplar: Exemplar, slots: IntArray) -> FloatArray:
+        found = np.empty(len(slots))
+        for arrays, rows, here in self._arrays.parted(slots):
+            found[here] = self.distance.divergence(exemplar, Exemplar(*arrays), rows, self._weights)
+        return found
+
+    def without_tempo(self, numbers: Sequence[int], matrix: FloatArray) -> FloatArray:
+        """Return the distances that exemplars have without tempo, given those with it, (k, k)."""
+        durations = self._arrays.gather(self._slots_of(numbers), _DURATION)
+        beyond = np.maximum.outer(durations, durations) / np.minimum.outer(durations, durations)
+        rows, others = np.nonzero(np.triu(beyond / self.config.tempo > 1.0))
+        if len(rows):
+            matrix = matrix.copy()
+        for i in np.unique(rows).tolist():
+            group = others[rows == i]
+            row = self.distances(self[numbers[i]], [numbers[j] for j in group], without_tempo=True)
+            matrix[i, group] = matrix[group, i] = row
+        return matrix
 
     def matrix(self, numbers: Sequence[int], *, without_tempo: bool = False) -> FloatArray:
         """Return the distances among exemplars, shape (k, k)."""
@@ -179,6 +227,7 @@ class ExemplarBank:
         """Return a bank that holds the same, and goes on apart; what neither changes is shared."""
         twin = copy(self)
         twin._slots, twin._arrays = dict(self._slots), self._arrays.fork()
+        twin._latest = -1, None
         return twin
 
     def state(self, numbers: Iterable[int]) -> BankState:

@@ -38,6 +38,7 @@ class Neighbours:
 
     def __init__(self) -> None:
         self.counts = np.zeros(N_STEPS + 1)
+        self._found: tuple[FloatArray, float, float] | None = None  # of these counts and this rise
 
     def update(self, distances: FloatArray) -> None:
         """Take the distances of a new segment to known ones, over the mean of all, shape (k,)."""
@@ -53,6 +54,12 @@ class Neighbours:
         Returns:
             The farthest that was looked at while too little is known.
         """
+        found = self._found
+        if found is None or found[0] is not self.counts or found[1] != rise:
+            found = self._found = self.counts, rise, self._valley(rise)
+        return found[2]
+
+    def _valley(self, rise: float) -> float:
         inner, outer = self.counts[:-_ACROSS], self.counts[_ACROSS:]
         known = inner >= _LEAST
         if not known.any():

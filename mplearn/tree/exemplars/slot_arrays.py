@@ -75,7 +75,10 @@ class SlotArrays:
         self, slots: IntArray
     ) -> Iterator[tuple[tuple[FloatArray, ...], IntArray, IntArray]]:
         """Yield the blocks that hold some slots: arrays, rows there, positions among the slots."""
+        if len(self.blocks) == 1:
+            yield self.blocks[0], slots, np.arange(len(slots))
+            return
         block, row = np.divmod(slots, BLOCK)
-        for number in np.unique(block):
+        for number in sorted(set(block.tolist())):
             here = np.flatnonzero(block == number)
             yield self.blocks[number], row[here], here

@@ -107,7 +107,13 @@ class DistanceSample:
         self.seed = seed
         self.numbers: list[int] = []
         self._matrix = np.zeros((size, size))
-        self._state: SampleState | None = None  # as long as nothing changes
+        self._forget()
+
+    def _forget(self) -> None:
+        """Let go of what follows from the distances, which have changed."""
+        self._state: SampleState | None = None
+        self._mean: float | None = None
+        self._scale: tuple[TreeConfig, float] | None = None
 
     def place_for(self, n_seen: int) -> int | None:
         """Return where in the sample the segment after ``n_seen`` others goes; None: nowhere."""
@@ -126,7 +132,7 @@ class DistanceSample:
         row = bank.distances(bank[number], self.numbers, without_tempo=True)
         row[place] = 0.0
         self._matrix[place, : len(row)] = self._matrix[: len(row), place] = row
-        self._state = None
+        self._forget()
         return gone
 
     def measure(self, bank: ExemplarBank) -> None:
@@ -134,17 +140,19 @@ class DistanceSample:
         self._matrix[: len(self.numbers), : len(self.numbers)] = bank.matrix(
             self.numbers, without_tempo=True
         )
-        self._state = None
+        self._forget()
 
     def remeasured(self, matrix: FloatArray) -> None:
         """Take over distances that were measured again, shape (n, n)."""
         self._matrix[: len(matrix), : len(matrix)] = matrix
-        self._state = None
+        self._forget()
 
     def mean(self) -> float:
         """Return the mean distance; 0 where there is none."""
-        n = len(self.numbers)
-        return float(self._matrix[:n, :n].sum() / max(n * (n - 1), 1))
+        if self._mean is None:
+            n = len(self.numbers)
+            self._mean = float(self._matrix[:n, :n].sum() / max(n * (n - 1), 1))
+        return self._mean
 
     def scale(self, config: TreeConfig) -> float:
         """Return the largest distance expected between executions of one motion.
@@ -155,6 +163,11 @@ class DistanceSample:
         near, as in a recording played twice, or far, as in a person's free motion, the scale
         follows with a power below 1.
         """
+        if self._scale is None or self._scale[0] is not config:
+            self._scale = config, self._measured_scale(config)
+        return self._scale[1]
+
+    def _measured_scale(self, config: TreeConfig) -> float:
         n = len(self.numbers)
         matrix, mean = self._matrix[:n, :n], self.mean()
         apart = np.where(matrix > 1e-6 * mean, matrix, np.inf)  # a copy says nothing of variation
@@ -189,6 +202,7 @@ class DistanceSample:
         self.numbers = state.numbers.tolist()
         self._matrix = np.zeros((self.size, self.size))
         self._matrix[:n, :n] = state.matrix
+        self._forget()
         self._state = state
 
 

@@ -3,9 +3,59 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from ...recording import FloatArray, IntArray
 from ..exemplars.spread import pairs
+
+
+@njit(cache=True)
+def complete_linkage(matrix: FloatArray, cutoff: float) -> tuple[FloatArray, IntArray]:
+    """Join what is nearest by the largest distance inside it, as far as that is at most ``cutoff``.
+
+    Args:
+        matrix: Distances, shape (n, n).
+        cutoff: Largest distance inside a cluster.
+
+    Returns:
+        The joins so far as scipy's ``linkage`` has them, shape (k, 4); and of each of the n the
+        first in its cluster, shape (n,).
+    """
+    n = len(matrix)
+    apart = matrix.copy()
+    homes, ids, sizes = np.arange(n), np.arange(n), np.ones(n)
+    nearest, nearness = np.zeros(n, np.int64), np.full(n, np.inf)
+    merges = np.empty((max(n - 1, 0), 4))
+    stale = np.ones(n, np.bool_)
+    n_merges = 0
+    while True:
+        one = -1
+        for i in range(n):
+            if homes[i] != i:
+                continue
+            if stale[i]:
+                nearness[i], stale[i] = np.inf, False
+                for j in range(n):
+                    if homes[j] == j and j != i and apart[i, j] < nearness[i]:
+                        nearest[i], nearness[i] = j, apart[i, j]
+            if nearness[i] <= cutoff and (one < 0 or nearness[i] < nearness[one]):
+                one = i
+        if one < 0 or n_merges == n - 1:
+            return merges[:n_merges], homes
+        kept, gone = min(one, nearest[one]), max(one, nearest[one])
+        merges[n_merges, 0] = min(ids[kept], ids[gone])
+        merges[n_merges, 1] = max(ids[kept], ids[gone])
+        merges[n_merges, 2] = nearness[one]
+        sizes[kept] += sizes[gone]
+        merges[n_merges, 3] = sizes[kept]
+        ids[kept] = n + n_merges
+        n_merges += 1
+        for j in range(n):
+            if homes[j] == gone:
+                homes[j] = kept
+            apart[kept, j] = apart[j, kept] = max(apart[kept, j], apart[gone, j])
+            stale[j] |= nearest[j] == kept or nearest[j] == gone
+        stale[kept] = True
 
 
 def clusters_below(matrix: FloatArray, cutoff: float, least: int) -> list[IntArray]:
@@ -19,14 +69,12 @@ def clusters_below(matrix: FloatArray, cutoff: float, least: int) -> list[IntArr
     Returns:
         Positions of the members, in order.
     """
-    from scipy.cluster.hierarchy import fcluster, linkage
-
     if len(matrix) < max(least, 2) or not cutoff >= 0:
         return []
-    labels = fcluster(linkage(pairs(matrix), "complete"), cutoff, "distance")
-    groups = [np.flatnonzero(labels == label) for label in np.unique(labels)]
-    large = [group for group in groups if len(group) >= least]
-    return sorted(large, key=lambda group: float(matrix[np.ix_(group, group)].max()))
+    _, homes = complete_linkage(np.ascontiguousarray(matrix), cutoff)
+    sizes = np.bincount(homes)
+    groups = [np.flatnonzero(homes == home) for home in np.flatnonzero(sizes >= max(least, 1))]
+    return sorted(groups, key=lambda group: float(matrix[np.ix_(group, group)].max()))
 
 
 def two_branches(matrix: FloatArray, least: int) -> tuple[IntArray, IntArray] | None:
@@ -35,12 +83,10 @@ def two_branches(matrix: FloatArray, least: int) -> tuple[IntArray, IntArray] | 
     Branches of fewer than ``least`` members that join last are outliers; each goes to the branch
     that is nearer on average. None where there are no two branches of that size.
     """
-    from scipy.cluster.hierarchy import linkage
-
     n = len(matrix)
     if n < 2 * least:
         return None
-    merges = linkage(pairs(matrix), "complete")
+    merges, _ = complete_linkage(np.ascontiguousarray(matrix), np.inf)
     sizes = np.concatenate([np.ones(n), merges[:, 3]])
     at = 2 * n - 2
     while True:

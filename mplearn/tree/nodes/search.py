@@ -28,6 +28,7 @@ _KNOWN = np.dtype(
         ("diameter", np.float64),
         ("extent", np.float64),
         ("slot", np.int64),
+        ("size", np.int64),
     ]
 )
 
@@ -129,15 +130,16 @@ class NodeIndex:
         """Take note of a node: its id, its parent's, whether it is a leaf, its diameter."""
         k = int(np.searchsorted(self.ids, facts[0]))
         if facts[0] not in self.ids[k : k + 1]:
-            new = np.array([(*facts, np.inf, self._means.take())], _KNOWN)
+            new = np.array([(*facts, np.inf, self._means.take(), 0)], _KNOWN)
             self._known = np.insert(self._known, k, new)
             self.members.insert(k, [])
-        slot, extent = int(self._known["slot"][k]), float(self._known["extent"][k])
-        self._known[k] = (*facts, extent, slot)
+        known = self._known[k]
+        known["parent"], known["is_leaf"], known["diameter"] = facts[1:]
         if self.members[k] != members:
             self.members[k] = list(members)
-            self._known["extent"][k] = _mean_extents(bank, [members])[0]
-            self._means.write(slot, (bank.mean_profile(members),))
+            known["size"] = len(members)
+            known["extent"] = _mean_extents(bank, [members])[0]
+            self._means.write(int(known["slot"]), (bank.mean_profile(members),))
 
     def remeasured(self, diameters: Mapping[int, float], bank: ExemplarBank) -> None:
         """Take note of nodes' new diameters, by id, and of the new models of their exemplars."""
@@ -150,29 +152,27 @@ class NodeIndex:
         It is 0 where there is no leaf.
         """
         chosen = self.leaves & (self.ids != but) if but is not None else self.leaves
-        return float(np.median(self._diameters()[chosen])) if chosen.any() else 0.0
-
-    def _sizes(self) -> IntArray:
-        return np.array([len(group) for group in self.members], dtype=np.int64)
+        diameters = np.sort(self._diameters()[chosen])
+        n = len(diameters)
+        return float(diameters[(n - 1) // 2] + diameters[n // 2]) / 2 if n else 0.0
 
     def _diameters(self) -> FloatArray:
         """Return the diameters of the nodes, those of young ones as they will be, shape (n,)."""
         diameters = np.asarray(self._known["diameter"])
         if not self.config.young_reach:
             return diameters
-        return np.asarray(
-            diameters * _YOUNG_GROWTH[np.minimum(self._sizes(), len(_YOUNG_GROWTH) - 1)]
-        )
+        sizes = np.minimum(self._known["size"], len(_YOUNG_GROWTH) - 1)
+        return np.asarray(diameters * _YOUNG_GROWTH[sizes])
 
     def radii(self) -> FloatArray:
         """Return the radius of each node: eq. 6, capped by the scale that the leaves share."""
         config = self.config
-        sizes, diameters = self._sizes(), self._diameters()
-        radii = config.reach * diameters
+        radii = config.reach * self._diameters()
         if np.isfinite(config.reach_cap):
             radii = np.minimum(radii, min(config.reach_cap * self.scale(), self.limit))
             if np.isfinite(self.limit):
-                least = np.where(sizes <= _YOUNG, config.young_reach, config.least_reach)
+                young = self._known["size"] <= _YOUNG
+                least = np.where(young, config.young_reach, config.least_reach)
                 radii = np.minimum(np.maximum(radii, least * self.limit), self.limit)
         radii = np.minimum(radii, config.extent_share * self._known["extent"])
         return np.asarray(radii if self.caps is None else np.minimum(radii, self.caps))
@@ -219,16 +219,15 @@ class NodeIndex:
         return np.sort(np.argsort(nearness, kind="stable")[: self.config.n_candidates])
 
     def _compare(self, exemplar: Exemplar, bank: ExemplarBank, places: IntArray) -> Sight:
-        members = [self.members[k] for k in places]
-        row = bank.distances(exemplar, [m for group in members for m in group])
-        radii = np.minimum(self.radii(), self.config.extent_share * float(exemplar.extent))
-        matches = []
-        first = 0
-        for k, group in zip(places, members, strict=True):
-            distance = float(mean_nearest(row[first : first + len(group)], self.config.n_nearest))
-            first += len(group)
-            ratio = distance / max(float(radii[k]), 1e-12)
-            matches.append(Match(int(self.ids[k]), bank.distance.divergence_of(distance), ratio))
+        row = bank.distances(exemplar, [m for k in places.tolist() for m in self.members[k]])
+        known = self._known[places]
+        radii = np.minimum(self.radii()[places], self.config.extent_share * exemplar.extent)
+        means = _group_means(row, known["size"].copy(), self.config.n_nearest)
+        seen = zip(known["id"].tolist(), means.tolist(), radii.tolist(), strict=True)
+        matches = [
+            Match(id, bank.distance.divergence_of(mean), mean / max(radius, 1e-12))
+            for id, mean, radius in seen
+        ]
         return Sight(sorted(matches, key=lambda match: (match.ratio, match.node)), row)
 
     def _descend(self, exemplar: Exemplar, bank: ExemplarBank) -> Sight:
@@ -283,6 +282,18 @@ class NodeIndex:
 def mean_nearest(distances: FloatArray, n_nearest: int) -> FloatArray:
     """Return the mean of the smallest distances along the last axis, (..., k) -> (...)."""
     return np.asarray(np.sort(distances, axis=-1)[..., :n_nearest].mean(axis=-1))
+
+
+@njit(cache=True)
+def _group_means(distances: FloatArray, sizes: IntArray, n_nearest: int) -> FloatArray:
+    """Return `mean_nearest` of each of some groups that stand one after the other, shape (g,)."""
+    means = np.empty(len(sizes))
+    first = 0
+    for k, size in enumerate(sizes):
+        nearest = np.sort(distances[first : first + size])[:n_nearest]
+        means[k] = nearest.sum() / len(nearest)
+        first += size
+    return means
 
 
 def _mean_extents(bank: ExemplarBank, groups: Sequence[Sequence[int]]) -> FloatArray:

@@ -1,0 +1,103 @@
+"""What the bank remembers of distances and models is what is measured and fitted anew."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mplearn.errors import ModelError
+from mplearn.hmm import fit
+from mplearn.tree import Exemplar, TreeConfig
+from mplearn.tree.exemplars import normalisation
+from mplearn.tree.exemplars.bank import ExemplarBank
+from mplearn.tree.nodes.search import _group_means, mean_nearest
+
+D = 5
+
+
+def points(rng: np.random.Generator, config: TreeConfig) -> np.ndarray:
+    at = np.linspace(0, np.pi, config.normalisation.n_points)[:, None]
+    return np.sin(at + rng.uniform(0, 2 * np.pi, D)) + rng.normal(0, 0.05, (len(at), D))
+
+
+def banked(rng: np.random.Generator, numbers: range) -> ExemplarBank:
+    bank = ExemplarBank(TreeConfig(), D, np.full(D, 0.09))
+    for number in numbers:
+        bank.add(number, bank.model(points(rng, bank.config), rng.uniform(40, 160)))
+    return bank
+
+
+@pytest.mark.parametrize("n_missing", [0, 7])
+def test_a_model_is_that_of_one_step_of_em(n_missing: int) -> None:
+    rng = np.random.default_rng(n_missing)
+    bank = ExemplarBank(TreeConfig(), D, np.linspace(0.01, 0.2, D))
+    seen = points(rng, bank.config)
+    seen.ravel()[rng.choice(seen.size, n_missing, replace=False)] = np.nan
+    seen, weights = seen.astype(np.float32), normalisation.weights(bank.config.normalisation)
+    exemplar = bank.model(seen, 90.0)
+    model = fit(
+        [seen], bank.config.n_states, weights=[weights], n_steps=1, variance_floor=bank.floor
+    )
+    for name in ("means", "variances", "log_norms", "log_stay", "log_next"):
+        np.testing.assert_array_equal(getattr(exemplar, name), getattr(model, name))
+    assert exemplar.own == model.score(seen, weights)
+    still = np.broadcast_to(
+        normalisation.mean_posture(seen.astype(float), bank.config.normalisation), seen.shape
+    )
+    other = ExemplarBank(replace(bank.config, extent_share=np.inf), D, bank.floor)
+    other.add(0, other._modelled(still, 90.0))
+    np.testing.assert_array_equal(exemplar.extent, other.distances(exemplar, [0])[0])
+
+
+def test_a_model_of_what_was_never_seen_is_refused() -> None:
+    bank = ExemplarBank(TreeConfig(), D, np.full(D, 0.09))
+    seen = points(np.random.default_rng(0), bank.config)
+    seen[:, 2] = np.nan
+    with pytest.raises(ModelError, match=r"channels \[2\] were never measured"):
+        bank.model(seen)
+
+
+def test_what_is_known_of_the_latest_is_what_is_measured() -> None:
+    """Exemplars come and go, in any order, and slots are taken again."""
+    rng = np.random.default_rng(3)
+    bank, next_number = banked(rng, range(6)), 6
+    for _ in range(60):
+        step, numbers = rng.integers(4), bank.numbers()
+        if step == 0 or len(numbers) < 4:
+            bank.add(next_number, bank.model(points(rng, bank.config), rng.uniform(40, 160)))
+            next_number += 1
+        elif step == 1:
+            bank.drop(int(rng.choice(numbers)))
+        elif step == 2:
+            bank = bank.fork()
+        else:
+            bank.take_over(banked(rng, range(next_number - 3, next_number)))
+        numbers = bank.numbers()
+        asked = [int(n) for n in rng.permutation(numbers)[:5]]
+        for without_tempo in (False, True):
+            for number in (numbers[-1], numbers[0]):
+                apart = Exemplar(*(part.copy() for part in bank[number]))
+                np.testing.assert_array_equal(
+                    bank.distances(bank[number], asked, without_tempo=without_tempo),
+                    bank.distances(apart, asked, without_tempo=without_tempo),
+                )
+
+
+def test_tempo_is_taken_out_of_distances() -> None:
+    bank = banked(np.random.default_rng(1), range(12))
+    numbers = [4, 2, 9, 0, 11, 7]
+    matrix = bank.matrix(numbers)
+    before = matrix.copy()
+    found = bank.without_tempo(numbers, matrix)
+    np.testing.assert_array_equal(found, bank.matrix(numbers, without_tempo=True))
+    np.testing.assert_array_equal(matrix, before)
+    assert (found < matrix).any()
+
+
+@pytest.mark.parametrize("n_nearest", [1, 2, 1000])
+def test_means_of_groups_are_those_of_each(n_nearest: int) -> None:
+    rng = np.random.default_rng(n_nearest)
+    sizes = rng.integers(1, 13, 7)
+    distances = rng.random(sizes.sum())
+    expected = [mean_nearest(each, n_nearest) for each in np.split(distances, sizes.cumsum()[:-1])]
+    np.testing.assert_allclose(_group_means(distances, sizes, n_nearest), expected, rtol=1e-14)
