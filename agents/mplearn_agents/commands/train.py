@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--env",
         choices=get_args(EnvVersion),
         default=default["env"],
-        help="version of the environment (default: v0); v1 has 138 primitives of several people",
+        help="version of the environment (default: v0); v1 has 140 primitives of several people",
     )
     parser.add_argument(
         "--people", choices=["train", "test", "all"], help="of v1: with whom (default: train)"

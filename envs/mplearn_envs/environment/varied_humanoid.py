@@ -36,14 +36,14 @@ _kept: list[Repertoire] = []  # outlives its environments: others of the process
 
 
 class VariedHumanoidEnv(MacroStepEnv):
-    """A humanoid with 138 primitives of several people, among which the ways are long.
+    """A humanoid with 140 primitives of several people, among which the ways are long.
 
     Observations, actions, rewards and ``info`` are those of `PrimitiveHumanoidEnv`, but:
 
     * Each episode has a person, drawn by the environment's seed among ``people``, and that person's
-      graph: who does what after what, and how often. The primitives are the same for all. Nine of
-      ten ways people have in common; so what was learned with the people of "train" can be tried
-      with those of "test". ``info["person"]`` says who it is, for whoever evaluates, and
+      graph: who was seen to do what after what, and how often. The primitives are the same for
+      all, and three of four ways are shared by any two people; so what was learned with the people
+      of "train" can be tried with those of "test". ``info["person"]`` says who it is, for whoever evaluates, and
       ``reset(options={"person": 7})`` asks for one.
     * An episode starts at one primitive, drawn too, which alone is legal besides hold.
     * ``task="goal"`` asks for a primitive 5 to 15 primitives away, within 90 s; a ``"recite"`` has
@@ -53,7 +53,8 @@ class VariedHumanoidEnv(MacroStepEnv):
       and ``idle_return``, what holding earns: (return - idle) / (best - idle) is the share of what
       is possible.
 
-    There are 256 actions. What the built-in humanoid makes of the library at the usual speed is
+    All was learned by a `mplearn.MotionLearner` that watched six people, and recognised in what
+    eight do (``python -m mplearn_envs.varied.build``). There are 256 actions. What the built-in humanoid makes of the library at the usual speed is
     known beforehand, so that an episode begins at once; with another robot, speed or style,
     verdicts and plans are made when they are needed.
 

@@ -1,13 +1,14 @@
-"""The varied library: 138 primitives, and the ways of eight people among them.
+"""The varied library: 140 primitives, and the ways of eight people among them.
 
-The primitives are the same for all, and each person has an own graph of them: a tenth of the ways
-are one's own, and how often each is taken. So what was learned with some people can be tried with
+The primitives are the same for all, and each person has an own graph of them: the ways in which
+that person was seen to go on, and how often. So what was learned with some people can be tried with
 others: `SPLITS` names who is who. ``python -m mplearn_envs.varied.build`` makes the files.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -56,13 +57,13 @@ def varied_library() -> PrimitiveLibrary:
 def library_of(person: int) -> PrimitiveLibrary:
     """Return the primitives with the transitions of one person."""
     library = varied_library()
-    return replace(library, graph=graph_of(_facts()["ways"][person], len(library)))
+    return replace(library, graph=graph_of(_facts()["ways"][person], library.ids))
 
 
-def graph_of(ways: Ways, n_primitives: int) -> TransitionGraph:
-    """Return a graph of primitives 1, 2, ... with these transitions."""
+def graph_of(ways: Ways, ids: Sequence[int]) -> TransitionGraph:
+    """Return a graph of some primitives with these transitions."""
     graph = TransitionGraph(order=1)
-    for id in range(1, n_primitives + 1):
+    for id in ids:
         graph.add_node(id)
     for before, after, times in ways:
         for _ in range(times):
