@@ -13,6 +13,7 @@ import numpy as np
 from mplearn.errors import InvalidValueError, NoPathError, RobotError, UnknownPrimitiveError
 from mplearn.graph import TransitionGraph
 from mplearn.recording import FloatArray
+from mplearn_envs.skills.action_choices import HOLD
 from mplearn_envs.varied.people import varied_library
 
 from .base import Policy, transition_prior
@@ -28,7 +29,8 @@ class PathToGoal(Policy):
 
     Args:
         graph: Actions as nodes, for "quick" each with its ``"duration_s"`` [s]; each edge with its
-            ``"probability"``.
+            ``"probability"``, and for "quick" with a ``"duration_s"`` where an action takes another
+            time after the one before.
         goal: The action to reach, or several of which any will do.
         prefer: ``"likely"`` takes the path of greatest probability, ``"short"`` that of fewest
             primitives, and of those the more probable, ``"quick"`` that of the least time.
@@ -53,7 +55,7 @@ class PathToGoal(Policy):
         costs = nx.DiGraph()
         costs.add_nodes_from(graph)
         costs.add_weighted_edges_from(
-            (after, before, self._cost(after, probability))
+            (after, before, self._cost(before, after, probability))
             for before, after, probability in graph.edges(data="probability")
             if probability > 0
         )
@@ -89,8 +91,9 @@ class PathToGoal(Policy):
         possible = np.flatnonzero(prior)
         if len(possible) == 1:
             return int(possible[0])
+        here = int(observation["current_primitive"]) if isinstance(observation, Mapping) else HOLD
         ways = {
-            int(action): self._cost(int(action), prior[action]) + self._rest[int(action)]
+            int(action): self._cost(here, int(action), prior[action]) + self._rest[int(action)]
             for action in possible
             if int(action) in self._rest
         }
@@ -98,10 +101,11 @@ class PathToGoal(Policy):
             raise NoPathError(f"none of the legal actions {possible.tolist()} leads to {self.goal}")
         return min(ways, key=lambda action: (ways[action], action))
 
-    def _cost(self, action: int, probability: float) -> float:
+    def _cost(self, before: int, action: int, probability: float) -> float:
         """Return what an action costs; where paths are to be short, each has a high toll."""
         if self.prefer == "quick":
-            return float(self.graph.nodes[action]["duration_s"])
+            way = self.graph.get_edge_data(before, action) or {}
+            return float(way.get("duration_s", self.graph.nodes[action]["duration_s"]))
         surprise = -math.log(probability)
         return surprise if self.prefer == "likely" else 1e6 + surprise
 
@@ -187,9 +191,11 @@ class PathToTask(Policy):
         if self._here == 0 or set(self.graph.successors(self._here)) == shown:
             return
         self.graph, self._ways = self.graph.copy(), {}
+        known = dict(self.graph[self._here])
         self.graph.remove_edges_from(list(self.graph.out_edges(self._here)))
         for after in shown:
-            self.graph.add_edge(self._here, after, probability=float(prior[after]))
+            way = known.get(after, {}) | {"probability": float(prior[after])}
+            self.graph.add_edge(self._here, after, **way)
 
 
 def graph_of_actions(
@@ -220,4 +226,7 @@ def graph_of_actions(
             }
         for after, probability in following.items():
             graph.add_edge(repertoire.slots[id], after, probability=probability)
+            time_s = repertoire.skills.foreknown_s(id, repertoire.primitive(after))
+            if time_s is not None:
+                graph.edges[repertoire.slots[id], after]["duration_s"] = time_s
     return graph

@@ -231,6 +231,10 @@ class Skills:
                 self._transitions_s[key] = self.plan(self.end(before), after).duration_s
             return self._transitions_s[key]
 
+    def foreknown_s(self, before: int, after: int) -> float | None:
+        """Return what `transition_s` does where that was found out before; None elsewhere."""
+        return self._foreknown.transitions_s.get((before, after))
+
     def end(self, id: int | None) -> Reference:
         """Return where a primitive ends; None: where the robot stands at rest."""
         if id is None:
