@@ -14,6 +14,8 @@ from .findings import Findings
 # steps between frames from which on times count less than seconds: 2 ms are 500 Hz
 _FINER = ((1e-3, "milliseconds", 2.0), (1e-6, "microseconds", 2e3), (1e-9, "nanoseconds", 2e6))
 _EVEN = 0.3  # of a frame: what rounding leaves
+_ROUNDED = 0.6  # of the last decimal: rounding leaves a half, the line through all is not exact
+_OFTEN = 5  # frames that would be missing: where they lie as evenly as rounding has it, none is
 _UNEVEN, _MANY = 0.1, 0.2  # a clock jitters if such a share of its steps is off by such a share
 
 
@@ -77,6 +79,10 @@ def even_clock(path: Path, times_s: FloatArray) -> Clock:
         raise bad_file(
             path, "most of the time has no frames", "an even rate with few dropped frames"
         )
+    coarse = (whole < 1).any() or (whole.max() == 2 and (whole == 2).sum() >= _OFTEN)
+    rounded_s = _rounded_step(times_s) if coarse else None
+    if rounded_s is not None:
+        return Clock(1.0 / rounded_s, np.arange(len(times_s), dtype=np.float64), False)
     if (whole < 1).any() and _jitters(times_s):
         rate_hz = (len(times_s) - 1) / (times_s[-1] - times_s[0])
         return Clock(float(rate_hz), (times_s - times_s[0]) * rate_hz, True)
@@ -94,6 +100,21 @@ def even_clock(path: Path, times_s: FloatArray) -> Clock:
     if off.max() <= _EVEN:
         return Clock(rate_hz, index, False)
     return Clock(rate_hz, places, True)
+
+
+def _rounded_step(times_s: FloatArray) -> float | None:
+    """Return the step of even times that were rounded to coarse decimals [s]; None for others."""
+    decimals = next((k for k in range(4) if _whole(times_s * 10.0**k)), None)
+    if decimals is None or len(times_s) < 3:
+        return None
+    index = np.arange(len(times_s), dtype=np.float64)
+    step_s, start_s = np.polyfit(index, times_s - times_s[0], 1)
+    off = np.abs(times_s - times_s[0] - start_s - step_s * index).max()
+    return float(step_s) if off <= _ROUNDED * 10.0**-decimals else None
+
+
+def _whole(values: FloatArray) -> bool:
+    return bool(np.abs(values - np.rint(values)).max() < 1e-6)
 
 
 def _jitters(times_s: FloatArray) -> bool:

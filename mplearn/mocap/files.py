@@ -17,6 +17,7 @@ _MOST_PACKED = 60  # times; tables of measured numbers pack to a half or a tenth
 _SMALL_BYTES = 4_000_000
 _LONGEST_SHOWN = 300  # characters of what a file holds
 _LARGE_BYTES = 8_000_000
+_TELLING = 64  # bytes of plain letters, in which every second one is 0 in UTF-16
 # characters that a line, and a cell, of a large table has at least: more lines of nothing than
 # memory holds are no measurement
 _LEAST_LINE, _LEAST_CELL = 12, 1.6
@@ -129,10 +130,19 @@ def read_text(path: Path) -> str:
 
 
 def _plain(data: bytes) -> bytes:
-    """Return text in UTF-16, which starts with its mark, as UTF-8; anything else as it is."""
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return data.decode("utf-16", errors="replace").encode("utf-8", errors="replace")
-    return data
+    """Return text in UTF-32 or UTF-16, by its mark or its zeros, as UTF-8; others as they are."""
+    start = data[:_TELLING]
+    if data.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)):
+        encoding = "utf-32"
+    elif data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        encoding = "utf-16"
+    elif len(start) > 1 and 0 not in start[::2] and not any(start[1::2]):
+        encoding = "utf-16-le"
+    elif len(start) > 1 and 0 not in start[1::2] and not any(start[::2]):
+        encoding = "utf-16-be"
+    else:
+        return data
+    return data.decode(encoding, errors="replace").encode("utf-8", errors="replace")
 
 
 def _opened(path: Path) -> BufferedIOBase:

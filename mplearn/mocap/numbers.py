@@ -150,6 +150,8 @@ def measured_rows(
     values, lines = array("d"), array("q")
     extra: list[tuple[int, int]] = []
     n_cut = 0
+    ends_early = False
+    row: list[str] = []
     short: tuple[int, int] | None = None  # a row that ends early, and that may be the last one
     for line, row in rows:
         if short is not None:
@@ -170,7 +172,12 @@ def measured_rows(
             cells = [cells[i] for i in columns]
         values.extend(_row(path, cells, line))
         lines.append(line)
+        ends_early = len(row) < n_columns
     else:
+        if cut_off and ends_early and 0 < n_cut < len(lines):  # its last number may be cut, too
+            n_cut -= 1
+            short = lines.pop(), len(row)
+            del values[len(lines) * (n_columns if columns is None else len(columns)) :]
         if short is not None and lines and cut_off:  # the last row of a file that was cut off
             findings.warn(f"the last row, line {short[0]}, is cut off: left out")
             short = None

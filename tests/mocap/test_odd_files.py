@@ -8,12 +8,21 @@ from __future__ import annotations
 
 import gzip
 import re
+import struct
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from mocap_writers import amc_values, bvh_values, write_amc, write_asf, write_bvh, write_mvnx
+from mocap_writers import (
+    amc_values,
+    bvh_values,
+    write_amc,
+    write_asf,
+    write_bvh,
+    write_c3d,
+    write_mvnx,
+)
 
 from mplearn.demonstrator import demonstrate
 from mplearn.errors import InvalidValueError, RecordingError
@@ -100,6 +109,23 @@ def test_what_was_not_seen(
     check(path, points, standing.marker_names)
 
 
+def velocities(text: str) -> str:
+    head, *frames = text.splitlines()
+    name = head.split(",")[1][:-2]
+    more = ",".join(f"{name}_v{axis}" for axis in "xyz")
+    return "\n".join([f"{head},{more}", *(f"{line},1,2,3" for line in frames)]) + "\n"
+
+
+def by_points(text: str, head: str) -> str:
+    """A row for each point that was seen."""
+    names, *frames = (line.split(",") for line in text.splitlines())
+    lines = [head]
+    for time, *values in frames:
+        seen = [i for i in range(0, len(values), 3) if values[i]]
+        lines += [",".join([time, names[1 + i][:-2], *values[i : i + 3]]) for i in seen]
+    return "\n".join(lines) + "\n"
+
+
 def fortran(text: str) -> str:
     return re.sub(r"(\d)e([-+]\d)", r"\1D\2", text)
 
@@ -115,6 +141,19 @@ TABLES: dict[str, Change] = {
     "capital letters": str.upper,
     "blanks behind commas": lambda s: s.replace(",", ", "),
     "byte order mark": lambda s: "\ufeff" + s,
+    "bars": lambda s: s.replace(",", "|"),
+    "a title above": lambda s: "Walk of Anna; 2nd try\n\n" + s,
+    "names and values above": lambda s: "Subject,Anna\nRate,50\nDate,2024-03-01\n\n" + s,
+    "a column without a name": lambda s: s.replace("\n", ",7\n").replace(",7", ",", 1),
+    "quoted names": lambda s: re.sub(r"(\w+)_x,\1_y,\1_z", r"'\1'_x,'\1'_y,'\1'_z", s),
+    "positions": lambda s: re.sub(r"_([xyz])\b", r"_pos_\1", s),
+    "coordinates": lambda s: re.sub(r"_([xyz])\b", r".coord.\1", s),
+    "axes in the middle": lambda s: re.sub(r"_([xyz])\b", r"_\1_coord", s),
+    "axes in brackets": lambda s: re.sub(r"_([xyz])\b", r".pos[\1]", s),
+    "axes of translations": lambda s: re.sub(r"_([xyz])\b", r"_T\1", s),
+    "velocities too": velocities,
+    "long, axes named": lambda s: by_points(s, "time,marker,pos_x,pos_y,pos_z"),
+    "long, with units": lambda s: by_points(s, "time,Marker Name,X (mm),Y (mm),Z (mm)"),
 }  # fmt: skip
 
 
@@ -140,6 +179,47 @@ def test_a_rate_above_the_table(
 
 
 @pytest.mark.parametrize(
+    ("name", "beside"),
+    [
+        ("walk_50hz.csv", ""),
+        ("walk-50fps-3.csv", ""),
+        ("a.csv", '{"SamplingFrequency": 50, "TaskName": "walk"}'),
+        ("a.csv", '{"frame_rate": 50.0}'),
+    ],
+)
+def test_a_rate_beside_the_table(
+    tmp_path: Path, standing: Recording, points: np.ndarray, name: str, beside: str
+) -> None:
+    path = tmp_path / name
+    path.write_text(table(points, standing.marker_names, clock=str).replace("time", "frame", 1))
+    for unreadable in (beside, "[50]", "{", "") if beside else ("",):
+        if unreadable:
+            path.with_suffix(".json").write_text(unreadable)
+        if unreadable == beside:
+            check(path, points, standing.marker_names, "50 Hz, as")
+        else:
+            with pytest.raises(RecordingError, match="no rate"):
+                open_recording(path)
+
+
+def test_a_column_says_the_rate(tmp_path: Path, standing: Recording, points: np.ndarray) -> None:
+    text = table(points, standing.marker_names, clock=lambda i: "50")
+    path = tmp_path / "a.csv"
+    path.write_text(text.replace("time", "fps", 1))
+    check(path, points, standing.marker_names)
+
+
+def test_numbered_axes_are_not_taken_for_markers_silently(
+    tmp_path: Path, standing: Recording, points: np.ndarray
+) -> None:
+    path = tmp_path / "a.csv"
+    text = table(points, standing.marker_names)
+    path.write_text(re.sub(r"_([xyz])\b", lambda m: f"_{'xyz'.index(m[1])}", text))
+    report = open_recording(path).report
+    assert report is not None and any("end their names in _x" in x for x in report.warnings)
+
+
+@pytest.mark.parametrize(
     ("clock", "name"),
     [
         (lambda i: f"00:00:{i / 50:06.3f}", "time"),
@@ -147,6 +227,9 @@ def test_a_rate_above_the_table(
         (lambda i: f"{1.7e9 + i / 50:.3f}", "timestamp"),
         (lambda i: str(1_700_000_000_000 + 20 * i), "timestamp"),
         (lambda i: str(1_700_000_000_000_000_000 + 20_000_000 * i), "timestamp"),
+        (lambda i: f"2024-03-01 10:00:{i / 50:09.6f}", "datetime"),
+        (lambda i: f"{1.7e9 + i / 50:.3f}", "epoch"),
+        (lambda i: f"{1.7e12 + 20.0 * i:.0f}", "unix_time_ms"),
     ],
 )
 def test_clocks(
@@ -165,6 +248,29 @@ def test_a_table_that_was_cut_off(tmp_path: Path, standing: Recording, points: n
     path.write_text(table(points, standing.marker_names).replace(",", "", 200))
     with pytest.raises(RecordingError):
         open_recording(path)
+
+
+def test_a_row_that_was_cut_off_between_cells_does_not_count(
+    tmp_path: Path, standing: Recording, points: np.ndarray
+) -> None:
+    for kind, text in (("csv", table), ("trc", trc)):
+        path = tmp_path / f"a.{kind}"
+        whole = text(points, standing.marker_names)
+        separator = "\t" if kind == "trc" else ","
+        path.write_text(separator.join(whole.rstrip("\n").split(separator)[:-6])[:-2])
+        check(path, points[:-1], standing.marker_names, "cut off")
+
+
+@pytest.mark.parametrize("rate_hz", [30.0, 60.0, 75.0])
+def test_times_with_two_decimals_do_not_jitter(
+    tmp_path: Path, standing: Recording, points: np.ndarray, rate_hz: float
+) -> None:
+    path = tmp_path / "a.csv"
+    names = standing.marker_names
+    path.write_text(table(points, names, clock=lambda i: f"{i / rate_hz:.2f}"))
+    recording = open_recording(path)
+    assert recording.rate_hz == pytest.approx(rate_hz, rel=2e-3)
+    assert recording.markers == pytest.approx(points, abs=1e-5, nan_ok=True)
 
 
 def test_between_blanks_a_missing_cell_is_not_guessed(
@@ -203,7 +309,9 @@ def test_trc(tmp_path: Path, standing: Recording, points: np.ndarray, kind: str)
     check(path, points, standing.marker_names, "taken as mm" if kind == "wrong unit" else "")
 
 
-@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])
+@pytest.mark.parametrize(
+    "encoding", ["utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32", "latin-1"]
+)
 @pytest.mark.parametrize("packed", [False, True])
 def test_encodings(
     tmp_path: Path, standing: Recording, points: np.ndarray, encoding: str, packed: bool
@@ -222,6 +330,11 @@ def rows(text: str, change: Change) -> str:
 def counted(text: str, step: float) -> str:
     n = iter(range(1000))
     return rows(text, lambda line: f"{step * next(n):g} {line}")
+
+
+def short(match: re.Match[str]) -> str:
+    """Xposition -> TX, Zrotation -> RZ."""
+    return ("T" if match[2] == "p" else "R") + match[1]
 
 
 def radians(text: str) -> str:
@@ -247,6 +360,8 @@ BVH: dict[str, tuple[Change, str]] = {
     "milliseconds named": (lambda s: s.replace("Time: 0.01", "Time: 10 ms"), ""),
     "seconds named": (lambda s: s.replace("Time: 0.01", "Time: 0.01s"), ""),
     "Fortran": (lambda s: s.replace("Time: 0.01", "Time: 1.0D-02"), ""),
+    "channels in short": (lambda s: re.sub("([XYZ])([pr])[a-z]+ion", short, s), ""),
+    "remarks": (lambda s: s.replace("JOINT", "# below\n  // it\n JOINT"), ""),
     "semicolons": (lambda s: rows(s, lambda line: line.replace(" ", "; ")), ""),
     "commas between channels": (lambda s: s.replace("Xrotation ", "Xrotation, "), ""),
     "short names of channels": (lambda s: re.sub("(pos|rot)(ition|ation)", r"\1", s), ""),
@@ -304,6 +419,53 @@ def test_an_amc_in_radians_that_does_not_say_so(tmp_path: Path) -> None:
     found = open_recording(path)
     assert found.frames == pytest.approx(plain.frames, abs=1e-9)
     assert found.report is not None and any("radians" in x for x in found.report.warnings)
+
+
+def test_an_mvnx_file_with_decimal_commas(tmp_path: Path) -> None:
+    path = write_mvnx(tmp_path / "a.mvnx")
+    plain = open_recording(path, positions=True)
+    path.write_text(re.sub(r"(-?\d)\.(\d{9})", r"\1,\2", path.read_text()))
+    found = open_recording(path, positions=True)
+    assert found.rate_hz == plain.rate_hz
+    assert found.frames == pytest.approx(plain.frames, abs=1e-12)
+
+
+@pytest.mark.parametrize("unit", ["", "N/A", "unknown", "mm/deg", "[mm]"])
+def test_units_of_c3d_that_say_little(
+    tmp_path: Path, standing: Recording, points: np.ndarray, unit: str
+) -> None:
+    names = list(standing.marker_names)
+    path = write_c3d(tmp_path / "a.c3d", points, names=names, rate_hz=50.0, units=unit)
+    check(path, points, standing.marker_names)
+
+
+def test_a_c3d_without_a_rate_names_the_option(
+    tmp_path: Path, standing: Recording, points: np.ndarray
+) -> None:
+    names = list(standing.marker_names)
+    for name in ("a.c3d", "walk_50Hz.c3d"):
+        path = write_c3d(tmp_path / name, points, names=names, rate_hz=50.0)
+        data = bytearray(path.read_bytes())
+        for at in [m.start() for m in re.finditer(re.escape(struct.pack("<f", 50.0)), data)]:
+            data[at : at + 4] = bytes(4)
+        path.write_bytes(data)
+        if name == "a.c3d":
+            with pytest.raises(RecordingError, match=r"RATE.*rate_hz="):
+                open_recording(path)
+            assert open_recording(path, hints=Hints(rate_hz=50.0)).rate_hz == 50.0
+        else:
+            check(path, points, standing.marker_names, "50 Hz, as the file's name says")
+
+
+def test_frames_that_16_bits_cannot_count_are_counted(tmp_path: Path) -> None:
+    points = np.random.default_rng(0).normal(1.0, 0.3, (65_600, 4, 3))
+    path = write_c3d(tmp_path / "a.c3d", points, names=list("abcd"), rate_hz=100.0)
+    data = bytearray(path.read_bytes())
+    assert struct.unpack_from("<2H", data, 6) == (1, 65_535)
+    at = data.index(b"FRAMES", 512)  # what says more is taken away
+    data[at : at + 6] = b"FLAMES"
+    path.write_bytes(data)
+    assert len(open_recording(path, hints=Hints(unit_m=0.001, up_axis="z"))) == len(points)
 
 
 @pytest.mark.parametrize("cut", [5, 300, 1200])

@@ -15,6 +15,7 @@ from ..findings import Findings
 from ..numbers import measured_rows, not_seen
 from ..options import option
 from ..placing.space import Space, placed
+from ..rates import rate_beside
 from ..reader import Hints
 from .names import chosen_names
 from .sheet import Sheet
@@ -140,6 +141,8 @@ def _clock(path: Path, block: Block, clocks: FloatArray, findings: Findings) -> 
 def _rate(path: Path, said_hz: float | None, clock: Clock, findings: Findings) -> float:
     said = said_hz if said_hz is not None and 0 < said_hz < np.inf else None
     measured = clock.rate_hz if clock.rate_hz > 0 else None
+    if said is None and measured is None and (beside := rate_beside(path, findings)):
+        return beside
     if said is None and measured is None:
         raise bad_file(path, "no rate", f"a rate, times, or {option('rate_hz')}")
     if said is None or measured is None:

@@ -11,8 +11,10 @@ from ...errors import InvalidValueError
 from ...recording import FloatArray, Recording, marker_channels
 from ..files import bad_file, read_bytes, stem
 from ..findings import Findings
-from ..placing.size import UNITS_M, named_unit
+from ..options import option
+from ..placing.size import said_unit
 from ..placing.space import Space, placed, to_z_up
+from ..rates import rate_beside
 from ..reader import Hints, Reader
 from .c3d_file import C3DContent, parse_c3d
 from .names import chosen_names
@@ -104,8 +106,12 @@ def _bone_axes(points: FloatArray, labels: list[str]) -> set[str]:
 def _rate(path: Path, content: C3DContent, findings: Findings) -> float:
     said = [float(rate) for rate in content.numbers("POINT", "RATE")[:1]]
     rates = [rate for rate in (*said, content.rate_hz) if 0.0 < rate < np.inf]
+    if not rates and (beside := rate_beside(path, findings)):
+        return beside
     if not rates:
-        raise bad_file(path, f"POINT:RATE is {said or 'missing'}", "a positive number [1/s]")
+        raise bad_file(
+            path, f"POINT:RATE is {said or 'missing'}", f"a rate [1/s], or {option('rate_hz')}"
+        )
     if len(rates) == 2 and abs(rates[0] - rates[1]) > 0.01 * rates[0]:
         findings.warn(
             f"POINT:RATE says {rates[0]:g} Hz and is used, the header says {rates[1]:g} Hz"
@@ -115,9 +121,7 @@ def _rate(path: Path, content: C3DContent, findings: Findings) -> float:
 
 def _space(path: Path, hints: Hints, content: C3DContent) -> Space:
     text = next(iter(content.texts("POINT", "UNITS")), "")
-    unit = named_unit(text)
-    if unit is None and text and hints.unit_m is None:
-        raise bad_file(path, f"unit of length {text!r}", f"one of {', '.join(UNITS_M)}")
+    unit = said_unit(path, text, hints)
     up = next(iter(content.texts("POINT", "Y_SCREEN")), "").lower().removeprefix("+")
     forward = next(iter(content.texts("POINT", "X_SCREEN")), "").lower().removeprefix("+")
     says_unit = unit is not None

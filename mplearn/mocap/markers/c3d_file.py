@@ -89,7 +89,8 @@ def parse_c3d(path: Path, data: bytes) -> C3DContent:
     )
     width, real = 4 * n_points + n_analog, scale < 0.0
     n_bytes = width * (4 if real else 2)
-    said, n_frames = _frame_count(content, last - first + 1, n_bytes, len(data) - begin)
+    n_used = len(data.rstrip(b"\0")) - begin
+    said, n_frames = _frame_count(content, last - first + 1, n_bytes, len(data) - begin, n_used)
     if n_frames < 1:
         raise bad_file(
             path, f"{said} frames, {len(data)} of {begin + said * n_bytes} bytes", _EXPECTED
@@ -158,12 +159,13 @@ def _reals(raw: bytes, processor: int) -> FloatArray:
 
 
 def _frame_count(
-    content: C3DContent, in_header: int, n_bytes: int, n_there: int
+    content: C3DContent, in_header: int, n_bytes: int, n_there: int, n_used: int
 ) -> tuple[int, int]:
     """Return how many frames the file says it holds, and how many to read.
 
     The header's 16 bits do not hold numbers from 65,536 on; of what other places say, that counts
-    which fills the file to its last block.
+    which fills the file to its last block. Where none says more than 16 bits hold, all that is
+    there may be frames.
     """
     ends = [content.numbers("TRIAL", f"ACTUAL_{end}_FIELD") for end in ("START", "END")]
     counts = [int(count) for count in content.numbers("POINT", "LONG_FRAMES")[:1] if count > 0]
@@ -171,6 +173,8 @@ def _frame_count(
         first, last = (low % 65536 + 65536 * (high % 65536) for low, high in ends)
         counts.append(int(last - first) + 1)
     counts += [int(count) % 65536 for count in content.numbers("POINT", "FRAMES")[:1]]
+    if in_header == 65535 and n_bytes > 0:
+        counts.append(-(-n_used // n_bytes))
     counts = [count for count in (*counts, in_header) if 0 < count < 2**32]
     if n_bytes <= 0 or not counts:
         return max(in_header, 0), 0

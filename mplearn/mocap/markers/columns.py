@@ -38,6 +38,9 @@ _AXES = (
         rf"(?P<name>.+?){_SEP}+(?:pos|position|loc|t|translate)?{_SEP}*(?P<axis>[xyz])$", re.I
     ),
     re.compile(r"(?P<name>.+?)\s*[\[(](?P<axis>[xyz])[\])]$", re.I),
+    re.compile(
+        rf"(?P<name>.+?){_SEP}+(?P<axis>[xyz]){_SEP}+(?:coord(?:inate)?|pos(?:ition)?)$", re.I
+    ),
     re.compile(r"(?P<name>.+?)(?P<axis>[xyz])$", re.I),
     re.compile(rf"(?:(?:pos|position){_SEP}+)?(?P<axis>[xyz]){_SEP}?(?P<name>.+)$", re.I),
 )  # fmt: skip
@@ -45,7 +48,12 @@ _AXES = (
 _NO_POSITION = frozenset((
     "r", "rot", "rotation", "q", "quat", "quaternion", "ori", "orient", "orientation", "ang",
     "angle", "angles", "euler", "vel", "velocity", "acc", "acceleration", "gyro", "mag", "force",
-    "moment", "torque", "grf", "cop", "power", "scale",
+    "moment", "torque", "grf", "cop", "power", "scale", "omega",
+))
+_OF_A_MARKER = frozenset(("v", "a", "w", "d", "f", "m", "s", "std", "sd", "var", "err", "error"))
+_DECORATION = frozenset((
+    "pos", "position", "positions", "coord", "coords", "coordinate", "coordinates", "loc",
+    "location", "trans", "translation", "translate", "t", "p", "tr", "point", "xyz",
 ))
 # fmt: on
 _CONFIDENCE = re.compile(
@@ -53,10 +61,15 @@ _CONFIDENCE = re.compile(
     r"reprojection_?error|v|c|p)\d*$",
     re.I,
 )
+_WHOSE_TIME = (
+    r"(?:unix|epoch|system|host|device|sensor|ros|capture|recording|video|relative|rel|absolute|abs|"
+    r"utc|local|date)"
+)
 _TIME = re.compile(
-    rf"(time|times|zeit|temps|tiempo|tempo|tijd|timestamps?|time{_SEP}?stamps?|t|elapsed|elapsed{_SEP}?time|clock|secs?|seconds|"
-    rf"ms|msec|milliseconds)({_SEP}?(s|secs?|seconds?|ms|msecs?|milliseconds|us|microseconds|ns|"
-    r"nanoseconds|mean|unix))*$",
+    rf"(?:{_WHOSE_TIME}{_SEP}?)*"
+    rf"(time|times|zeit|temps|tiempo|tempo|tijd|zeitstempel|timestamps?|time{_SEP}?stamps?|t|unix|"
+    rf"epoch|elapsed|elapsed{_SEP}?time|clock|secs?|seconds|ms|msec|milliseconds)"
+    rf"({_SEP}?(s|secs?|seconds?|ms|msecs?|milliseconds|us|microseconds|ns|nanoseconds|mean|unix))*$",
     re.I,
 )
 _TIME_UNITS = {
@@ -69,6 +82,11 @@ _FRAME = re.compile(
     rf"(unnamed: ?0|#|index|idx|row|sample|samples|field)$|(sub)?{_SEP}?frames?{_SEP}?"
     rf"(#|no\.?|nr\.?|num|number|index|idx|id|count)?$|(sample|field|row|item){_SEP}?"
     r"(#|no\.?|num|number|index|idx)$",
+    re.I,
+)
+_RATE = re.compile(rf"fps|(?:(?:frame|sampling|sample|capture){_SEP}?)rate({_SEP}?(hz|fps))?", re.I)
+_PLACE = re.compile(
+    rf"(?:(?:pos|position|coord|loc|location|t|p){_SEP}?)?([xyz])(?:{_SEP}?(?:pos|position|coord))?",
     re.I,
 )
 _TEXTS = ("label", "segment", "person")
@@ -93,6 +111,7 @@ class Columns:
         doubled: Names of markers that come more than once; the first counts.
         confidences: How sure a landmark is; no measurement.
         points: Column that names the point of each row, where each row is one point.
+        rates: Columns that say the rate.
     """
 
     names: tuple[str, ...]
@@ -104,12 +123,19 @@ class Columns:
     doubled: tuple[str, ...]
     confidences: tuple[int, ...]
     points: int | None
+    rates: tuple[int, ...] = ()
 
     @property
     def measured(self) -> list[int]:
         """Columns that may be measurements."""
         other = {*self.times, *self.frames, *self.texts.values(), *self.confidences, self.points}
+        other |= {*self.rates, *self.nameless}
         return [i for i in range(len(self.names)) if i not in other]
+
+    @property
+    def nameless(self) -> list[int]:
+        """Columns that have no name, among others that have."""
+        return [i for i, name in enumerate(self.names) if not name and i not in self.frames]
 
     def time_unit_s(self, column: int) -> float | None:
         """Return the unit of a column of times [s], if its header says it."""
@@ -132,13 +158,16 @@ def meaning_of(header: Sequence[str]) -> Columns:
         if i not in special and (_FRAME.fullmatch(name) or (not name and i == 0))
     ]
     special |= set(frames)
-    free = [i for i in range(len(names)) if i not in special]
-    axes = {names[i].lower(): i for i in free}
+    rates = [i for i, name in enumerate(names) if i not in special and _RATE.fullmatch(name)]
+    free = [i for i in range(len(names)) if i not in {*special, *rates}]
+    axes = {i: match[1].lower() for i in free if (match := _PLACE.fullmatch(names[i]))}
     points = [i for i in free if _POINTS.fullmatch(names[i])]
-    if points and {"x", "y", "z"} <= axes.keys():
+    if points and sorted(axes.values()) == ["x", "y", "z"]:
         # a row for each point; names tell more than numbers
         best = min(points, key=lambda i: names[i].lower().endswith(("id", "index")))
-        return Columns(names, units, tuple(times), tuple(frames), texts, {}, (), (), best)
+        names = tuple(axes.get(i, name) for i, name in enumerate(names))
+        ways = tuple(times), tuple(frames), texts
+        return Columns(names, units, *ways, {}, (), (), best, tuple(rates))
     markers, doubled = _markers(names, free)
     used = {i for columns in markers.values() for i in columns}
     confidences = [i for i in free if i not in used and _CONFIDENCE.fullmatch(names[i])]
@@ -152,7 +181,25 @@ def meaning_of(header: Sequence[str]) -> Columns:
         doubled,
         tuple(confidences) if markers else (),
         None,
+        tuple(rates),
     )
+
+
+def numbered_triples(names: Sequence[str]) -> list[str]:
+    """Return names of columns that come in threes, ``LFHD_0, LFHD_1, LFHD_2``, if most do.
+
+    Example:
+        >>> numbered_triples(["a_1", "a_2", "a_3", "b_1", "b_2", "b_3"])
+        ['a_1, a_2, a_3', 'b_1, b_2, b_3']
+        >>> numbered_triples(["hip", "knee_1"])
+        []
+    """
+    groups: defaultdict[str, list[str]] = defaultdict(list)
+    for name in names:
+        if match := re.fullmatch(rf"(.+?){_SEP}?[0-3]", name):
+            groups[match[1]].append(name)
+    triples = [", ".join(group) for group in groups.values() if len(group) == 3]
+    return triples if 6 * len(triples) > len(names) else []
 
 
 def angle_factor(unit: str) -> float | None:
@@ -198,8 +245,32 @@ def _markers(
                 doubled.append(name)
             markers.setdefault(name, (axes["x"][0], axes["y"][0], axes["z"][0]))
             left = [i for i in left if i not in {i for each in axes.values() for i in each}]
-    order = sorted(markers.items(), key=lambda item: min(item[1]))
-    return dict(order), tuple(doubled)
+    order = dict(sorted(markers.items(), key=lambda item: min(item[1])))
+    derived = {
+        name
+        for name in order
+        if _last_word(name) in _OF_A_MARKER and re.sub(rf"{_SEP}+\w+$", "", name) in order
+    }
+    plain = _undecorated([name for name in order if name not in derived])
+    kept = (columns for name, columns in order.items() if name not in derived)
+    return dict(zip(plain, kept, strict=True)), tuple(doubled)
+
+
+def _undecorated(names: list[str]) -> list[str]:
+    """Return names without the words and quotes that all of them begin or end with."""
+    ways = (
+        (rf"(\w+){_SEP}+(.+)", 1, 2),
+        (rf"(.+?){_SEP}+(\w+)", 2, 1),
+        (r"(['\"])(.+)\1", 0, 2),
+    )
+    for pattern, word, rest in ways:
+        matches = [re.fullmatch(pattern, name) for name in names]
+        words = {match[word].lower() for match in matches if match} if word else set()
+        known = len(words) == 1 and words <= _DECORATION if word else True
+        short = [match[rest] for match in matches if match]
+        if len(names) >= 3 and len(short) == len(set(short)) == len(names) and known:
+            names = short
+    return names
 
 
 def _last_word(name: str) -> str:

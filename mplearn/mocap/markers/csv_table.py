@@ -3,8 +3,9 @@
 The separator is a comma, semicolon, tab or white space; decimals have a point or a comma; an empty
 cell, ``NaN``, ``NA`` or ``null`` is a missing measurement. Special names, in any spelling, are:
 
-* ``time``, ``time_s``, ``t``, ``timestamp``, ``Time (ms)``, ...: when; without such a column
-  `Hints.rate_hz` is needed;
+* ``time``, ``time_s``, ``t``, ``timestamp``, ``Time (ms)``, ...: when; without such a column a line
+  above (``fps, 50``), a column ``fps``, the file's name (``walk_50hz.csv``), a JSON file of that
+  name or `Hints.rate_hz` must say the rate;
 * ``frame``, ``Frame#``, ``index``, ...: numbers of frames, which are no measurement;
 * ``label``: class of the motion; consecutive rows with the same one are a `LabelledSegment`, rows
   without one belong to none;
@@ -38,8 +39,9 @@ from ..numbers import measured_rows, not_seen
 from ..options import option
 from ..placing.size import named_unit
 from ..placing.space import Space, placed
+from ..rates import rate_beside
 from ..reader import Hints, Reader
-from .columns import MEDIAPIPE_POSE, Columns, angle_factor, meaning_of
+from .columns import MEDIAPIPE_POSE, Columns, angle_factor, meaning_of, numbered_triples
 from .names import chosen_names
 from .sheet import Header, Sheet, find_header, is_number
 
@@ -76,7 +78,7 @@ class CSVReader(Reader):
         if columns.points is not None:
             table = _by_points(path, table, columns)
         person = _person(path, table)
-        rate_hz, clock = _clock(path, table, header.rate_hz, hints, findings)
+        rate_hz, clock = _clock(path, table, header.rate_hz or table.rate_hz, hints, findings)
         index = np.rint(clock.places).astype(np.int64)
         values = clock.even(table.values)
         labels = _segments(table.texts, index, person)
@@ -122,6 +124,7 @@ class _Table:
         times: Columns of times [any unit], each of shape (T,), with their unit [s] if it is said.
         numbers: Numbers of the frames, shape (T,); None where there are none.
         texts: Columns of texts by name, each of length T.
+        rate_hz: What a column says of the rate [1/s], if one does.
     """
 
     values: FloatArray
@@ -131,13 +134,14 @@ class _Table:
     times: tuple[tuple[FloatArray, float | None], ...]
     numbers: FloatArray | None
     texts: dict[str, list[str]]
+    rate_hz: float | None = None
 
 
 def _check_names(path: Path, columns: Columns) -> None:
-    plain = [name for i, name in enumerate(columns.names) if i not in columns.frames]
-    marked = {i for c in columns.markers.values() for i in c}
-    single = [n for i, n in enumerate(columns.names) if i not in marked and i not in columns.frames]
-    if not all(plain) or (len(set(single)) != len(single) and not columns.doubled):
+    special = {i for c in columns.markers.values() for i in c} | {*columns.frames}
+    single = [name for i, name in enumerate(columns.names) if name and i not in special]
+    unnamed = columns.nameless and not columns.markers
+    if unnamed or (len(set(single)) != len(single) and not columns.doubled):
         raise bad_file(path, f"columns named {list(columns.names[:6])}", "names, each different")
 
 
@@ -160,7 +164,11 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
         wanted = [next(i for i in measured if columns.names[i].lower() == a) for a in "xyz"]
     else:
         wanted = measured
-    clocks = [i for i in (*columns.times, *columns.frames) if i not in textual.values()]
+    clocks = [*columns.times, *columns.frames, *columns.rates]
+    clocks = [i for i in clocks if i not in textual.values()]
+    if columns.nameless:
+        findings.leave_out(["(no name)"] * len(columns.nameless))
+        findings.note(f"{len(columns.nameless)} columns without a name left out")
 
     def rows() -> Iterator[tuple[int, list[str]]]:
         for line, cells in sheet.rows(header.start):
@@ -204,10 +212,17 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
         tuple(times),
         found[:, place[numbers[0]]] if numbers else None,
         texts,
+        _even_rate(found[:, [place[i] for i in columns.rates]]),
     )
     if are_markers:
         return _of_markers(table, columns, findings)
     return table if columns.points is not None else _in_si(table, wanted, columns, findings)
+
+
+def _even_rate(said: FloatArray) -> float | None:
+    """Return the rate that a column says in every row [1/s], if one does."""
+    even = [float(column[0]) for column in said.T if (column == column[0]).all()]
+    return even[0] if even and 0 < even[0] < np.inf else None
 
 
 def _of_markers(table: _Table, columns: Columns, findings: Findings) -> _Table:
@@ -233,7 +248,13 @@ def _in_si(table: _Table, wanted: list[int], columns: Columns, findings: Finding
     for k, text in enumerate(said):
         values[:, k] *= angle_factor(text) or named_unit(text) or 1.0
     reach = np.nanmax(np.abs(values), initial=0.0)
-    if not any(said) and reach > 2 * _TURN:
+    triples = numbered_triples([columns.names[i] for i in wanted])
+    if triples:
+        findings.warn(
+            f"columns like {triples[0]} are taken as angles or places of their own; if the three "
+            "are where a marker is, end their names in _x, _y and _z"
+        )
+    elif not any(said) and reach > 2 * _TURN:
         findings.note(
             f"the columns reach up to {reach:.4g} and are taken as radians and metres; if they are "
             "degrees or millimetres, write (deg) or (mm) behind their names"
@@ -300,6 +321,7 @@ def _by_points(path: Path, table: _Table, columns: Columns) -> _Table:
         tuple((times[first], unit_s) for times, unit_s in table.times),
         None if table.numbers is None else table.numbers[first],
         texts,
+        table.rate_hz,
     )
 
 
@@ -325,8 +347,9 @@ def _clock(
         clock = _by_numbers(path, table.numbers)
     else:
         clock = Clock(np.nan, np.arange(len(table.values), dtype=np.float64), False)
-    rate_hz = hints.rate_hz or (clock.rate_hz if clock.rate_hz > 0 else said_hz or np.nan)
-    if not 0 < rate_hz < np.inf:
+    rate_hz = hints.rate_hz or (clock.rate_hz if clock.rate_hz > 0 else said_hz)
+    rate_hz = rate_hz or rate_beside(path, findings)
+    if rate_hz is None or not 0 < rate_hz < np.inf:
         raise bad_file(path, "no rate", f"a column 'time' [s], or {option('rate_hz')}")
     return rate_hz, clock
 

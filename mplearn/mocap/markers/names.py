@@ -11,7 +11,9 @@ from ..files import bad_file
 from ..findings import Findings
 
 # how systems call trajectories that they could not identify
-_UNIDENTIFIED = re.compile(r"\*\d*|unlabell?ed.*|uname\*?\d*|unidentified.*", re.I)
+_UNIDENTIFIED = re.compile(
+    r"[-*~?.]+\d*|un(?:labell?ed|named|ident(?:ified)?|known)\b.*|uname\*?\d*|new[ _]\d+", re.I
+)
 _SEPARATORS = ":|"
 
 

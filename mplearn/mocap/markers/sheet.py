@@ -47,17 +47,18 @@ class Sheet:
     cut_off: bool = False
 
     @classmethod
-    def of(cls, path: Path, text: str, separators: str = ",;\t") -> Sheet:
+    def of(cls, path: Path, text: str, separators: str = ",;\t|") -> Sheet:
         """Return a text as a table; what separates its cells is found out."""
         lines = text.splitlines()
         if lines and (said := _SEPARATOR.fullmatch(lines[0].strip())):  # for Excel
             lines[0] = ""
             separators = said[1] or "\t"
         some = [line for line in lines[:_LOOK] if line.strip()]
-        # the first line that has any tells: names hold no separators, numbers may hold commas
-        telling = next((line for line in some if any(s in line for s in separators)), "")
-        bare = re.sub(r'"[^"]*"', "", telling)  # a quoted name may hold any of them
-        separator = max(separators, key=bare.count) if telling else ""
+        bare = [re.sub(r'"[^"]*"', "", line) for line in some]  # a quoted name may hold any of them
+        # the first line that has many tells: names hold no separators, numbers may hold commas
+        most = [max(map(line.count, separators)) for line in bare]
+        telling = next((t for t, n in zip(bare, most, strict=True) if 0 < max(most) <= 2 * n), "")
+        separator = max(separators, key=telling.count) if telling else ""
         sheet = cls(path, lines, separator, False)
         cells = [cell for i in range(min(len(lines), _LOOK)) for cell in sheet.cells(i)]
         commas = sum(bool(_DECIMAL_COMMA.fullmatch(cell)) for cell in cells)
@@ -148,9 +149,10 @@ def find_header(sheet: Sheet) -> Header:
             start = line
             break
         if line == 0 or not above:
-            narrow = 2 * len(cells) < _width_below(sheet, line)
+            width = _width_below(sheet, line)
             said = _RATE.search(sheet.lines[line])
-            if narrow and (cells[0][:1] in _COMMENT or said):
+            remark = cells[0][:1] in _COMMENT or said or not _data_follow(sheet, line, width)
+            if 4 * sum(map(bool, cells)) < width and remark:
                 rate_hz = float(said[1]) if said else rate_hz
                 continue  # a remark, not the names
             cells = _uncommented(cells)
@@ -177,13 +179,20 @@ def _width_below(sheet: Sheet, line: int) -> int:
     return max((len(sheet.cells(k)) for k in below), default=0)
 
 
+def _data_follow(sheet: Sheet, line: int, width: int) -> bool:
+    """Whether the next line that is not empty holds as many numbers as the table is wide."""
+    below = range(line + 1, min(len(sheet.lines), line + _LOOK))
+    after = next((k for k in below if sheet.lines[k].strip()), None)
+    return after is not None and sheet.is_data(after) and 2 * len(sheet.cells(after)) > width
+
+
 def _joined_names(above: list[list[str]]) -> tuple[str, ...]:
     axes = next((i for i, row in enumerate(above) if i and _names_axes(row)), None)
     if axes is None:
         names = above[0]
         if len(above) > 1 and _names_units(above[1]):
             pairs = zip_longest(names, above[1][: len(names)], fillvalue="")
-            names = [f"{name} ({unit})" if unit else name for name, unit in pairs]
+            names = [_with_unit(name, unit) for name, unit in pairs]
         width = max((i + 1 for i, name in enumerate(names) if name), default=0)
         return tuple(names[:width])
     names, letters = above[axes - 1], above[axes]
@@ -194,10 +203,14 @@ def _joined_names(above: list[list[str]]) -> tuple[str, ...]:
         current = name or current
         axis = letter[:1].lower() if _AXIS.fullmatch(letter) else ""
         own = f"{current}.{axis}" if axis else letter or name
-        joined.append(f"{own} ({unit})" if unit and own else own)
+        joined.append(_with_unit(own, unit))
     while joined and not joined[-1]:
         joined.pop()
     return tuple(joined)
+
+
+def _with_unit(name: str, unit: str) -> str:
+    return f"{name} ({unit.strip('[]()')})" if unit and name else name
 
 
 def _names_axes(row: list[str]) -> bool:

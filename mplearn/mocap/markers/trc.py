@@ -13,7 +13,7 @@ from ..clock import even_clock, in_seconds
 from ..files import bad_file, cmu_subject, read_text, stem
 from ..findings import Findings
 from ..numbers import measured_rows, not_seen, number
-from ..placing.size import UNITS_M, named_unit
+from ..placing.size import said_unit
 from ..placing.space import Space, placed
 from ..reader import Hints, Reader
 from .columns import meaning_of
@@ -196,7 +196,5 @@ def _in_time(
 
 def _space(path: Path, header: _Header, hints: Hints) -> Space:
     text = header.values.get("units", "")
-    unit = named_unit(text)
-    if unit is None and text and hints.unit_m is None:
-        raise bad_file(path, f"unit of length {text!r}", f"one of {', '.join(UNITS_M)}")
+    unit = said_unit(path, text, hints)
     return Space(unit or 0.001, "y", "x", says_unit=unit is not None)

@@ -6,11 +6,16 @@ points spread otherwise. A unit that the file names wins as long as a person can
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from ...recording import FloatArray
+from ..files import bad_file
+from ..options import option
+from ..reader import Hints
 from .part_names import LINKS_M, place_of
 
 UNITS_M = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
@@ -20,11 +25,13 @@ CMU_UNIT_M = 0.0254 / 0.45
 """Unit of the CMU database's skeletons, and of most conversions of it [m]."""
 
 _COMMON = (1.0, 0.001, 0.01)
-_OTHERS = (0.0254, CMU_UNIT_M, 0.3048, 0.1)
+_RARE = {CMU_UNIT_M: 2.5, 0.0254: 3.0, 0.3048: 4.0, 0.1: 5.0}  # against units that few use [nat]
 _LOOK = 200  # frames
 
 # how large a person may be against one of 1.75 m: a toddler to a giant, markers off the joints
 _PEOPLE = (0.4, 1.4)
+_VARY = 0.3  # of the logarithm of their size
+_IN_DOUBT = 2.0  # nat
 # how far the points may spread against the markers of a whole person: a hand to two people afar
 _SPREADS = (0.06, 8.0)
 _USUAL_SPREAD_M = 0.45
@@ -40,42 +47,72 @@ class Unit:
         fits: Whether a person, or a part of one, can be meant by it.
         contradicts: Whether it is another than the one declared.
         doubtful: Whether the points would be few, or far apart, of a person.
+        rival_m: Another unit that would fit nearly as well [m]: a child, or an adult in inches.
     """
 
     unit_m: float
     fits: bool
     contradicts: bool
     doubtful: bool = False
+    rival_m: float | None = None
 
 
-def find_unit(points: FloatArray, names: tuple[str, ...], declared_m: float) -> Unit:
+def find_unit(
+    points: FloatArray, names: tuple[str, ...], declared_m: float, *, says_so: bool = True
+) -> Unit:
     """Return the unit of length in which points are a person's.
 
     Args:
         points: Markers or joint centres in the file's unit, shape (T, M, 3); NaN where missing.
         names: Their names, length M; hints.
         declared_m: The unit that the file, or its format, says [m].
+        says_so: Whether the file itself says it, not only its format.
     """
     adult_m = _unit_of_an_adult(points, names)
     if adult_m is not None:
-        low, high = _PEOPLE
-        if low <= declared_m / adult_m <= high:
-            return Unit(declared_m, True, False)
-        fits = [u for u in _COMMON if low <= u / adult_m <= high]
-        fits = fits or [u for u in _OTHERS if low <= u / adult_m <= high]
-    else:
-        spread = spread_of(points)
-        if not 0 < spread < np.inf:
-            return Unit(declared_m, False, False)
-        adult_m = _USUAL_SPREAD_M / spread
-        low, high = _USUAL_SPREADS
-        if _SPREADS[0] <= declared_m / adult_m <= _SPREADS[1]:
-            return Unit(declared_m, True, False, not low <= declared_m / adult_m <= high)
-        fits = [u for u in _COMMON if low <= u / adult_m <= high]
+        return likeliest_unit(adult_m, declared_m, _PEOPLE, says_so=says_so)
+    spread = spread_of(points)
+    if not 0 < spread < np.inf:
+        return Unit(declared_m, False, False)
+    adult_m = _USUAL_SPREAD_M / spread
+    low, high = _USUAL_SPREADS
+    if _SPREADS[0] <= declared_m / adult_m <= _SPREADS[1]:
+        return Unit(declared_m, True, False, not low <= declared_m / adult_m <= high)
+    fits = [u for u in _COMMON if low <= u / adult_m <= high]
     if not fits:
         return Unit(declared_m, False, False)
     best = min(fits, key=lambda u: abs(np.log(u / adult_m)))
     return Unit(best, True, True)
+
+
+def likeliest_unit(
+    adult_m: float, declared_m: float, people: tuple[float, float], *, says_so: bool
+) -> Unit:
+    """Return the unit in which somebody is most likely as large as people are.
+
+    Args:
+        adult_m: The unit in which it would be an adult of the usual size [m].
+        declared_m: The unit that the file, or its format, says [m].
+        people: The least and the largest size of a person against that.
+        says_so: Whether the file itself says it: then it counts whenever it can.
+    """
+    low, high = people
+    if says_so and low <= declared_m / adult_m <= high:
+        return Unit(declared_m, True, False)
+    candidates = {*_COMMON, *_RARE, declared_m}
+    fits = [unit for unit in candidates if low <= unit / adult_m <= high]
+    if not fits:
+        return Unit(declared_m, False, False)
+    unlikely = {unit: _unlikely(unit, adult_m, declared_m) for unit in fits}
+    best, *others = sorted(fits, key=lambda unit: unlikely[unit])
+    rival = others[0] if others and unlikely[others[0]] - unlikely[best] < _IN_DOUBT else None
+    return Unit(best, True, best != declared_m, False, rival)
+
+
+def _unlikely(unit_m: float, adult_m: float, declared_m: float) -> float:
+    """Return how unlikely a unit is [nat]: people are rarely small, and few files in inches."""
+    size = np.log(unit_m / adult_m) / _VARY
+    return float(0.5 * size**2 + (0.0 if unit_m == declared_m else _RARE.get(unit_m, 0.0)))
 
 
 def spread_of(points: FloatArray) -> float:
@@ -92,9 +129,9 @@ def spread_of(points: FloatArray) -> float:
 def named_unit(text: str) -> float | None:
     """Return the length of a unit as files write it [m]: in short, in words, or cut; or None.
 
-    ``"mm"``, ``"Millimeters"``, ``"mete"``, ``"[m]"``, ``"inches"``.
+    ``"mm"``, ``"Millimeters"``, ``"mete"``, ``"[m]"``, ``"inches"``, ``"mm/deg"``.
     """
-    plain = "".join(c for c in text.lower() if c.isalpha())
+    plain = "".join(c for c in _ANGLES_TOO.sub("", text.lower()) if c.isalpha())
     if plain in UNITS_M:
         return UNITS_M[plain]
     if len(plain) < 2:
@@ -106,6 +143,21 @@ def named_unit(text: str) -> float | None:
     return None
 
 
+def said_unit(path: Path, text: str, hints: Hints) -> float | None:
+    """Return the length of the unit that a file says [m]; None where it says nothing.
+
+    Raises:
+        RecordingError: It says what is no unit of length, and no hint tells what is meant.
+    """
+    unit = named_unit(text)
+    if unit is None and hints.unit_m is None and not _SAYS_NOTHING.fullmatch(text.strip().lower()):
+        expected = f"one of {', '.join(UNITS_M)}, or {option('unit_m')}"
+        raise bad_file(path, f"unit of length {text!r}", expected)
+    return unit
+
+
+_ANGLES_TOO = re.compile(r"\W*(?:deg|degrees?|rad|radians?|°)\W*$")  # one text for both
+_SAYS_NOTHING = re.compile(r"|\W+|n/?a|none|null|unknown|undefined|unspecified|units?|arbitrary")
 _WORDS = (
     (("um", "µm", "μm", "micrometers", "micrometres", "microns"), 1e-6),
     (("millimeters", "millimetres", "mms", "milimeters", "milimetres"), 0.001),

@@ -133,23 +133,24 @@ def _settled_unit(
     findings: Findings,
     sized: Unit | None,
 ) -> float:
-    found = sized or find_unit(points, names, space.unit_m)
+    found = sized or find_unit(points, names, space.unit_m, says_so=space.says_unit)
+    taken = f"the unit of length is taken as {unit_text(found.unit_m)}"
+    rival = "" if found.rival_m is None else f"; {unit_text(found.rival_m)} would fit as well"
     if found.contradicts:
-        said = unit_text(space.unit_m)
-        tell = findings.warn if space.says_unit else findings.note
-        tell(
-            f"the unit of length is taken as {unit_text(found.unit_m)}, by the size of the person; "
-            + (f"the file says {said}" if space.says_unit else f"usual is {said}")
-            + f" ({option('unit_m')} sets it)"
-        )
+        said = f"{'the file says' if space.says_unit else 'usual is'} {unit_text(space.unit_m)}"
+        tell = findings.warn if space.says_unit or rival else findings.note
+        sets = f"({option('unit_m')} sets it)"
+        tell(f"{taken}, by the size of the person; {said}{rival} {sets}")
     elif found.doubtful and len(names) >= _MANY:
+        close = spread_of(points) * found.unit_m < 0.2
         findings.warn(
-            f"the unit of length is taken as {unit_text(found.unit_m)}, by which the points are "
-            f"{'close together' if spread_of(points) * found.unit_m < 0.2 else 'far apart'} for a "
+            f"{taken}, by which the points are {'close together' if close else 'far apart'} for a "
             f"person's; {option('unit_m')} settles it"
         )
+    elif rival:
+        findings.warn(f"{taken}, as is usual{rival}: {option('unit_m')} settles it")
     elif not space.says_unit and found.fits:
-        findings.note(f"the unit of length is taken as {unit_text(found.unit_m)}: it fits a person")
+        findings.note(f"{taken}: it fits a person")
     return found.unit_m
 
 

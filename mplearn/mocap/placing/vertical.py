@@ -37,6 +37,7 @@ _STEADY, _CONTACT, _TALL = 2.0, 1.0, 1.5  # nat, at most
 _ROUGH_M = 0.01  # as level as the lowest points of a foot are
 _ROUGH_M_S = 0.02
 _TO_CHANGE = 2.0  # nat, by which another axis must win
+_ALONG = 0.85  # of a standing body's length that lies along an axis, at least
 _IN_DOUBT = 1.0
 
 
@@ -100,12 +101,19 @@ def find_vertical(
     margin = float(np.min(evidence[best] - np.delete(evidence, best)))
     # lying down, or standing on the hands, names say one thing and the floor another
     floor_elsewhere = floor.max() > 0 and floor[best] == 0
+    slanted = floor[best] == 0 and bool(named.max() < _ALONG * np.linalg.norm(named))
     if best != start and (
-        evidence[best] - evidence[start] < _TO_CHANGE or (floor_elsewhere and floor[start] > 0)
+        evidence[best] - evidence[start] < _TO_CHANGE
+        or (slanted and says_so)
+        or ((floor_elsewhere or slanted) and floor[start] > 0)
     ):
         return Vertical(declared, False, True, tuple(map(float, evidence)))
+    lies_on = np.flatnonzero((floor > 0) & _rests_on(first, seen))
+    if floor_elsewhere and slanted and len(lies_on) == 1 and named[lies_on[0]] < _TELLING:
+        best = int(lies_on[0])  # who lies about anyhow, on the only floor that there is
+        return Vertical(DIRECTIONS[best], best != start, True, tuple(map(float, evidence)))
     told = named[best] >= _TELLING or floor[best] > 0
-    doubtful = margin < _IN_DOUBT or not told or floor_elsewhere
+    doubtful = margin < _IN_DOUBT or not told or floor_elsewhere or (slanted and best != start)
     return Vertical(DIRECTIONS[best], best != start, bool(doubtful), tuple(map(float, evidence)))
 
 

@@ -17,7 +17,8 @@ from .skeletal import Column
 
 _WORD = re.compile(r"[{}]|[^\s{}]+")
 _KIND = "(rotation|rot|position|pos|translation)"
-_CHANNEL = re.compile(rf"([xyz])_?{_KIND}|{_KIND}_?([xyz])")
+_CHANNEL = re.compile(rf"([xyz])_?{_KIND}|{_KIND}_?([xyz])|([rt])([xyz])")
+_REMARK = re.compile(r"^[ \t]*(?:#|//).*$", re.MULTILINE)
 _KEYWORDS = ("ROOT", "JOINT", "END", "ENDSITE", "END_SITE", "OFFSET", "CHANNELS", "{", "}")
 
 
@@ -29,7 +30,7 @@ def parse_hierarchy(
     Raises:
         RecordingError: The text is not a hierarchy.
     """
-    parser = _Parser(path, _WORD.findall(text), findings)
+    parser = _Parser(path, _WORD.findall(_REMARK.sub("", text)), findings)
     parser.parse()
     names, renamed = _distinct(parser.joints)
     if renamed:
@@ -183,8 +184,9 @@ class _Parser:
             raise bad_file(
                 self.path, f"channel {word[:40]!r} of {joint.name!r}", "Xrotation, Yposition, ..."
             )
-        axis, kind = match[1] or match[4], match[2] or match[3]
-        return Column(joint.name, "xyz".index(axis), kind.startswith("rot"), joint.parent < 0)
+        axis = match[1] or match[4] or match[6]
+        kind = match[2] or match[3] or match[5]
+        return Column(joint.name, "xyz".index(axis), kind.startswith("r"), joint.parent < 0)
 
     def _close(self, joint: _Open) -> None:
         if joint.offset is None and joint.is_end:

@@ -114,6 +114,9 @@ def _rows(indices: list[int], findings: Findings) -> IntArray:
 
 
 def _table(path: Path, texts: list[str], name: str, width: int) -> FloatArray:
+    """Return the numbers of some texts, shape (T, width); decimals may have a comma."""
+    if any("," in text for text in texts):
+        texts = [text.replace(",", " " if "." in text else ".") for text in texts]
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)  # by which numpy says: no number
         try:
@@ -221,7 +224,7 @@ class _Stream:
 
 def _positive(text: str) -> float | None:
     try:
-        value = float(text)
+        value = float(text.replace(",", "."))
     except ValueError:
         return None
     return value if 0 < value < 1e12 else None

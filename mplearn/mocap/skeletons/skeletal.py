@@ -101,8 +101,8 @@ def skeletal_recording(
     names = tuple(joint.name for joint in joints)
     local = joint_positions(joints, motion.values)
     parents = [joint.parent for joint in joints]
-    sized = unit_of_skeleton(local, parents, motion.space.unit_m)
     space = motion.space
+    sized = unit_of_skeleton(local, parents, space.unit_m, says_so=space.says_unit)
     if sized is None and len({place_of(name).part for name in names} & HEIGHTS.keys()) < 2:
         findings.note(
             "no person by its joints: unit and vertical axis are those usual in the format"

@@ -7,23 +7,25 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...recording import FloatArray
-from ..placing.size import CMU_UNIT_M, Unit
+from ..placing.size import Unit, likeliest_unit
 
-_CANDIDATES = (1.0, 0.01, 0.001, 0.0254, CMU_UNIT_M, 0.1, 0.3048)
 _USUAL_M = 1.6  # between the joints of a person that are farthest apart: crown to toe, or hands
-_PEOPLE_M = (0.72, 2.3)  # the same, from a child who sits to a giant who reaches up
+_PEOPLE = (0.45, 1.44)  # against that: from a child who sits to a giant who reaches up
 _LOOK = 100  # frames
 _RIGID = 0.1  # of its length, by which a bone may vary
 _LONG = 0.2  # of the longest chain, from which on one is a limb or a trunk
 
 
-def unit_of_skeleton(points: FloatArray, parents: Sequence[int], declared_m: float) -> Unit | None:
+def unit_of_skeleton(
+    points: FloatArray, parents: Sequence[int], declared_m: float, *, says_so: bool = True
+) -> Unit | None:
     """Return the unit of length in which a skeleton is a person's.
 
     Args:
         points: Where its joints are, in the file's unit, shape (T, J, 3); NaN where missing.
         parents: Index of each joint's parent, length J, parents first; -1 for a root.
         declared_m: The unit that the file, or its format, says [m].
+        says_so: Whether the file itself says it, not only its format.
 
     Returns:
         The unit; None where the skeleton has no trunk with limbs at both ends, as people have.
@@ -38,13 +40,9 @@ def unit_of_skeleton(points: FloatArray, parents: Sequence[int], declared_m: flo
     body = some[:, joints]
     apart = np.array([np.linalg.norm(p[:, None] - p[None], axis=2).max() for p in body])
     extent = float(np.median(apart))
-    low, high = _PEOPLE_M
-    if low <= extent * declared_m <= high:
-        return Unit(declared_m, True, False)
-    fits = [unit for unit in _CANDIDATES if low <= extent * unit <= high]
-    if not fits:
+    if not 0 < extent < np.inf:
         return Unit(declared_m, False, False)
-    return Unit(min(fits, key=lambda unit: abs(np.log(extent * unit / _USUAL_M))), True, True)
+    return likeliest_unit(_USUAL_M / extent, declared_m, _PEOPLE, says_so=says_so)
 
 
 def _largest_rigid_part(
