@@ -235,7 +235,8 @@ class RobotModel:
         turn = quaternion_to_matrix(quat)
         rest = quaternion_to_matrix(self.at_zero.quat[0])
         limits = self.limits
-        middle = np.where(np.isfinite(limits).all(axis=1), limits.mean(axis=1), 0.0)
+        limited = np.isfinite(limits).all(axis=1, keepdims=True)
+        middle = np.where(limited, limits, 0.0).mean(axis=1)
         out = np.zeros((len(quat), len(self.joint_names)))
         off = np.zeros(quat.shape[:2])
         for b in range(1, len(self.bodies)):

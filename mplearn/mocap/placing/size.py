@@ -25,13 +25,14 @@ CMU_UNIT_M = 0.0254 / 0.45
 """Unit of the CMU database's skeletons, and of most conversions of it [m]."""
 
 _COMMON = (1.0, 0.001, 0.01)
-_RARE = {CMU_UNIT_M: 2.5, 0.0254: 3.0, 0.3048: 4.0, 0.1: 5.0}  # against units that few use [nat]
+_OTHERS = (0.0254, CMU_UNIT_M, 0.3048, 0.1)
 _LOOK = 200  # frames
 
 # how large a person may be against one of 1.75 m: a toddler to a giant, markers off the joints
 _PEOPLE = (0.4, 1.4)
 _VARY = 0.3  # of the logarithm of their size
-_IN_DOUBT = 2.0  # nat
+_RARE = 3.0  # nat, against a unit that few use
+_IN_DOUBT, _BETWEEN_RARE = 0.8, 1.5  # nat; between two that few use, habit does not help
 # how far the points may spread against the markers of a whole person: a hand to two people afar
 _SPREADS = (0.06, 8.0)
 _USUAL_SPREAD_M = 0.45
@@ -99,20 +100,21 @@ def likeliest_unit(
     low, high = people
     if says_so and low <= declared_m / adult_m <= high:
         return Unit(declared_m, True, False)
-    candidates = {*_COMMON, *_RARE, declared_m}
+    candidates = {*_COMMON, *_OTHERS, declared_m}
     fits = [unit for unit in candidates if low <= unit / adult_m <= high]
     if not fits:
         return Unit(declared_m, False, False)
     unlikely = {unit: _unlikely(unit, adult_m, declared_m) for unit in fits}
     best, *others = sorted(fits, key=lambda unit: unlikely[unit])
-    rival = others[0] if others and unlikely[others[0]] - unlikely[best] < _IN_DOUBT else None
+    doubt = _BETWEEN_RARE if unlikely[best] >= _RARE else _IN_DOUBT
+    rival = others[0] if others and unlikely[others[0]] - unlikely[best] < doubt else None
     return Unit(best, True, best != declared_m, False, rival)
 
 
 def _unlikely(unit_m: float, adult_m: float, declared_m: float) -> float:
     """Return how unlikely a unit is [nat]: people are rarely small, and few files in inches."""
     size = np.log(unit_m / adult_m) / _VARY
-    return float(0.5 * size**2 + (0.0 if unit_m == declared_m else _RARE.get(unit_m, 0.0)))
+    return float(0.5 * size**2 + (0.0 if unit_m in (declared_m, *_COMMON) else _RARE))
 
 
 def spread_of(points: FloatArray) -> float:

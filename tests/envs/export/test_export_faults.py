@@ -9,9 +9,11 @@ from export_world import OF_MOTIONS, alone, change_arrays, of_arrays, written
 
 from mplearn.errors import RecordingError
 from mplearn_envs.export import RobotModel, RobotMotion, check, formats
+from mplearn_envs.export.formats.glb import numbers, read_glb
 from mplearn_envs.robot import humanoid
 
-NOT_IN_BVH = {  # it holds no angles of hinges
+BODIES_ALONE = {"bvh", "gltf"}
+OF_HINGES = {  # of which these hold no angles
     "degrees", "centimetres", "quaternion order", "joints breadth first", "two joints swapped",
 }  # fmt: skip
 ALONE = {"degrees", "centimetres", "quaternion order", "too high", "y up"}  # by the file alone
@@ -21,7 +23,7 @@ CASES = [
     (name, fault)
     for name in FORMATS
     for fault in OF_MOTIONS
-    if not (name == "bvh" and fault in NOT_IN_BVH)
+    if not (name in BODIES_ALONE and fault in OF_HINGES)
 ]
 
 
@@ -110,6 +112,33 @@ def test_a_bvh_in_radians_or_metres_or_with_exchanged_names_is_found(
     path.write_text(swapped.replace(" ?\n", f" {other}\n"), "utf-8")
     (verdict,) = check(path, model)
     assert "names" in verdict.faults[0].problem and verdict.left.position_m < 1e-5
+
+
+def test_a_gltf_with_quaternions_of_another_order_or_z_up_is_found(
+    model: RobotModel, motion: RobotMotion, tmp_path: Path
+) -> None:
+    path = written(tmp_path, motion, model, "gltf")
+    content, buffer = read_glb(path)
+    right = path.read_bytes()
+    data = bytearray(buffer)
+    for channel in content["animations"][0]["channels"]:
+        if channel["target"]["path"] == "rotation":
+            output = content["animations"][0]["samplers"][channel["sampler"]]["output"]
+            rolled = np.roll(numbers(content, buffer, output), 1, axis=1).astype("<f4")
+            start = content["bufferViews"][content["accessors"][output]["bufferView"]]["byteOffset"]
+            data[start : start + rolled.nbytes] = rolled.tobytes()
+    path.write_bytes(right.replace(buffer, bytes(data)))
+    (verdict,) = check(path, model)
+    assert [fault.kind for fault in verdict.faults] == ["quaternion order"]
+    assert verdict.left.position_m < 1e-5
+
+    world = re.search(rb'"name":"[^"]*","rotation":\[0\.5[^]]*\],"children"', right)
+    assert world is not None
+    still = re.sub(rb"\[.*\]", b"[0,0,0,1]", world[0])
+    path.write_bytes(right.replace(world[0], still + b" " * (len(world[0]) - len(still))))
+    (verdict,) = check(path, model)
+    assert [fault.kind for fault in verdict.faults] == ["axes"]
+    assert verdict.left.position_m < 1e-5
 
 
 def test_what_nothing_explains_is_said_with_where_and_how_much(

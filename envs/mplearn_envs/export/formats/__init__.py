@@ -2,6 +2,7 @@
 
 from ..registry import register_format
 from .bvh import BVH
+from .gltf import GLTF
 from .gmr import GMRNPZ
 from .html import HTMLFilm
 from .lerobot import LeRobot
@@ -19,5 +20,6 @@ for _format in (
     MCAP(),
     NDJSON(),
     HTMLFilm(),
+    GLTF(),
 ):
     register_format(_format)
