@@ -43,8 +43,8 @@ class VariedHumanoidEnv(MacroStepEnv):
     * Each episode has a person, drawn by the environment's seed among ``people``, and that person's
       graph: who was seen to do what after what, and how often. The primitives are the same for
       all, and three of four ways are shared by any two people; so what was learned with the people
-      of "train" can be tried with those of "test". ``info["person"]`` says who it is, for whoever evaluates, and
-      ``reset(options={"person": 7})`` asks for one.
+      of "train" can be tried with those of "test". ``info["person"]`` says who it is, for whoever
+      evaluates, and ``reset(options={"person": 7})`` asks for one.
     * An episode starts at one primitive, drawn too, which alone is legal besides hold.
     * ``task="goal"`` asks for a primitive 5 to 15 primitives away, within 90 s; a ``"recite"`` has
       180 s; a second costs 0.02 in both. A second discounts by 0.98, and ``gym.make`` truncates
@@ -54,9 +54,9 @@ class VariedHumanoidEnv(MacroStepEnv):
       is possible.
 
     All was learned by a `mplearn.MotionLearner` that watched six people, and recognised in what
-    eight do (``python -m mplearn_envs.varied.build``). There are 256 actions. What the built-in humanoid makes of the library at the usual speed is
-    known beforehand, so that an episode begins at once; with another robot, speed or style,
-    verdicts and plans are made when they are needed.
+    eight do (``python -m mplearn_envs.varied.build``). There are 256 actions. What the built-in
+    humanoid makes of the library at the usual speed is known beforehand, so that an episode begins
+    at once; with another robot, speed or style, verdicts and plans are made when they are needed.
 
     Args:
         people: "train" (0 to 5), "test" (6, 7), "all", a number, or some.
