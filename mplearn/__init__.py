@@ -7,6 +7,8 @@ loaded when something of it is first asked for.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from .offers import offer
+
 if TYPE_CHECKING:
     from .errors import MPLearnError as MPLearnError
     from .learner import LearnerConfig as LearnerConfig
@@ -33,6 +35,9 @@ _ROOMS = {
 }
 
 __all__ = sorted(_ROOMS)
+
+offer("read a library from a store", by="mplearn.store:library_of")
+offer("find the segments of a recording", by="mplearn.tables:segments_of")
 
 
 def __getattr__(name: str) -> Any:

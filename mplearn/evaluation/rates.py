@@ -17,8 +17,26 @@ from .matching import TOLERANCE_S, match_segments
 from .membership import Membership, recognised_as
 
 
+class ErrorRates:
+    """The paper's two error rates, of what counts found, wrong and missed segments."""
+
+    n_found: int
+    n_wrong: int
+    n_missed: int
+
+    @property
+    def false_positive(self) -> float:
+        """Share of the found segments that were recognised wrongly."""
+        return self.n_wrong / max(1, self.n_found)
+
+    @property
+    def false_negative(self) -> float:
+        """Share of the found segments that were not recognised in spite of a model."""
+        return self.n_missed / max(1, self.n_found)
+
+
 @dataclass(frozen=True)
-class LearningRates:
+class LearningRates(ErrorRates):
     """How well a session was learned.
 
     Attributes:
@@ -60,16 +78,6 @@ class LearningRates:
     def n_duplicates(self) -> int:
         """Primitives beyond the first of each class."""
         return len(self.classes) - self.n_spurious - len(self.extracted)
-
-    @property
-    def false_positive(self) -> float:
-        """Share of the found segments that were recognised wrongly."""
-        return self.n_wrong / max(1, self.n_found)
-
-    @property
-    def false_negative(self) -> float:
-        """Share of the found segments that were not recognised in spite of a model."""
-        return self.n_missed / max(1, self.n_found)
 
     @property
     def recognised(self) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -15,17 +14,50 @@ from .motion_model import held
 from .sequences import as_frames, as_weights
 
 
-def checked_gaussians(model: Any) -> None:
-    """Make the means and variances of a model's states arrays of its own, unchangeable.
+class GaussianStates:
+    """States that emit Gaussians: what models of several kinds share.
 
     Raises:
         ModelError: Shapes disagree, or a value is not finite or not positive.
     """
-    for name in ("means", "variances"):
+
+    means: FloatArray
+    variances: FloatArray
+
+    def __post_init__(self) -> None:
+        own_arrays(self, "means", "variances")
+        _check_gaussians(self.means, self.variances)
+
+    @property
+    def n_states(self) -> int:
+        """Number of states N."""
+        return int(self.means.shape[0])
+
+    @property
+    def n_channels(self) -> int:
+        """Number of channels D."""
+        return int(self.means.shape[1])
+
+    @cached_property
+    def log_norms(self) -> FloatArray:
+        """Log of each Gaussian's normalisation, -log(2 pi variance) / 2, shape (N, D)."""
+        return np.asarray(kernels.log_norms(self.variances))
+
+    @cached_property
+    def gaussians(self) -> kernels.Gaussians:
+        """What the states emit."""
+        return kernels.Gaussians(self.means, self.variances, self.log_norms)
+
+
+def own_arrays(model: object, *names: str) -> None:
+    """Make arrays of a model its own, unchangeable."""
+    for name in names:
         array = np.array(getattr(model, name), dtype=np.float64, order="C")
         array.flags.writeable = False
         object.__setattr__(model, name, array)
-    means, variances = model.means, model.variances
+
+
+def _check_gaussians(means: FloatArray, variances: FloatArray) -> None:
     if means.ndim != 2 or 0 in means.shape:
         raise ModelError(f"means must have shape (N, D), N, D >= 1, not {means.shape}")
     if variances.shape != means.shape:
@@ -40,7 +72,7 @@ SHORTEST_STAY = 1.05  # frames: a state is never left for certain, or staying we
 
 
 @dataclass(frozen=True)
-class LeftRightHMM:
+class LeftRightHMM(GaussianStates):
     """A left-right HMM with diagonal Gaussian emissions and no skips.
 
     It starts in state 0; from state n it stays or moves to n + 1. The last state is absorbing. By
@@ -61,41 +93,20 @@ class LeftRightHMM:
     log_stay: FloatArray
 
     def __post_init__(self) -> None:
-        checked_gaussians(self)
-        log_stay = np.array(self.log_stay, dtype=np.float64)
-        log_stay.flags.writeable = False
-        object.__setattr__(self, "log_stay", log_stay)
-        if log_stay.shape != self.means.shape[:1]:
-            raise ModelError(f"log_stay must have shape ({self.n_states},), not {log_stay.shape}")
+        super().__post_init__()
+        own_arrays(self, "log_stay")
+        shape = self.log_stay.shape
+        if shape != self.means.shape[:1]:
+            raise ModelError(f"log_stay must have shape ({self.n_states},), not {shape}")
         if self.log_stay[-1] != 0.0 or not (self.log_stay[:-1] < 0).all():
             raise ModelError(
                 f"log_stay must be negative in every state and 0 in the last, not {self.log_stay}"
             )
 
-    @property
-    def n_states(self) -> int:
-        """Number of states N."""
-        return int(self.means.shape[0])
-
-    @property
-    def n_channels(self) -> int:
-        """Number of channels D."""
-        return int(self.means.shape[1])
-
     @cached_property
     def log_next(self) -> FloatArray:
         """Log-probability of moving on, shape (N,); the last state has nowhere to go."""
         return np.append(np.log(-np.expm1(self.log_stay[:-1])), -np.inf)
-
-    @cached_property
-    def log_norms(self) -> FloatArray:
-        """Log of each Gaussian's normalisation, -log(2 pi variance) / 2, shape (N, D)."""
-        return np.asarray(kernels.log_norms(self.variances))
-
-    @cached_property
-    def gaussians(self) -> kernels.Gaussians:
-        """What the states emit."""
-        return kernels.Gaussians(self.means, self.variances, self.log_norms)
 
     @property
     def durations_frames(self) -> FloatArray:

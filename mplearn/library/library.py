@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from importlib import import_module
 from pathlib import Path
 from typing import TypeAlias, Unpack
 
@@ -23,6 +22,7 @@ from ..graph import (
     TransitionGraph,
     tree_levels,
 )
+from ..offers import ask
 from ..recording import FloatArray, Recording
 from ..state import from_plain, to_plain, within
 from ..tree.recogniser import Recogniser, Recognition
@@ -230,8 +230,7 @@ class PrimitiveLibrary:
             >>> len(table) >= 10, table.column("name")[-4:]
             (True, ['P1', 'P2', 'P1', 'P2'])
         """
-        tables = import_module("mplearn.tables")  # which stands above: loaded where needed
-        found: SegmentTable = tables.segments_of(self, recording)
+        found: SegmentTable = ask("find the segments of a recording")(self, recording)
         return found
 
     # ---- planning
@@ -358,8 +357,7 @@ class PrimitiveLibrary:
             StoreError: It is a store that cannot be read.
         """
         if _is_store(Path(path)):
-            store = import_module("mplearn.store")  # which stands above: loaded where needed
-            library: PrimitiveLibrary = store.library_of(path)
+            library: PrimitiveLibrary = ask("read a library from a store")(path)
             return library
         content = FILES.read(Path(path))
         try:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Literal, Self, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
+from ..closing import Closing
 from ..recording import BoolArray, FloatArray, Recording, Skeleton, are_markers
 
 ChangeKind: TypeAlias = Literal[
@@ -165,7 +165,7 @@ class Tally:
         return {k: n for k, n in vars(self).items() if n and k != "frames"}
 
 
-class Source(ABC):
+class Source(Closing, ABC):
     """A stream of motion, live.
 
     Iterating yields `Block` and `Change` as they come, and waits in between; it ends with the
@@ -204,16 +204,3 @@ class Source(ABC):
         """Yield what comes until the stream ends."""
         while not self.ended:
             yield from self.read(WAIT_S)
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close it."""
-        self.close()

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..closing import Closing
 from ..errors import (
     FrameError,
     InvalidValueError,
@@ -36,7 +37,7 @@ from .store import Found, Store
 _CHUNK_S = 1.0  # of frames that are written together
 
 
-class LifelongLearner:
+class LifelongLearner(Closing):
     """The one object through which a learner, its commands and its store are used.
 
     Args:
@@ -157,14 +158,6 @@ class LifelongLearner:
             self._close_chunk()
             if not self.store.flush():
                 raise StoreWriteError(f"{self.store.path} cannot be written: {self.store.problem}")
-
-    def __enter__(self) -> LifelongLearner:
-        """Return itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close it."""
-        self.close()
 
     # ---- learning
 

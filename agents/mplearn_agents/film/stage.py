@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mplearn.closing import Closing
 from mplearn.recording import FloatArray
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ _DISTANCE_M = 7.0
 _HEIGHT_M = 2.6  # of what is seen at the bodies
 
 
-class Stage:
+class Stage(Closing):
     """Renders postures, not physics: a posture is shown as it is given.
 
     Use it in a ``with`` block; it holds a renderer.
@@ -92,19 +92,6 @@ class Stage:
     def close(self) -> None:
         """Give the renderer back."""
         self._renderer.close()
-
-    def __enter__(self) -> Stage:
-        """Return the stage itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Give the renderer back."""
-        self.close()
 
 
 def _places(n: int) -> FloatArray:

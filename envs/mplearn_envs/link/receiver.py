@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from collections import OrderedDict, deque
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
+from mplearn.closing import Closing
 from mplearn.errors import InvalidValueError
 from mplearn_envs.robot import Robot
 
@@ -47,7 +47,7 @@ class LinkCounts:
     stale: int = 0
 
 
-class Receiver:
+class Receiver(Closing):
     """Receives postures of the upper body; a context manager, as it holds a socket.
 
     It follows one sender's stream, the first that it hears. Another one is foreign to it until the
@@ -184,11 +184,3 @@ class Receiver:
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
-
-    def __enter__(self) -> Self:
-        """Return the receiver itself."""
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        """Close the socket."""
-        self.close()

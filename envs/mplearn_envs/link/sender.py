@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import secrets
 import time
-from typing import Self
 
+from mplearn.closing import Closing
 from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray
 from mplearn_envs.robot import Robot
@@ -14,7 +14,7 @@ from .datagram import Datagram, checked_key, encode, robot_code
 from .sockets import HOST, PORT, open_socket
 
 
-class Sender:
+class Sender(Closing):
     """Sends postures of the upper body; a context manager, as it holds a socket.
 
     Nobody answers, so nothing here waits: what cannot be sent is lost.
@@ -78,11 +78,3 @@ class Sender:
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
-
-    def __enter__(self) -> Self:
-        """Return the sender itself."""
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        """Close the socket."""
-        self.close()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ...merging import merge_learners
 from ...recording import Recording, Segment
 from ...tables import recognise_recording
 from ..matching import match_segments
+from ..rates import ErrorRates
 from ..sessions import make_session
 from ..table import Table, percent
 from .sessions import by_person
@@ -23,7 +24,8 @@ from .sessions import by_person
 _BLOCK = 128  # frames
 
 
-class Asked(NamedTuple):
+@dataclass(frozen=True)
+class Asked(ErrorRates):
     """What a library says of sessions whose truth is known.
 
     Attributes:
@@ -46,16 +48,6 @@ class Asked(NamedTuple):
     n_wrong: int
     n_missed: int
     n_right: int
-
-    @property
-    def false_positive(self) -> float:
-        """Share of the found segments that were recognised wrongly."""
-        return self.n_wrong / max(1, self.n_found)
-
-    @property
-    def false_negative(self) -> float:
-        """Share of the found segments that were not recognised in spite of a model."""
-        return self.n_missed / max(1, self.n_found)
 
     @property
     def coverage(self) -> float:

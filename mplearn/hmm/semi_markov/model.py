@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -16,8 +15,8 @@ from ...errors import InvalidValueError, ModelError
 from ...recording import FloatArray
 from ..em import Emitted, maximise_gaussians
 from ..fit import fit
-from ..kernels import Gaussians, log_densities, log_norms
-from ..model import SHORTEST_STAY, LeftRightHMM, checked_gaussians
+from ..kernels import log_densities
+from ..model import SHORTEST_STAY, GaussianStates, LeftRightHMM, own_arrays
 from ..motion_model import held
 from ..parameters import as_floor
 from ..sequences import SequenceBatch, as_frames, as_weights
@@ -27,7 +26,7 @@ LEAST_SPREAD = 0.7  # frames: below it a normal distribution over whole frames h
 
 
 @dataclass(frozen=True)
-class SemiMarkovHMM:
+class SemiMarkovHMM(GaussianStates):
     """A left-right model whose states last a normally distributed number of frames.
 
     Attributes:
@@ -46,31 +45,15 @@ class SemiMarkovHMM:
     spreads_frames: FloatArray
 
     def __post_init__(self) -> None:
-        checked_gaussians(self)
+        super().__post_init__()
+        own_arrays(self, "durations_frames", "spreads_frames")
         for name, least in (("durations_frames", 1.0), ("spreads_frames", LEAST_SPREAD)):
-            array = np.array(getattr(self, name), dtype=np.float64)
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+            array = getattr(self, name)
             if array.shape != self.means.shape[:1] or not (array >= least).all():
                 raise ModelError(
                     f"{name} must have shape ({self.n_states},) and be at least {least}, "
                     f"not {array}"
                 )
-
-    @property
-    def n_states(self) -> int:
-        """Number of states N."""
-        return int(self.means.shape[0])
-
-    @property
-    def n_channels(self) -> int:
-        """Number of channels D."""
-        return int(self.means.shape[1])
-
-    @cached_property
-    def gaussians(self) -> Gaussians:
-        """What the states emit."""
-        return Gaussians(self.means, self.variances, log_norms(self.variances))
 
     def log_durations(self, longest: int) -> FloatArray:
         """Return the log-probability of each state lasting d frames, d = 0..longest at least.
