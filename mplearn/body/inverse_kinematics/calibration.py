@@ -17,7 +17,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from mplearn.errors import BodyError
-from mplearn.recording import FloatArray, IntArray
+from mplearn.recording import FloatArray
 from mplearn.state import Array, Range
 
 from ..kinematics.tree import KinematicTree
@@ -26,7 +26,7 @@ from ..models.human import human_body
 from .first_posture import TooFewMarkersError, first_posture, place_trunk, settle
 from .follower import Follower
 from .follower import follower as make_follower
-from .sizes import fit_sizes, match_sizes
+from .sizes import Expected, fit_sizes, match_sizes
 
 # how far markers may be from their usual places, round after round [m]: the sizes must explain what
 # they can before the places may take up the rest, or a bent knee passes for misplaced markers
@@ -91,7 +91,8 @@ def fit(follower: Follower, markers: MarkerSet, frames: FloatArray) -> Calibrati
     rounds = JOINT_PLACE_SIGMAS_M if measured_all else PLACE_SIGMAS_M
     places_m = [np.minimum(place_sigma_m, firm) for place_sigma_m in rounds]
     settled = SETTLED if measured_all else 0.0
-    found = _alternate(person, sizes, sigma, bodies, template, places_m, settled, start, chosen)
+    expected = Expected(sizes, sigma, bodies, template)
+    found = _alternate(person, expected, places_m, settled, start, chosen)
     if person is not follower:
         measured = person.tree.scaled(found.factors)
         sizes = match_sizes(follower.tree, measured)
@@ -99,11 +100,9 @@ def fit(follower: Follower, markers: MarkerSet, frames: FloatArray) -> Calibrati
         bodies, template = placed.attach(follower.tree.scaled(sizes), measured)
         start = follower.tree.rest
         start[:7] = found.postures[0, :7]
-        template = template / sizes[bodies]
+        expected = Expected(sizes, FIXED_SIGMA, bodies, template / sizes[bodies])
         places_m = [np.full(len(bodies), place_sigma_m) for place_sigma_m in PLACE_SIGMAS_M]
-        found = _alternate(
-            follower, sizes, FIXED_SIGMA, bodies, template, places_m, settled, start, chosen
-        )
+        found = _alternate(follower, expected, places_m, settled, start, chosen)
     rms = float(np.sqrt(np.nanmean(found.residuals**2)))
     if rms > WORST_FIT_M:
         mean = np.nan_to_num(np.nanmean(found.residuals, axis=0))
@@ -135,19 +134,15 @@ class _Fit(NamedTuple):
 
 def _alternate(
     follower: Follower,
-    sizes: FloatArray,
-    size_sigma: float,
-    bodies: IntArray,
-    template: FloatArray,
+    expected: Expected,
     places_m: Sequence[FloatArray],
     settled_below: float,
     start: FloatArray,
     frames: FloatArray,
 ) -> _Fit:
     """Estimate postures, and sizes with places, in turn."""
-    tree = follower.tree.scaled(sizes)
-    offsets = template * sizes[bodies]
-    factors = sizes
+    factors, bodies, offsets = expected.size, expected.bodies, expected.offsets
+    tree = follower.tree.scaled(factors)
     last = first_posture(follower, tree, bodies, offsets, start, frames[0])
     postures = np.empty((len(frames), len(last)))
     for k in range(len(frames)):  # from one to the next, so that no limb loses its way
@@ -159,9 +154,7 @@ def _alternate(
         if settled and np.array_equal(place_sigma_m, places_m[k - 1]):
             continue  # nothing would change any more
         before = factors
-        factors, offsets = fit_sizes(
-            follower.tree, sizes, size_sigma, bodies, template, postures, frames, place_sigma_m
-        )
+        factors, offsets = fit_sizes(follower.tree, expected, postures, frames, place_sigma_m)
         settled = bool(np.abs(factors - before).max() < settled_below)
         tree = follower.tree.scaled(factors)
         residuals = settle(follower, tree, bodies, offsets, postures, frames)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -15,12 +17,41 @@ SHORTEST_M = 0.03  # a link shorter than this along an axis says nothing about i
 NARROWEST, WIDEST = 0.7, 1.4  # bounds on a segment's length relative to the overall size
 
 
+class Expected(NamedTuple):
+    """What a person's body and markers are expected to be like.
+
+    Attributes:
+        size: Size of each body relative to the tree's, shape (B, 3).
+        size_sigma: Standard deviation of a segment's size, relative to what is expected.
+        bodies: Body of each marker, shape (M,).
+        template: Place of each marker on the body of the tree's size, shape (M, 3) [m].
+    """
+
+    size: FloatArray
+    size_sigma: float
+    bodies: IntArray
+    template: FloatArray
+
+    @property
+    def offsets(self) -> FloatArray:
+        """Place of each marker on the body of that size, shape (M, 3) [m]."""
+        return np.asarray(self.template * self.size[self.bodies])
+
+
+class _Links(NamedTuple):
+    parent: IntArray  # (B,)
+    offset: FloatArray  # (B, 3) [m]
+    groups: IntArray  # (B, 3)
+
+
+class _Equations(NamedTuple):
+    normal: FloatArray  # (U, U)
+    gradient: FloatArray  # (U,)
+
+
 def fit_sizes(
     tree: KinematicTree,
-    size: FloatArray,
-    size_sigma: float,
-    bodies: IntArray,
-    template: FloatArray,
+    expected: Expected,
     postures: FloatArray,
     frames: FloatArray,
     place_sigma_m: FloatArray,
@@ -34,10 +65,7 @@ def fit_sizes(
 
     Args:
         tree: The body, in its own size.
-        size: Expected size of each body relative to the tree's, shape (B, 3).
-        size_sigma: Standard deviation of a segment's size, relative to what is expected.
-        bodies: Body of each marker, shape (M,).
-        template: Expected place of each marker on the body, shape (M, 3) [m].
+        expected: What sizes and places are expected.
         postures: Posture in each frame, shape (K, 7 + n).
         frames: Measured positions, shape (K, M, 3) [m]; NaN where missing.
         place_sigma_m: Standard deviation of each marker's place on its segment, shape (M,) [m].
@@ -46,22 +74,21 @@ def fit_sizes(
         Factors on the body's sizes, shape (B, 3), and the markers' places, shape (M, 3) [m].
     """
     groups = _groups(tree)
-    n_groups, n_markers, n_frames = int(groups.max()) + 1, len(bodies), len(frames)
+    n_groups, n_markers, n_frames = int(groups.max()) + 1, len(expected.bodies), len(frames)
     n_unknowns = n_groups + 3 * n_markers + 3 * n_frames
-    expected = np.zeros(n_unknowns)
-    expected[:n_groups] = 1.0
+    first = np.zeros(n_unknowns)
+    first[:n_groups] = 1.0
     normal, gradient = np.zeros((n_unknowns, n_unknowns)), np.zeros(n_unknowns)
-    normal[range(n_groups), range(n_groups)] = (size_sigma / MARKER_SIGMA_M) ** -2.0
+    normal[range(n_groups), range(n_groups)] = (expected.size_sigma / MARKER_SIGMA_M) ** -2.0
     shifted = range(n_groups, n_groups + 3 * n_markers)
     normal[shifted, shifted] = np.repeat(place_sigma_m / MARKER_SIGMA_M, 3) ** -2.0
     mats = np.array([tree.forward(q)[1] for q in postures])
-    _add_markers(
-        mats, tree.parent, tree.offset, size, groups, bodies, template, frames, normal, gradient
-    )
-    solution = expected + np.linalg.solve(normal, gradient)
-    factors = size * np.clip(solution[:n_groups], NARROWEST, WIDEST)[groups]
+    links = _Links(tree.parent, tree.offset, groups)
+    _add_markers(mats, links, expected, frames, _Equations(normal, gradient))
+    solution = first + np.linalg.solve(normal, gradient)
+    factors = expected.size * np.clip(solution[:n_groups], NARROWEST, WIDEST)[groups]
     shifts = solution[n_groups : n_groups + 3 * n_markers].reshape(n_markers, 3)
-    return factors, template * factors[bodies] + shifts
+    return factors, expected.template * factors[expected.bodies] + shifts
 
 
 def match_sizes(tree: KinematicTree, person: KinematicTree) -> FloatArray:
@@ -105,18 +132,12 @@ def _groups(tree: KinematicTree) -> IntArray:
 
 @njit(cache=True)
 def _add_markers(
-    mats: FloatArray,
-    parent: IntArray,
-    offset: FloatArray,
-    size: FloatArray,
-    groups: IntArray,
-    bodies: IntArray,
-    template: FloatArray,
-    frames: FloatArray,
-    normal: FloatArray,
-    gradient: FloatArray,
+    mats: FloatArray, links: _Links, expected: Expected, frames: FloatArray, equations: _Equations
 ) -> None:
     """Add what the seen markers say, linearised at factors of one, to the normal equations."""
+    parent, offset, groups = links.parent, links.offset, links.groups
+    size, bodies, template = expected.size, expected.bodies, expected.template
+    normal, gradient = equations.normal, equations.gradient
     n_groups, n_markers = groups.max() + 1, len(bodies)
     reach = np.zeros((len(parent), 3, n_groups))  # body origins, per unit of each group
     block, unknowns = np.zeros((3, n_groups + 6)), np.arange(n_groups + 6)
