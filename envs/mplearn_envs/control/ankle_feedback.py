@@ -10,13 +10,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from mplearn.maths.compiling import kernel
 from mplearn.maths.plane import turn_in_plane
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.mechanics.pendulum import pendulum_rate
 from mplearn_envs.mechanics.reference import reference_robot
 from mplearn_envs.mechanics.support import GRAVITY
+from mplearn_envs.mechanics.views import Views
 from mplearn_envs.planning.plan import Plan
 from mplearn_envs.robot import Robot
 
@@ -133,34 +134,19 @@ def ankles(robot: Robot) -> tuple[IntArray, IntArray]:
     return np.array(hinges, np.int64), np.array(sides, np.int64)
 
 
-@njit(cache=True, nogil=True)
-def correct(
-    law: AnkleFeedback,
-    step: int,
-    command: FloatArray,
-    cog: FloatArray,
-    velocity: FloatArray,
-    left_foot: FloatArray,
-    right_foot: FloatArray,
-    left_turn: FloatArray,
-    right_turn: FloatArray,
-    axes: FloatArray,
-) -> float:
+@kernel
+def correct(law: AnkleFeedback, step: int, views: Views) -> float:
     """Change the ankles' commands in place; return how far the DCM is from where it shall be [m].
 
     Args:
         law: What is wanted.
         step: Which of the plan's commands comes next.
-        command: It, shape (n,) [rad].
-        cog: Measured COG, shape (3,) [m].
-        velocity: Its velocity, shape (3,) [m/s].
-        left_foot: Position of the left foot, shape (3,) [m].
-        right_foot: Of the right foot.
-        left_turn: Orientation of the left foot, rows of its matrix, shape (9,).
-        right_turn: Of the right foot.
-        axes: Axes of all joints, the free one first, shape (1 + n, 3).
+        views: The robot as it stands, velocities of subtrees up to date, and that command.
     """
-    wanted = law.wanted[step]
+    wanted, command = law.wanted[step], views.ctrl
+    cog, velocity = views.subtree_com[1], views.subtree_linvel[1]
+    left_foot, right_foot = views.xpos[views.feet[0]], views.xpos[views.feet[1]]
+    left_turn, right_turn = views.xmat[views.feet[0]], views.xmat[views.feet[1]]
     left = wanted[2]
     right = 1.0 - left
     c = left * left_turn[0] + right * right_turn[0]
@@ -176,7 +162,7 @@ def correct(
         x, y = x * law.largest_m / size, y * law.largest_m / size
     for k in range(law.ankles.shape[0]):
         j = law.ankles[k]
-        axis = axes[j + 1]
+        axis = views.xaxis[j + 1]
         carried = left if law.sides[k] == 0 else right
         change = carried * law.softness[k] * (axis[1] * x - axis[0] * y)
         low, high = law.limits[k]

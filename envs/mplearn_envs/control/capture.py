@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from mplearn.maths.compiling import kernel
 from mplearn.maths.plane import turn_in_plane
 from mplearn.recording import FloatArray
 from mplearn_envs.mechanics.support import hull_margin, hull_of
@@ -61,7 +61,7 @@ class Step(NamedTuple):
     missing_m: float
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def outline(corners: FloatArray, place: FloatArray, inset: float) -> FloatArray:
     """Return the corners of a sole that stands somewhere, its edges moved inwards, (4, 2) [m].
 
@@ -80,7 +80,7 @@ def outline(corners: FloatArray, place: FloatArray, inset: float) -> FloatArray:
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def support_hull(corners: FloatArray, feet: FloatArray, up: int, inset: float) -> FloatArray:
     """Return the support polygon of soles with their edges moved inwards, shape (H, 2) [m].
 
@@ -96,7 +96,7 @@ def support_hull(corners: FloatArray, feet: FloatArray, up: int, inset: float) -
     return hull_of(np.concatenate((left, right)))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def nearest_inside(hull: FloatArray, x: float, y: float) -> tuple[float, float]:
     """Return the point of a convex polygon (H, 2), counter-clockwise, nearest to another."""
     if hull_margin(hull, x, y) >= 0.0:
@@ -114,7 +114,7 @@ def nearest_inside(hull: FloatArray, x: float, y: float) -> tuple[float, float]:
     return found_x, found_y
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def landing_place(
     corners: FloatArray,
     stands: FloatArray,
@@ -152,7 +152,7 @@ def landing_place(
     return place, max(0.0, -hull_margin(both, then_x, then_y))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def choose_step(
     corners: FloatArray, feet: FloatArray, dcm: FloatArray, rate: float, reach: Reach, only: int
 ) -> Step:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
-from numba import njit
 
+from mplearn.maths.compiling import inner_kernel, kernel
 from mplearn.maths.plane import turn_in_plane
 from mplearn.maths.rotation_kernels import rotation_error
 from mplearn.recording import FloatArray
@@ -14,6 +14,8 @@ from mplearn_envs.mechanics.kinematics import Pose, forward, rotate_quaternion
 from mplearn_envs.mechanics.reference import ReferenceRobot
 from mplearn_envs.mechanics.support import GRAVITY
 
+# Sides, as numbers of numpy: numba would compile a kernel anew for each literal that it is given.
+LEFT, RIGHT, NEITHER = (cast("int", np.int64(side)) for side in (0, 1, -1))
 _LOWEST_M = 0.3  # of the COG, for the pendulum
 
 
@@ -51,7 +53,7 @@ class Now(NamedTuple):
     dcm: FloatArray
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def sense(robot: ReferenceRobot, q: FloatArray, v: FloatArray, period_s: float, up: int) -> Now:
     """Return the moment.
 
@@ -94,7 +96,7 @@ def sense(robot: ReferenceRobot, q: FloatArray, v: FloatArray, period_s: float, 
     return Now(q, v, pose, after, spin, cog, cog_rate, feet, foot_rate, soles, floor, rate, dcm)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def sole_middle(robot: ReferenceRobot, feet: FloatArray, side: int) -> tuple[float, float]:
     """Return the middle of a sole, x and y [m]."""
     x, y = robot.corners[side, :, 0].mean(), robot.corners[side, :, 1].mean()
@@ -102,20 +104,20 @@ def sole_middle(robot: ReferenceRobot, feet: FloatArray, side: int) -> tuple[flo
     return feet[side, 0] + x, feet[side, 1] + y
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def in_base(q: FloatArray, vector: FloatArray) -> FloatArray:
     """Return a vector of the world (3,) as the base sees it."""
     conjugate = np.array([q[3], -q[4], -q[5], -q[6]])
     return _rotated(conjugate, vector)
 
 
-@njit(cache=True, nogil=True)
+@inner_kernel
 def _turned_by(q: FloatArray, vector: FloatArray) -> FloatArray:
     """Return a vector of the base's frame (3,) in the world's."""
     return _rotated(q[3:7], vector)
 
 
-@njit(cache=True, nogil=True)
+@inner_kernel
 def _rotated(quaternion: FloatArray, vector: FloatArray) -> FloatArray:
     w, x, y, z = quaternion
     a, b, c = vector

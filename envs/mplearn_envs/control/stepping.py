@@ -11,15 +11,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from mplearn.maths.compiling import inner_kernel, kernel
 from mplearn.maths.plane import turn_in_plane, wrap_angle
 from mplearn.recording import FloatArray
 from mplearn_envs.mechanics.reference import ReferenceRobot
 from mplearn_envs.mechanics.support import hull_margin
 
 from .capture import Reach, choose_step, landing_place, nearest_inside, support_hull
-from .senses import Now, sole_middle
+from .senses import LEFT, NEITHER, RIGHT, Now, sole_middle
 
 STANDS, SHIFTS, SWINGS = 0, 1, 2
 TOUCHES_M = 0.002  # so low a sole has landed
@@ -87,13 +87,13 @@ def new_mind() -> Mind:
     return Mind(*(np.zeros(n) for n in (4, 3, 3, 2, 4, 4, 4)))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def swinging(mind: Mind) -> int:
     """Return the side of the foot that is on its way, -1 for none."""
     return int(mind.phase[1]) if mind.phase[0] == SWINGS else -1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def wake(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now, up: int) -> None:
     """Start to balance by steps.
 
@@ -109,17 +109,17 @@ def wake(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now, up: int) -> 
     mind.goal[:] = now.dcm
     if up >= 0:
         step = choose_step(robot.corners, now.feet, now.dcm, now.rate, law.reach, up)
-        _lift(robot, mind, now, up, step.time_s, step.place, False)
+        _lift(robot, mind, now, up, step.time_s, step.place)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def settled(law: StepLaw, mind: Mind, now: Now, for_s: float) -> bool:
     """Return whether both feet stand beside each other and the weight has rested between them."""
     rests = mind.phase[0] == STANDS and mind.time[2] >= for_s
     return bool(rests and _astray(law, now.feet) < ASTRAY_M)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def decide(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> tuple[float, float]:
     """Think on by one control period; return where the zero-moment point shall be [m].
 
@@ -137,22 +137,23 @@ def decide(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> tuple[f
             mind.phase[0], mind.time[0], mind.time[2] = STANDS, 0.0, 0.0
             mind.goal[:] = now.dcm
     if mind.phase[0] != SWINGS:
-        hull = support_hull(robot.corners, now.feet, -1, 0.0)
+        hull = support_hull(robot.corners, now.feet, NEITHER, 0.0)
         landed = mind.phase[3] == 0.0 or mind.phase[0] == SHIFTS or mind.time[0] > 0.02
         if landed and hull_margin(hull, now.dcm[0], now.dcm[1]) < _LEAVES_M:
-            step = choose_step(robot.corners, now.feet, now.dcm, now.rate, law.reach, -1)
-            _lift(robot, mind, now, step.side, step.time_s, step.place, False)
+            step = choose_step(robot.corners, now.feet, now.dcm, now.rate, law.reach, NEITHER)
+            _lift(robot, mind, now, step.side, step.time_s, step.place)
     if mind.phase[0] == SHIFTS:
         side = int(mind.phase[1])
         over = support_hull(robot.corners, now.feet, side, _LIFTS_M)
         if hull_margin(over, now.dcm[0], now.dcm[1]) > 0.0:
-            _lift(robot, mind, now, side, _BACK_S, _beside(law, now.feet, side), True)
+            _lift(robot, mind, now, side, _BACK_S, _beside(law, now.feet, side))
+            mind.phase[2] = 1.0  # back
     if mind.phase[0] == SWINGS:
         return _on_one_foot(law, robot, mind, now)
     return _on_both_feet(law, robot, mind, now)
 
 
-@njit(cache=True, nogil=True)
+@inner_kernel
 def _lift(
     robot: ReferenceRobot,
     mind: Mind,
@@ -160,10 +161,9 @@ def _lift(
     side: int,
     time_s: float,
     place: FloatArray,
-    back: bool,
 ) -> None:
-    """Begin a step."""
-    mind.phase[0], mind.phase[1], mind.phase[2] = SWINGS, side, 1.0 if back else 0.0
+    """Begin a step, one to catch."""
+    mind.phase[0], mind.phase[1], mind.phase[2] = SWINGS, side, 0.0
     mind.phase[3] += 1.0
     mind.time[0], mind.time[1] = 0.0, time_s
     mind.place[:] = place
@@ -171,7 +171,7 @@ def _lift(
     mind.foot_rate[:3], mind.foot_rate[3] = now.foot_rate[side, :3], now.foot_rate[side, 5]
 
 
-@njit(cache=True, nogil=True)
+@inner_kernel
 def _on_one_foot(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> tuple[float, float]:
     """Move the foot on; return where in the standing sole the zero-moment point shall be."""
     side = int(mind.phase[1])
@@ -201,11 +201,11 @@ def _on_one_foot(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> t
     return nearest_inside(sole, x, y)
 
 
-@njit(cache=True, nogil=True)
+@inner_kernel
 def _on_both_feet(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> tuple[float, float]:
     """Bring the weight between the feet or over one; return the wanted zero-moment point."""
-    left_x, left_y = sole_middle(robot, now.feet, 0)
-    right_x, right_y = sole_middle(robot, now.feet, 1)
+    left_x, left_y = sole_middle(robot, now.feet, LEFT)
+    right_x, right_y = sole_middle(robot, now.feet, RIGHT)
     share = 0.5
     if mind.phase[0] == SHIFTS:
         share = 0.0 if mind.phase[1] == 0.0 else 1.0
@@ -223,7 +223,7 @@ def _on_both_feet(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> 
         mind.phase[0], mind.time[0], mind.time[2] = SHIFTS, 0.0, 0.0
         if mind.phase[2] == 0.0:  # after a step that caught, the other foot follows
             mind.phase[1] = 1.0 - mind.phase[1]
-    hull = support_hull(robot.corners, now.feet, -1, _INSET_M)
+    hull = support_hull(robot.corners, now.feet, NEITHER, _INSET_M)
     strong = 1.0 + law.gain / now.rate
     return nearest_inside(
         hull,
@@ -232,7 +232,7 @@ def _on_both_feet(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> 
     )
 
 
-@njit(cache=True, nogil=True)
+@inner_kernel
 def _astray(law: StepLaw, feet: FloatArray) -> float:
     """Return how far the left foot is from its place beside the right one [m]."""
     x, y = turn_in_plane(feet[0, 0] - feet[1, 0], feet[0, 1] - feet[1, 1], -feet[1, 2])
@@ -240,7 +240,7 @@ def _astray(law: StepLaw, feet: FloatArray) -> float:
     return float(np.hypot(x - law.apart[0], y - law.apart[1]) + _TURN_M * abs(turn))
 
 
-@njit(cache=True, nogil=True)
+@inner_kernel
 def _beside(law: StepLaw, feet: FloatArray, side: int) -> FloatArray:
     """Return a foot's place beside the other: x, y [m] and yaw [rad], shape (3,)."""
     x, y, turn = law.apart
@@ -252,7 +252,7 @@ def _beside(law: StepLaw, feet: FloatArray, side: int) -> FloatArray:
     return np.array([other[0] + dx, other[1] + dy, other[2] + turn])
 
 
-@njit(cache=True, nogil=True)
+@inner_kernel
 def _swing(law: StepLaw, robot: ReferenceRobot, mind: Mind, floor: float) -> None:
     """Move the foot that steps on its way: up, and down to its place."""
     h = law.period_s
@@ -271,7 +271,7 @@ def _swing(law: StepLaw, robot: ReferenceRobot, mind: Mind, floor: float) -> Non
     at += h * rate
 
 
-@njit(cache=True, nogil=True)
+@inner_kernel
 def _towards(x: float, rate: float, goal: float, left: float) -> float:
     """Return the acceleration with which a cubic comes to rest at a goal in the time left."""
     return 6.0 * (goal - x) / (left * left) - 4.0 * rate / left

@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from mplearn.maths.compiling import inner_kernel, kernel
 from mplearn.maths.plane import wrap_angle
 from mplearn.maths.rotation_kernels import rotation_error, turn_about_vertical
 from mplearn.maths.solvers import solve_damped
@@ -100,7 +100,7 @@ class Upper(NamedTuple):
     change: FloatArray
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def wanted_acceleration(
     law: BodyLaw,
     robot: ReferenceRobot,
@@ -171,7 +171,7 @@ def wanted_acceleration(
     return out
 
 
-@njit(cache=True, nogil=True)
+@inner_kernel
 def _foot(
     law: BodyLaw,
     robot: ReferenceRobot,
@@ -203,7 +203,7 @@ def _foot(
         out[3 + i] = min(max(a, -law.foot_turn), law.foot_turn)
 
 
-@njit(cache=True, nogil=True)
+@inner_kernel
 def _height(
     law: BodyLaw, robot: ReferenceRobot, mind: Mind, now: Now, wanted: float, period_s: float
 ) -> float:
@@ -234,7 +234,7 @@ def _height(
     return out
 
 
-@njit(cache=True, nogil=True)
+@inner_kernel
 def _cog_rate_of(robot: ReferenceRobot, now: Now, rate: FloatArray) -> FloatArray:
     """Return the COG's velocity that comes of the tracked hinges alone, shape (3,) [m/s]."""
     q = now.q.copy()
@@ -245,7 +245,7 @@ def _cog_rate_of(robot: ReferenceRobot, now: Now, rate: FloatArray) -> FloatArra
     return moved
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def command_legs(
     law: BodyLaw,
     robot: ReferenceRobot,

@@ -8,11 +8,14 @@ from typing import Any, NamedTuple
 
 import llvmlite.binding
 import mujoco
-from numba import njit, types
+import numpy as np
+from numba import types
 
 from mplearn.errors import RobotError
+from mplearn.maths.compiling import kernel
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.control.ankle_feedback import AnkleFeedback, correct
+from mplearn_envs.mechanics.views import Views
 
 from .tracking_report import FALL_DROP_M, has_fallen
 
@@ -37,81 +40,84 @@ mj_subtree_velocity = _of_mujoco("mj_subtreeVel")
 mj_inverse = _of_mujoco("mj_inverse")  # the forces that make an acceleration
 
 
-class Views(NamedTuple):
-    """What the loop sees of a simulation: MuJoCo's own memory; names are those of ``MjData``."""
+class Simulated(NamedTuple):
+    """A simulation, for compiled code.
 
-    ctrl: FloatArray
-    qpos: FloatArray
-    qvel: FloatArray
-    subtree_com: FloatArray
-    subtree_linvel: FloatArray
-    xpos: FloatArray
-    xmat: FloatArray
-    xaxis: FloatArray
-    xfrc_applied: FloatArray
+    Attributes:
+        model: Address of the model.
+        data: Address of its state.
+        views: Views of that.
+    """
+
+    model: int
+    data: int
+    views: Views
 
     @classmethod
-    def of(cls, data: mujoco.MjData) -> Views:
-        """Return views of a simulation's state."""
-        return cls(*(getattr(data, name) for name in cls._fields))
+    def of(cls, model: mujoco.MjModel, data: mujoco.MjData, feet: IntArray) -> Simulated:
+        """Return a simulation of a robot with these bodies as feet."""
+        return cls(model._address, data._address, Views.of(data, feet))
 
 
-@njit(cache=True, nogil=True)
+class Track(NamedTuple):
+    """What a robot did at a plan's K + 1 reference postures; filled as it goes on.
+
+    Attributes:
+        q: Postures, shape (K + 1, 7 + n).
+        v: Velocities, shape (K + 1, 6 + n).
+    """
+
+    q: FloatArray
+    v: FloatArray
+
+    @classmethod
+    def begin(cls, data: mujoco.MjData, n_knots: int) -> Track:
+        """Return a track that begins where the robot stands."""
+        track = cls(
+            np.empty((n_knots + 1, len(data.qpos))), np.empty((n_knots + 1, len(data.qvel)))
+        )
+        track.q[0], track.v[0] = data.qpos, data.qvel
+        return track
+
+
+@kernel
 def send(
-    model: int,
-    data: int,
-    views: Views,
-    feet: IntArray,
+    robot: Simulated,
     commands: FloatArray,
-    law: AnkleFeedback,
     wanted: FloatArray,
+    law: AnkleFeedback,
+    track: Track,
     first: int,
     last: int,
-    q: FloatArray,
-    v: FloatArray,
 ) -> tuple[int, bool]:
     """Send the commands between two of a plan's K + 1 reference postures, or until a fall.
 
     Args:
-        model: Address of the model.
-        data: Address of its state.
-        views: Views of that.
-        feet: Bodies of the feet, shape (2,).
+        robot: The simulated robot.
         commands: All servo commands of the plan, shape (N, n) [rad].
-        law: What corrects them; one without wanted values corrects nothing.
         wanted: Reference postures, shape (K + 1, 7 + n).
+        law: What corrects them; one without wanted values corrects nothing.
+        track: Filled after the first.
         first: Where the robot is in the plan.
         last: Where to stop.
-        q: Filled with the postures at the reference postures after the first, (K + 1, 7 + n).
-        v: Filled with the velocities there, (K + 1, 6 + n).
 
     Returns:
         Where it stopped, and whether because the robot had fallen there.
     """
+    views = robot.views
     n_steps = commands.shape[0] // (wanted.shape[0] - 1)
     guided = law.wanted.shape[0] > 0
     for knot in range(first + 1, last + 1):
         for step in range((knot - 1) * n_steps, knot * n_steps):
             views.ctrl[:] = commands[step]
             if guided:  # by how the robot stands now: what is performed depends on its state alone
-                mj_step1(model, data)
-                mj_subtree_velocity(model, data)
-                correct(
-                    law,
-                    step,
-                    views.ctrl,
-                    views.subtree_com[1],
-                    views.subtree_linvel[1],
-                    views.xpos[feet[0]],
-                    views.xpos[feet[1]],
-                    views.xmat[feet[0]],
-                    views.xmat[feet[1]],
-                    views.xaxis,
-                )
-                mj_step2(model, data)
+                mj_step1(robot.model, robot.data)
+                mj_subtree_velocity(robot.model, robot.data)
+                correct(law, step, views)
+                mj_step2(robot.model, robot.data)
             else:
-                _mj_step(model, data)
-        q[knot], v[knot] = views.qpos, views.qvel
-        if has_fallen(q[knot], wanted[knot], FALL_DROP_M):
+                _mj_step(robot.model, robot.data)
+        track.q[knot], track.v[knot] = views.qpos, views.qvel
+        if has_fallen(track.q[knot], wanted[knot], FALL_DROP_M):
             return knot, True
     return last, False

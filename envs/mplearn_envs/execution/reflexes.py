@@ -6,18 +6,19 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numba import njit
 
+from mplearn.maths.compiling import kernel
 from mplearn.maths.easing import minimum_jerk
 from mplearn.maths.rotation_kernels import turn_about_vertical
 from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix, roll_pitch_of
 from mplearn.recording import FloatArray, IntArray
-from mplearn_envs.control.ankle_feedback import AnkleFeedback, correct
+from mplearn_envs.control.ankle_feedback import AnkleFeedback, correct, make_ankle_feedback
 from mplearn_envs.control.capture import Reach
 from mplearn_envs.control.senses import sense
 from mplearn_envs.control.stepping import Mind, StepLaw, decide, new_mind, settled, swinging, wake
 from mplearn_envs.control.whole_body import BodyLaw, Upper, command_legs, wanted_acceleration
 from mplearn_envs.mechanics.gravity import holding_torques
+from mplearn_envs.mechanics.inverse_dynamics import free_model
 from mplearn_envs.mechanics.reference import (
     Reference,
     ReferenceRobot,
@@ -31,7 +32,7 @@ from mplearn_envs.planning.planner import GRID_DECIMALS
 from mplearn_envs.planning.stride import recentred
 from mplearn_envs.robot import Robot
 
-from .mujoco_loop import Views, mj_inverse, mj_step1, mj_step2, mj_subtree_velocity
+from .mujoco_loop import Simulated, Track, mj_inverse, mj_step1, mj_step2, mj_subtree_velocity
 from .tracking_report import FALL_DROP_M, has_fallen
 
 ASTRAY_M = 0.06  # a DCM so far from its plan wakes the reflexes
@@ -96,12 +97,37 @@ class Course(NamedTuple):
 
 
 class Own(NamedTuple):
-    """What the robot reckons with: its own model of itself, without the ground."""
+    """What the robot reckons with: its own model of itself, without the ground.
 
+    Attributes:
+        model: Address of the model.
+        data: Address of its state; the other fields are named as those of ``MjData``.
+    """
+
+    model: int
+    data: int
     qpos: FloatArray
     qvel: FloatArray
     qacc: FloatArray
     qfrc_inverse: FloatArray
+
+
+class Balance(NamedTuple):
+    """How a robot keeps its balance.
+
+    Attributes:
+        robot: The robot as it knows itself.
+        own: Its own model of itself.
+        ankles: What corrects commands as long as no step is needed.
+        law: What stepping goes by.
+        body: What the whole body's control goes by.
+    """
+
+    robot: ReferenceRobot
+    own: Own
+    ankles: AnkleFeedback
+    law: StepLaw
+    body: BodyLaw
 
 
 class Reflexes:
@@ -114,19 +140,16 @@ class Reflexes:
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self.reference = reference_robot(robot)
-        self.model = mujoco.MjModel.from_xml_string(robot.xml)
-        off = mujoco.mjtDisableBit
-        self.model.opt.disableflags |= (
-            off.mjDSBL_CONSTRAINT | off.mjDSBL_ACTUATION | off.mjDSBL_SENSOR
-        )
-        self.data = mujoco.MjData(self.model)
-        self.own = Own(*(getattr(self.data, name) for name in Own._fields))
+        self._model = free_model(robot)
+        self._data = mujoco.MjData(self._model)
+        state = (getattr(self._data, name) for name in Own._fields[2:])
+        self._own = Own(self._model._address, self._data._address, *state)
         limits = robot.position_limits.copy()
         for knee in robot.knees:
             j = robot.joint_names.index(knee)
             limits[j, 0] = max(limits[j, 0], 0.5 * robot.guard_knee_rad)
         ground = self.reference.ground
-        period_s = float(self.model.opt.timestep)
+        period_s = float(self._model.opt.timestep)
         self.law = StepLaw(
             period_s,
             _TUNED["gain"],
@@ -155,6 +178,11 @@ class Reflexes:
                 )
             ),
         )
+
+    def balance(self, plan: Plan) -> Balance:
+        """Return how the balance is kept while a plan is performed."""
+        ankles = make_ankle_feedback(self.robot, plan)
+        return Balance(self.reference, self._own, ankles, self.law, self.body)
 
     def course(self, plan: Plan) -> Course:
         """Return what a plan wants."""
@@ -216,6 +244,7 @@ class Progress(NamedTuple):
     """Where a robot is in a plan; arrays, changed in place.
 
     Attributes:
+        knot: Of the plan, at which the robot is, shape (1,).
         mind: What stepping remembers.
         awake: 1 once the robot balances by steps, shape (1,).
         command: What the servos got last, shape (n,) [rad].
@@ -223,6 +252,7 @@ class Progress(NamedTuple):
         late: Commands that have not reached the servos yet, shape (lag, n) [rad].
     """
 
+    knot: IntArray
     mind: Mind
     awake: IntArray
     command: FloatArray
@@ -239,57 +269,43 @@ def new_progress(command: FloatArray, lag: int) -> Progress:
     """
     late = np.repeat(command[None], lag, axis=0)
     owed = np.zeros((2, len(command)))
-    return Progress(new_mind(), np.zeros(1, np.int64), command.copy(), owed, late)
+    knot, awake = np.zeros((2, 1), np.int64)
+    return Progress(knot, new_mind(), awake, command.copy(), owed, late)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def send_watchful(
-    addresses: tuple[int, int, int, int],
-    views: Views,
-    own: Own,
-    feet: IntArray,
-    robot: ReferenceRobot,
-    ankles: AnkleFeedback,
-    law: StepLaw,
-    body: BodyLaw,
+    simulated: Simulated,
+    balance: Balance,
     course: Course,
     pushes: Pushes,
     progress: Progress,
-    first: int,
+    track: Track,
     last: int,
-    q: FloatArray,
-    v: FloatArray,
-) -> tuple[int, bool, bool]:
-    """Send the commands of a plan of K knots between two of its knots, or until a fall.
+) -> tuple[bool, bool]:
+    """Send the commands of a plan of K knots from where the robot is to a knot, or until a fall.
 
     Knots beyond the last are those of a robot that is still stepping back.
 
     Args:
-        addresses: Of the model, its state, the robot's own model, and its state.
-        views: Views of the state.
-        own: Views of its own model's state.
-        feet: Bodies of the feet, shape (2,).
-        robot: The reference robot.
-        ankles: What corrects the commands as long as no step is needed.
-        law: What stepping goes by.
-        body: What the whole body's control goes by.
+        simulated: The simulated robot.
+        balance: How it keeps its balance.
         course: What the plan wants.
         pushes: What pushes the robot.
         progress: Where the robot is in the plan.
-        first: Knot at which the robot is.
+        track: Filled at the plan's knots after the first.
         last: Where to stop.
-        q: Filled with the postures at the plan's knots after the first, (K + 1, 7 + n).
-        v: Filled with the velocities there, (K + 1, 6 + n).
 
     Returns:
-        Where it stopped, whether it had fallen there, and whether all is over.
+        Whether it has fallen, and whether all is over.
     """
-    model, data, own_model, own_data = addresses
+    model, data, views = simulated.model, simulated.data, simulated.views
+    robot, own, law, body = balance.robot, balance.own, balance.law, balance.body
     mind, owed, h = progress.mind, progress.owed, law.period_s
     n_knots = course.q.shape[0] - 1
     n_steps = course.commands.shape[0] // n_knots
     still = np.zeros(course.rate.shape[1])
-    for knot in range(first + 1, last + 1):
+    for knot in range(progress.knot[0] + 1, last + 1):
         at = min(knot, n_knots)
         for step in range((knot - 1) * n_steps, knot * n_steps):
             views.ctrl[:] = course.commands[min(step, n_knots * n_steps - 1)]
@@ -300,19 +316,7 @@ def send_watchful(
             mj_step1(model, data)
             if progress.awake[0] == 0:
                 mj_subtree_velocity(model, data)
-                off = correct(
-                    ankles,
-                    step,
-                    views.ctrl,
-                    views.subtree_com[1],
-                    views.subtree_linvel[1],
-                    views.xpos[feet[0]],
-                    views.xpos[feet[1]],
-                    views.xmat[feet[0]],
-                    views.xmat[feet[1]],
-                    views.xaxis,
-                )
-                if off > ASTRAY_M:
+                if correct(balance.ankles, step, views) > ASTRAY_M:
                     progress.awake[0] = 1
                     now = sense(robot, views.qpos.copy(), views.qvel.copy(), h, course.up[at])
                     wake(law, robot, mind, now, course.up[at])
@@ -328,7 +332,7 @@ def send_watchful(
                 )
                 change = wanted_acceleration(body, robot, mind, now, upper, zmp_x, zmp_y, h)
                 own.qpos[:], own.qvel[:], own.qacc[:] = views.qpos, views.qvel, change
-                mj_inverse(own_model, own_data)
+                mj_inverse(own.model, own.data)
                 command_legs(body, robot, mind, now, change, own.qfrc_inverse, h, views.ctrl, owed)
             progress.command[:] = views.ctrl
             if progress.late.shape[0] > 0:
@@ -336,15 +340,16 @@ def send_watchful(
                 views.ctrl[:] = progress.late[slot]
                 progress.late[slot] = progress.command
             mj_step2(model, data)
+        progress.knot[0] = knot
         if knot <= n_knots:
-            q[knot], v[knot] = views.qpos, views.qvel
+            track.q[knot], track.v[knot] = views.qpos, views.qvel
         drop = _DROP_M if progress.awake[0] == 1 else FALL_DROP_M
         if has_fallen(views.qpos, course.q[at], drop):
-            return knot, True, True
+            return True, True
         if knot >= n_knots:
             if progress.awake[0] == 0:
-                return knot, False, True
+                return False, True
             now = sense(robot, views.qpos.copy(), views.qvel.copy(), h, swinging(mind))
             if settled(law, mind, now, RESTS_S):
-                return knot, False, True
-    return last, False, False
+                return False, True
+    return False, False

@@ -20,7 +20,7 @@ from mplearn_envs.robot import Robot
 from mplearn_envs.robot.feet import sole_corners
 
 from .bodies import NOMINAL, Body, body_model, draw_pushes, embody
-from .mujoco_loop import Views, send
+from .mujoco_loop import Simulated, Track, send
 from .reflexes import LONGEST_S, NO_PUSHES, Pushes, Reflexes, new_progress, send_watchful
 from .tracking_report import FALL_DROP_M, assess, has_fallen
 from .tracking_report import TrackingReport as TrackingReport
@@ -59,7 +59,6 @@ class Simulation:
         self.embody(0)
         self._corners = sole_corners(self.model)
         self._feet = np.array([self.model.body(name).id for name in robot.feet])
-        self._views = Views.of(self.data)
 
     def embody(self, draw: int) -> None:
         """Draw a body; `reset` makes it stand.
@@ -140,19 +139,16 @@ class Simulation:
         at_once = n_knots if on_frame is None else -(-frame_steps // n_steps)
         guided = self.feedback == "always" or (self.feedback == "steps" and plan.steps)
         law = make_ankle_feedback(self.robot, plan, guided)
-        addresses = self.model._address, self.data._address
-        q, v = np.empty((n_knots + 1, self.model.nq)), np.empty((n_knots + 1, self.model.nv))
-        q[0], v[0] = self.data.qpos, self.data.qvel
+        robot = Simulated.of(self.model, self.data, self._feet)
+        track = Track.begin(self.data, n_knots)
         done, fallen = 0, False
         while done < n_knots and not fallen:
             last = min(done + at_once, n_knots)
-            done, fallen = send(
-                *addresses, self._views, self._feet, plan.commands, law, plan.q, done, last, q, v
-            )
+            done, fallen = send(robot, plan.commands, plan.q, law, track, done, last)
             self._update_positions()
             if on_frame is not None:
                 on_frame()
-        return assess(self.robot, plan, q[: done + 1], v[: done + 1], fallen)
+        return assess(self.robot, plan, track.q[: done + 1], track.v[: done + 1], fallen)
 
     def _perform_watchful(
         self, plan: Plan, on_frame: Callable[[], None] | None, frame_steps: int, pushes: Pushes
@@ -164,38 +160,20 @@ class Simulation:
         longest = n_knots + round(LONGEST_S / plan.knot_s)
         at_once = longest if on_frame is None else -(-frame_steps // n_steps)
         progress = new_progress(self.data.ctrl, self._drawn.lag)
-        course = reflexes.course(plan)
-        addresses = (
-            self.model._address,
-            self.data._address,
-            reflexes.model._address,
-            reflexes.data._address,
-        )
-        fixed = (
-            addresses,
-            self._views,
-            reflexes.own,
-            self._feet,
-            reflexes.reference,
-            make_ankle_feedback(self.robot, plan),
-            reflexes.law,
-            reflexes.body,
-            course,
-            pushes,
-            progress,
-        )
-        q, v = np.empty((n_knots + 1, self.model.nq)), np.empty((n_knots + 1, self.model.nv))
-        q[0], v[0] = self.data.qpos, self.data.qvel
-        done, fallen, over = 0, False, False
-        while not over and done < longest:
-            last = min(done + at_once, longest)
-            done, fallen, over = send_watchful(*fixed, done, last, q, v)
+        track = Track.begin(self.data, n_knots)
+        robot = Simulated.of(self.model, self.data, self._feet)
+        what = robot, reflexes.balance(plan), reflexes.course(plan), pushes, progress
+        fallen, over = False, False
+        while not over and progress.knot[0] < longest:
+            last = min(int(progress.knot[0]) + at_once, longest)
+            fallen, over = send_watchful(*what, track, last)
             self._update_positions()
             if on_frame is not None:
                 on_frame()
         self.data.xfrc_applied[:] = 0.0
+        done = int(progress.knot[0])
         known = min(done, n_knots) + 1
-        report = assess(self.robot, plan, q[:known], v[:known], fallen)
+        report = assess(self.robot, plan, track.q[:known], track.v[:known], fallen)
         if fallen or not progress.awake[0]:
             return report
         end = reflexes.arrival(plan, self.data.qpos)
@@ -240,8 +218,8 @@ class Simulation:
         copied.__dict__.update(self.__dict__)
         if not self.body.certain:  # it draws others
             copied.model = copy.copy(self.model)
+        copied.__dict__.pop("_reflexes", None)  # they have memory of their own
         copied.data = mujoco.MjData(copied.model)
-        copied._views = Views.of(copied.data)
         copied.load_state(self.state())
         return copied
 

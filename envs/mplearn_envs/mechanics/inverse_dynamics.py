@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from mplearn.maths.rotation_kernels import quaternion_matrix
@@ -12,7 +14,20 @@ from .kinematics import forward
 from .reference import reference_robot
 from .velocity_ik import FEET, add_leg_columns, jacobian_rows
 
+if TYPE_CHECKING:
+    import mujoco
+
 _LEVER_M = 0.1  # a foot carries a moment as unwillingly as this lever's force
+
+
+def free_model(robot: Robot) -> mujoco.MjModel:
+    """Return the robot as MuJoCo has it, without ground, limits, servos and sensors."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string(robot.xml)
+    off = mujoco.mjtDisableBit
+    model.opt.disableflags |= off.mjDSBL_CONSTRAINT | off.mjDSBL_ACTUATION | off.mjDSBL_SENSOR
+    return model
 
 
 class InverseDynamics:
@@ -30,11 +45,7 @@ class InverseDynamics:
 
         self.robot = robot
         self._reference = reference_robot(robot)
-        self._model = mujoco.MjModel.from_xml_string(robot.xml)
-        off = mujoco.mjtDisableBit
-        self._model.opt.disableflags |= (
-            off.mjDSBL_CONSTRAINT | off.mjDSBL_ACTUATION | off.mjDSBL_SENSOR
-        )
+        self._model = free_model(robot)
         self._data = mujoco.MjData(self._model)
         self._torque = robot.per_joint("torque")
 

@@ -14,6 +14,7 @@ from mplearn_envs.control.ankle_feedback import correct, make_ankle_feedback
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.mechanics import rest_reference
 from mplearn_envs.mechanics.reference import tracked_columns
+from mplearn_envs.mechanics.views import Views
 from mplearn_envs.planning import Motion, Planner
 from mplearn_envs.robot import humanoid
 
@@ -88,16 +89,13 @@ def test_guided_steps_are_mujocos_with_the_guides_corrections(simulation):
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     guide = make_ankle_feedback(HUMANOID, PLAN)
-    feet = [model.body(name).id for name in HUMANOID.feet]
-    seen = [data.xpos[feet[0]], data.xpos[feet[1]], data.xmat[feet[0]], data.xmat[feet[1]]]
+    views = Views.of(data, np.array([model.body(name).id for name in HUMANOID.feet]))
     changed = 0
     for step, command in enumerate(PLAN.commands):
         mujoco.mj_step1(model, data)  # the feedback is by where the robot is now
         mujoco.mj_subtreeVel(model, data)
         data.ctrl[:] = command
-        correct(
-            guide, step, data.ctrl, data.subtree_com[1], data.subtree_linvel[1], *seen, data.xaxis
-        )
+        correct(guide, step, views)
         changed += (data.ctrl != command).any()
         mujoco.mj_step2(model, data)
     expected = np.empty(mujoco.mj_stateSize(model, STATE))
