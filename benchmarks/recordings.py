@@ -25,7 +25,7 @@ from mplearn.library import PrimitiveLibrary
 from mplearn.mocap import Hints, open_recordings
 from mplearn.mocap.registry import reader_of
 from mplearn_agents.cli import main as mplearn
-from mplearn_agents.inspection import inspect
+from mplearn_agents.recordings.inspection import inspect
 
 STEPS = 5  # primitives that are performed of each
 

@@ -18,10 +18,10 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from mplearn.errors import InvalidValueError, MPLearnError
+from mplearn_agents.terminal.exit_codes import BAD_INPUT, INTERRUPTED
+from mplearn_agents.terminal.inert import inert_output
 
 from . import commands
-from .exit_codes import BAD_INPUT, INTERRUPTED
-from .inert import inert_output
 
 _OF_AN_OPTION = re.compile(r"argument (?P<option>--[\w-]+): (?P<problem>must .*)", re.DOTALL)
 _CODES = """exit codes: 0 done; 1 what was checked is not in order; 2 bad input; 130 interrupted"""

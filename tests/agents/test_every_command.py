@@ -15,10 +15,10 @@ import pytest
 from rich.table import Table
 
 from mplearn.library import PrimitiveLibrary
-from mplearn_agents import console as consoles
 from mplearn_agents.cli import build_parser, command_modules, main
-from mplearn_agents.console import InertConsole
-from mplearn_agents.inert import InertStream, inert_output, printable
+from mplearn_agents.terminal import console as consoles
+from mplearn_agents.terminal.console import InertConsole
+from mplearn_agents.terminal.inert import InertStream, inert_output, printable
 from mplearn_envs.data.library_source import LibrarySource
 
 COMMANDS = sorted(command_modules())

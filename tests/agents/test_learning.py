@@ -19,7 +19,7 @@ from mplearn.recording import LabelledSegment, Segment
 from mplearn.tree import Placement
 from mplearn_agents.cli import main
 from mplearn_agents.demo.score import score_learning
-from mplearn_agents.learning import LearningLog
+from mplearn_agents.learning.watched import LearningLog
 
 
 def test_a_log_counts_what_lives():

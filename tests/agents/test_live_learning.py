@@ -18,9 +18,9 @@ from mplearn.library import PrimitiveLibrary
 from mplearn.sources import Block, Change, Source, Stream, Tally, source_kinds
 from mplearn.sources.played import PlayedSource
 from mplearn_agents.cli import main
-from mplearn_agents.event_lines import change_text
-from mplearn_agents.interrupts import asked_to_stop
-from mplearn_agents.live_learning import SOURCES, learn_live
+from mplearn_agents.learning.live import SOURCES, learn_live
+from mplearn_agents.terminal.event_lines import change_text
+from mplearn_agents.terminal.interrupts import asked_to_stop
 
 ENV = {**os.environ, "NO_COLOR": "1", "COLUMNS": "120"}
 RUN = [sys.executable, "-m", "mplearn_agents.cli"]

@@ -15,7 +15,7 @@ from mplearn.library import PrimitiveLibrary
 from mplearn.mocap import join_by_name
 from mplearn.recording import Recording, marker_channels
 from mplearn_agents.cli import main
-from mplearn_agents.learning import learn
+from mplearn_agents.learning.watched import learn
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from mplearn.errors import InvalidValueError, RobotError, UnknownPrimitiveError
+from mplearn_agents.contests.suited import NEEDS_TASK
 from mplearn_agents.policies import (
     POLICIES,
     Greedy,
@@ -12,7 +13,6 @@ from mplearn_agents.policies import (
     Policy,
     RandomWalk,
 )
-from mplearn_agents.suited import NEEDS_TASK
 from mplearn_agents.walk import walk
 from mplearn_envs.skills.feasibility import FeasibilityConfig
 

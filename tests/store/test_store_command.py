@@ -10,11 +10,11 @@ import pytest
 from rich.console import Console
 from streams import CHANNELS, RATE_HZ, learner, stream
 
-import mplearn_agents.learning
+import mplearn_agents.learning.watched
 from mplearn import PrimitiveLibrary, Recording
 from mplearn.store import LifelongLearner, StoreReader
 from mplearn_agents.cli import main
-from mplearn_agents.learning import learn
+from mplearn_agents.learning.watched import learn
 
 TAKES = [Recording(stream(24, k), RATE_HZ, CHANNELS, name=f"take {k}") for k in range(3)]
 
@@ -43,7 +43,7 @@ def test_learning_that_is_stopped_goes_on(
         for _ in whole.learn_recording(take, 50):
             pass
     console = Console(quiet=True)
-    shown = mplearn_agents.learning._show
+    shown = mplearn_agents.learning.watched._show
     left = [0]
 
     def show(*args: object) -> None:
@@ -52,7 +52,7 @@ def test_learning_that_is_stopped_goes_on(
             os.kill(os.getpid(), number)
         shown(*args)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(mplearn_agents.learning, "_show", show)
+    monkeypatch.setattr(mplearn_agents.learning.watched, "_show", show)
     for stop, done in ((5, False), (30, False), (10**9, True)):
         left[0] = stop
         with LifelongLearner.open(tmp_path / "life.db", learner) as life:
@@ -76,7 +76,7 @@ def test_who_interrupts_learning_is_told_so_and_keeps_what_was_learned(
     rows = np.column_stack((np.arange(len(frames)) / RATE_HZ, frames))
     data, out = tmp_path / "take.csv", tmp_path / "out.mplearn"
     np.savetxt(data, rows, delimiter=",", header="time,a,b,c,d", comments="")
-    shown, left = mplearn_agents.learning._show, [stop]
+    shown, left = mplearn_agents.learning.watched._show, [stop]
 
     def show(*args: object) -> None:
         left[0] -= 1
@@ -84,7 +84,7 @@ def test_who_interrupts_learning_is_told_so_and_keeps_what_was_learned(
             os.kill(os.getpid(), signal.SIGINT)
         shown(*args)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(mplearn_agents.learning, "_show", show)
+    monkeypatch.setattr(mplearn_agents.learning.watched, "_show", show)
     argv = ["learn", str(data), "--observe", "channels", "--out", str(out)]
     assert main(argv) == code
     assert ("Stopped: what was learned" in capsys.readouterr().out) == bool(code)

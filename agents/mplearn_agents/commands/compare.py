@@ -6,11 +6,11 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from mplearn_agents.arguments import count, seed
-from mplearn_agents.suited import SUITED
+from mplearn_agents.contests.suited import SUITED
+from mplearn_agents.terminal.arguments import count, seed
 
 if TYPE_CHECKING:
-    from mplearn_agents.contest import Contest
+    from mplearn_agents.contests.contest import Contest
 
 HELP = "Compare policies and trained agents on the environment's tasks."
 EXAMPLE = "mplearn compare --tasks goal --policies random greedy --seeds 3"
@@ -72,11 +72,11 @@ def run(args: argparse.Namespace) -> None:
     from rich.progress import Progress
     from rich.table import Table as Shown
 
-    from mplearn_agents.compare import compare
-    from mplearn_agents.comparison import Comparison
-    from mplearn_agents.console import open_console
+    from mplearn_agents.contests.compare import compare
+    from mplearn_agents.contests.comparison import Comparison
     from mplearn_agents.policies import POLICIES
     from mplearn_agents.rl.config import AlgorithmName, PriorUse
+    from mplearn_agents.terminal.console import open_console
 
     comparison = Comparison(
         tasks=tuple(args.tasks),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from mplearn_agents.arguments import count, positive, seed
+from mplearn_agents.terminal.arguments import count, positive, seed
 
 HELP = "Learn from a synthetic demonstrator, let the robot walk, and write a report."
 EXAMPLE = "mplearn demo --minutes 7 --out out/demo"
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Run the demo."""
-    from mplearn_agents.console import open_console
     from mplearn_agents.demo.run import run_demo
+    from mplearn_agents.terminal.console import open_console
 
     run_demo(args.out, args.minutes, args.steps, args.seed, open_console())

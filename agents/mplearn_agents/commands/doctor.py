@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from mplearn_agents.exit_codes import NOT_IN_ORDER
+from mplearn_agents.terminal.exit_codes import NOT_IN_ORDER
 
 HELP = (
     "Check this installation: versions, extras, rendering, data; say what to do. 1: not in order."
@@ -22,8 +22,8 @@ def run(args: argparse.Namespace) -> int:
     """Check, print, and return 1 where something that is needed does not work."""
     from rich.text import Text
 
-    from mplearn_agents.console import new_table, open_console
     from mplearn_agents.diagnosis import diagnose
+    from mplearn_agents.terminal.console import new_table, open_console
 
     found = list(diagnose())
     if args.json:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from mplearn_agents.arguments import count, seed
+from mplearn_agents.terminal.arguments import count, seed
 
 HELP = "Play episodes and write them as a Minari data set, for offline reinforcement learning."
 EXAMPLE = "mplearn episodes mplearn/goal-random-v0 --task goal --out out/data"

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mplearn.errors import InvalidValueError, MPLearnError
-from mplearn_agents.arguments import count, seed
-
-from ..reading import say_left_out
+from mplearn_agents.recordings.reading import say_left_out
+from mplearn_agents.terminal.arguments import count, seed
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -51,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Run the experiments; print each table as it is done."""
-    from mplearn_agents.console import open_console
+    from mplearn_agents.terminal.console import open_console
 
     from ..evaluations import BUILT_IN, Setting, evaluations_for
 

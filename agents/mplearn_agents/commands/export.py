@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mplearn.errors import InvalidValueError
-from mplearn_agents.arguments import count, positive, primitive_key, seed
-from mplearn_agents.exit_codes import NOT_IN_ORDER
+from mplearn_agents.terminal.arguments import count, positive, primitive_key, seed
+from mplearn_agents.terminal.exit_codes import NOT_IN_ORDER
 
 if TYPE_CHECKING:
     from mplearn_envs.export import Verdict

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import InvalidValueError
-from mplearn_agents.arguments import count, positive, primitive_key, seed
+from mplearn_agents.terminal.arguments import count, positive, primitive_key, seed
 
 if TYPE_CHECKING:
     from mplearn.library import PrimitiveLibrary

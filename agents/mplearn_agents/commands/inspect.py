@@ -8,12 +8,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mplearn_agents.reading import add_reading_arguments, hints_of, say_left_out
+from mplearn_agents.recordings.reading import add_reading_arguments, hints_of, say_left_out
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from mplearn_agents.inspection import Inspection
+    from mplearn_agents.recordings.inspection import Inspection
 
 HELP = "Show what recordings hold: how they were read, and the person recognised in them."
 EXAMPLE = "mplearn inspect session.c3d --up y --unit mm"
@@ -36,8 +36,8 @@ def run(args: argparse.Namespace) -> None:
     """Read, recognise, print and draw."""
     from mplearn.anatomy import read_map
     from mplearn.mocap import command_line, open_takes
-    from mplearn_agents.console import open_console
-    from mplearn_agents.inspection import inspect
+    from mplearn_agents.recordings.inspection import inspect
+    from mplearn_agents.terminal.console import open_console
 
     console = open_console()
     with command_line():
@@ -66,7 +66,7 @@ def _draw(args: argparse.Namespace, found: list[Inspection], console: Console) -
         console.print("no picture: it needs pip install 'mplearn[report]'")
         return
     require("matplotlib", "report")
-    from mplearn_agents.stick_figures import draw
+    from mplearn_agents.recordings.stick_figures import draw
 
     path = args.picture or Path(f"{args.data.name.split('.')[0]}.png")
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -11,11 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import InvalidValueError, MPLearnError, RecordingError, StateError
-from mplearn_agents.arguments import count, positive
-from mplearn_agents.exit_codes import INTERRUPTED
-from mplearn_agents.inert import printable
-from mplearn_agents.live_learning import add_live_arguments, learn_from_source
-from mplearn_agents.reading import (
+from mplearn_agents.learning.live import add_live_arguments, learn_from_source
+from mplearn_agents.recordings.reading import (
     add_corpus_arguments,
     add_reading_arguments,
     hints_of,
@@ -23,6 +20,9 @@ from mplearn_agents.reading import (
     say_left_out,
     say_takes,
 )
+from mplearn_agents.terminal.arguments import count, positive
+from mplearn_agents.terminal.exit_codes import INTERRUPTED
+from mplearn_agents.terminal.inert import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from mplearn.recording import Recording
     from mplearn.store import LifelongLearner
     from mplearn.tree import TreeConfig
-    from mplearn_agents.learning import LearningLog
+    from mplearn_agents.learning.watched import LearningLog
 
 _SAME_RATE = 1e-3  # rates that differ by a smaller share are one
 
@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
     if args.jobs is not None or args.ray is not None:
         if args.live is not None:
             raise InvalidValueError("--jobs and --ray learn recordings, not --live SOURCE")
-        from mplearn_agents.corpora import learn_in_shards
+        from mplearn_agents.learning.corpora import learn_in_shards
 
         return learn_in_shards(args, partial(_configured, args))
     if args.out is None and args.store is None:
@@ -116,9 +116,9 @@ def _learn_from_files(args: argparse.Namespace) -> int:
     from mplearn.learner import LearnerConfig, with_takes
     from mplearn.mocap import command_line, open_takes
     from mplearn.store import LifelongLearner, is_begun
-    from mplearn_agents.console import open_console
-    from mplearn_agents.learning import learn, why_nothing
-    from mplearn_agents.tables import primitive_table
+    from mplearn_agents.learning.watched import learn, why_nothing
+    from mplearn_agents.terminal.console import open_console
+    from mplearn_agents.terminal.tables import primitive_table
 
     console = open_console()
     with command_line():

@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 
 from mplearn.extras import require
-from mplearn_agents.arguments import pace, port
-from mplearn_agents.inert import printable
+from mplearn_agents.terminal.arguments import pace, port
+from mplearn_agents.terminal.inert import printable
 
 HELP = "Learn from live motion, and show it all on a page in the browser."
 EXAMPLE = "mplearn live demonstrator --port 8765"

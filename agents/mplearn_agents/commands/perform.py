@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import InvalidValueError, MissingDependencyError
-from mplearn_agents.arguments import count, positive, primitive_key, seed, whole
+from mplearn_agents.terminal.arguments import count, positive, primitive_key, seed, whole
 
 if TYPE_CHECKING:
     import gymnasium

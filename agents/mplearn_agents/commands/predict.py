@@ -7,7 +7,7 @@ import json
 import math
 from pathlib import Path
 
-from mplearn_agents.arguments import count, primitive_key
+from mplearn_agents.terminal.arguments import count, primitive_key
 
 HELP = "Predict which primitive comes next, how likely and when, after those given."
 EXAMPLE = "mplearn predict my.mplearn 'bow down' 'bow up' --most 3"
@@ -28,7 +28,7 @@ def run(args: argparse.Namespace) -> None:
     from rich.text import Text
 
     from mplearn.library import PrimitiveLibrary
-    from mplearn_agents.console import new_table, open_console
+    from mplearn_agents.terminal.console import new_table, open_console
 
     library = PrimitiveLibrary.load(args.library)
     history = [key if key in library else primitive_key(key) for key in args.history]

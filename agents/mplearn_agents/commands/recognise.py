@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mplearn.errors import RecordingError
-from mplearn_agents.reading import (
+from mplearn_agents.recordings.reading import (
     add_corpus_arguments,
     add_reading_arguments,
     hints_of,
@@ -51,12 +51,12 @@ def run(args: argparse.Namespace) -> None:
 
     from mplearn.library import PrimitiveLibrary
     from mplearn.tables import SegmentTable, format_of, recognise_recording, write_segments
-    from mplearn_agents.console import new_table, open_console
+    from mplearn_agents.terminal.console import new_table, open_console
 
     if args.to is not None:
         format_of(args.to)
     if args.jobs is not None or args.ray is not None:
-        from mplearn_agents.corpora import recognise_in_chunks
+        from mplearn_agents.learning.corpora import recognise_in_chunks
 
         recognise_in_chunks(args)
         return

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from mplearn_agents.arguments import primitive_key
+from mplearn_agents.terminal.arguments import primitive_key
 
 HELP = "Give a primitive of a library a name; its id stays."
 EXAMPLE = "mplearn rename my.mplearn 7 'bow down'"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from mplearn.errors import InvalidValueError
-from mplearn_agents.arguments import pace
+from mplearn_agents.terminal.arguments import pace
 
 HELP = "Send a recording over a network, at its own pace, for another program to learn live."
 EXAMPLE = "mplearn send session.c3d --to udp:127.0.0.1:5005"
@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> None:
     from mplearn.mocap import Hints
     from mplearn.sources import Wanted, connect, source_kinds
     from mplearn.sources.sending import open_sender, send
-    from mplearn_agents.interrupts import asked_to_stop
+    from mplearn_agents.terminal.interrupts import asked_to_stop
 
     kind = args.data.partition(":")[0]
     name = args.data if kind in source_kinds() else f"recording:{args.data}"

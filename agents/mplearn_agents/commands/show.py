@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mplearn_agents.inert import printable
+from mplearn_agents.terminal.inert import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -30,8 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> None:
     """Print the tables, and write the page where one is asked for."""
     from mplearn.library import PrimitiveLibrary
-    from mplearn_agents.console import open_console
-    from mplearn_agents.tables import library_summary
+    from mplearn_agents.terminal.console import open_console
+    from mplearn_agents.terminal.tables import library_summary
 
     library = PrimitiveLibrary.load(args.library)
     console = open_console(stderr=args.json)
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> None:
 
 
 def _show(library: PrimitiveLibrary, console: Console) -> None:
-    from mplearn_agents.tables import (
+    from mplearn_agents.terminal.tables import (
         chain_table,
         primitive_table,
         primitive_tree,

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import StoreDamagedError
-from mplearn_agents.arguments import whole
-from mplearn_agents.inert import printable
+from mplearn_agents.terminal.arguments import whole
+from mplearn_agents.terminal.inert import printable
 
 if TYPE_CHECKING:
     from mplearn.store import Command, Entry, Happening, LifelongLearner

@@ -7,8 +7,8 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from mplearn_agents.arguments import count, positive, seed
-from mplearn_agents.suited import suited
+from mplearn_agents.contests.suited import suited
+from mplearn_agents.terminal.arguments import count, positive, seed
 
 if TYPE_CHECKING:
     from mplearn_agents.rl import TrainedPolicy, TrainingConfig
@@ -97,9 +97,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Train, and say how good the agent is."""
-    from mplearn_agents.console import open_console
     from mplearn_agents.rl import TrainingConfig
     from mplearn_agents.rl.train import train
+    from mplearn_agents.terminal.console import open_console
 
     given = {f.name: getattr(args, f.name) for f in fields(TrainingConfig) if hasattr(args, f.name)}
     if ".py:" in args.task:

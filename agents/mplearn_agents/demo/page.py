@@ -18,7 +18,7 @@ from mplearn_agents.report.figures import (
 )
 from mplearn_agents.report.library_page import library_figures, show
 from mplearn_agents.report.page import Column, Number, Page, Rate, Row, Step, Walk
-from mplearn_agents.tables import most_active
+from mplearn_agents.terminal.tables import most_active
 
 from .performance import PLAYBACK, Film
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from mplearn.demonstrator import Demonstration
     from mplearn.library import Primitive, PrimitiveLibrary
-    from mplearn_agents.learning import LearningLog
+    from mplearn_agents.learning.watched import LearningLog
     from mplearn_agents.walk import WalkResult
 
     from .score import Score

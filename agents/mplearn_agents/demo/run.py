@@ -12,9 +12,9 @@ import numpy as np
 
 from mplearn.errors import InvalidValueError
 from mplearn.extras import require
-from mplearn_agents.console import heading
-from mplearn_agents.learning import learn
+from mplearn_agents.learning.watched import learn
 from mplearn_agents.report import render_page
+from mplearn_agents.terminal.console import heading
 from mplearn_envs.rendering.backend import choose_backend
 
 from .page import Run, demo_page, meaning

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from mplearn.evaluation import LearningRates, match_segments, rate_learning
 from mplearn.recording import LabelledSegment
-from mplearn_agents.learning import LearningLog
+from mplearn_agents.learning.watched import LearningLog
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mplearn.extras import require
-from mplearn_agents.inert import printable
+from mplearn_agents.terminal.inert import printable
 
 
 def captioned(picture: NDArray[np.uint8], text: str, note: str = "") -> NDArray[np.uint8]:

@@ -24,8 +24,8 @@ from mplearn.learner import LearnerConfig, MotionLearner, learnable_rate
 from mplearn.library import PrimitiveLibrary
 from mplearn.sources import Block, Change, Observe, Source, open_source
 from mplearn.store import LifelongLearner, Store
+from mplearn_agents.learning.pauses import short_pauses
 
-from ..pauses import short_pauses
 from .figures import CLIP_HZ, motions_of
 from .happenings import happening, tell
 from .knowledge import knowledge

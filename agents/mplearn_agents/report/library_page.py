@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mplearn_agents.tables import most_active
+from mplearn_agents.terminal.tables import most_active
 
 from .figures import (
     PrimitiveCurves,

@@ -7,7 +7,7 @@ from importlib.resources import files
 from typing import Literal
 
 from mplearn.extras import require
-from mplearn_agents.inert import printable
+from mplearn_agents.terminal.inert import printable
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mplearn.extras import require
-from mplearn_agents.inert import printable
+from mplearn_agents.terminal.inert import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,7 +9,7 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from .inert import printable
+from mplearn_agents.terminal.inert import printable
 
 _ENDLESS = 100_000  # columns where no terminal cuts or wraps
 

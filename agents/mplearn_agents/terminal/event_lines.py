@@ -23,8 +23,7 @@ from mplearn.learner import (
 )
 from mplearn.recording import Segment
 from mplearn.sources import Change
-
-from .inert import printable
+from mplearn_agents.terminal.inert import printable
 
 
 def event_text(event: Event, rate_hz: float) -> str | None:

@@ -17,10 +17,9 @@ from scipy import stats
 from mplearn.errors import InvalidValueError
 from mplearn.evaluation import Table
 from mplearn.recording import FloatArray
-
-from .comparison import SLOW, Comparison
-from .contest import Contest
-from .episodes import Episode
+from mplearn_agents.contests.comparison import SLOW, Comparison
+from mplearn_agents.contests.contest import Contest
+from mplearn_agents.contests.episodes import Episode
 
 COLUMNS = ("task", "dynamics", "policy", "return", "share of the best", "success", "falls", "time")
 CONFIDENCE = 0.95

@@ -10,14 +10,13 @@ from typing import Any
 import gymnasium
 
 import mplearn_envs  # noqa: F401  (registers the environment)
+from mplearn_agents.contests.episodes import Episode, play
+from mplearn_agents.policies import POLICIES, Policy
+from mplearn_agents.rl import TrainedPolicy, TrainingConfig
+from mplearn_agents.rl.config import EnvVersion
+from mplearn_agents.rl.train import train
+from mplearn_agents.rl.trained import CONFIG, POLICY
 from mplearn_envs.tasks import FreeTask
-
-from .episodes import Episode, play
-from .policies import POLICIES, Policy
-from .rl import TrainedPolicy, TrainingConfig
-from .rl.config import EnvVersion
-from .rl.train import train
-from .rl.trained import CONFIG, POLICY
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,11 @@ from threading import Event as Flag
 from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import RecordingError
-
-from .arguments import pace, positive
-from .inert import printable
-from .interrupts import asked_to_stop
-from .pauses import short_pauses
-from .reading import hints_of
+from mplearn_agents.learning.pauses import short_pauses
+from mplearn_agents.recordings.reading import hints_of
+from mplearn_agents.terminal.arguments import pace, positive
+from mplearn_agents.terminal.inert import printable
+from mplearn_agents.terminal.interrupts import asked_to_stop
 
 if TYPE_CHECKING:
     from mplearn.learner import Event, LearnerConfig, MotionLearner
@@ -94,8 +93,7 @@ def learn_from_source(
     from mplearn.mocap import command_line
     from mplearn.sources import open_source
     from mplearn.store import LifelongLearner, is_begun
-
-    from .console import open_console
+    from mplearn_agents.terminal.console import open_console
 
     console = open_console(stderr=args.json)
     has_begun = args.store is not None and is_begun(args.store)
@@ -160,8 +158,7 @@ def learn_live(
     from mplearn.learner import FramesLost, LearnerConfig, MotionLearner, SegmentClosed
     from mplearn.sources import Change
     from mplearn.store import LifelongLearner
-
-    from .event_lines import change_json, change_text, event_json, event_text
+    from mplearn_agents.terminal.event_lines import change_json, change_text, event_json, event_text
 
     log = LiveLog()
 
@@ -225,8 +222,8 @@ def _report(
     console: Any, args: argparse.Namespace, source: Source, log: LiveLog, *, stopped: bool
 ) -> None:
     """Write the library, and say what came of it all."""
-    from .learning import why_nothing
-    from .tables import primitive_table
+    from mplearn_agents.learning.watched import why_nothing
+    from mplearn_agents.terminal.tables import primitive_table
 
     faults = source.tally.faults()
     if log.life is None or log.learner is None:

@@ -10,9 +10,8 @@ import numpy as np
 
 from mplearn.body import human_body, posture_of
 from mplearn.recording import FloatArray
-
-from .inert import printable
-from .inspection import Inspection, plain_points
+from mplearn_agents.recordings.inspection import Inspection, plain_points
+from mplearn_agents.terminal.inert import printable
 
 LEFT, RIGHT, MIDDLE, OTHER = "#c1272d", "#0f5e9c", "#222222", "#b0b0b0"
 _LIMBS = (("hip", "knee", "ankle", "ball"), ("shoulder", "elbow", "wrist", "hand"))

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mplearn.errors import InvalidValueError
-
-from .arguments import count, positive
-from .inert import printable
+from mplearn_agents.terminal.arguments import count, positive
+from mplearn_agents.terminal.inert import printable
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -23,8 +23,7 @@ from mplearn.learner import (
 )
 from mplearn.recording import Recording, Segment
 from mplearn.tree import Placement
-
-from .interrupts import asked_to_stop
+from mplearn_agents.terminal.interrupts import asked_to_stop
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mplearn.errors import InvalidValueError
-
-from .exit_codes import INTERRUPTED
-from .inert import printable
-from .interrupts import asked_to_stop
-from .reading import hints_of
+from mplearn_agents.recordings.reading import hints_of
+from mplearn_agents.terminal.exit_codes import INTERRUPTED
+from mplearn_agents.terminal.inert import printable
+from mplearn_agents.terminal.interrupts import asked_to_stop
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -62,9 +61,8 @@ def learn_in_shards(
     from mplearn.corpus import learn_corpus
     from mplearn.mocap import command_line
     from mplearn.store import LifelongLearner, is_begun
-
-    from .console import open_console
-    from .tables import primitive_table
+    from mplearn_agents.terminal.console import open_console
+    from mplearn_agents.terminal.tables import primitive_table
 
     if args.out is None and args.shards is None:
         raise InvalidValueError("give a library to write, --out, or a folder of stores, --shards")
@@ -126,7 +124,7 @@ def recognise_in_chunks(args: argparse.Namespace) -> None:
     from mplearn.corpus import recognise_corpus
     from mplearn.mocap import command_line
     from mplearn.tables import write_segments
-    from mplearn_agents.console import new_table, open_console
+    from mplearn_agents.terminal.console import new_table, open_console
 
     if args.to is None and not args.json:
         raise InvalidValueError("give a table to write, --to FILE, or --json")
@@ -191,7 +189,7 @@ def _say_refused(console: Console, refused: Iterable[tuple[str, str]]) -> None:
 
 def progress_table(progress: Progress) -> Table:
     """Return how far the learning of a corpus is."""
-    from .console import new_table
+    from mplearn_agents.terminal.console import new_table
 
     table = new_table("learning a corpus", "what", "how far")
     left = "" if progress.left_s is None else f", {duration(progress.left_s)} left"

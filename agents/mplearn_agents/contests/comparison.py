@@ -6,16 +6,15 @@ from dataclasses import dataclass, replace
 from typing import get_args
 
 from mplearn.errors import InvalidValueError
+from mplearn_agents.contests.contest import Contest, Game
+from mplearn_agents.contests.suited import NEEDS_TASK, SUITED, suited
+from mplearn_agents.policies import POLICIES
+from mplearn_agents.rl import TrainingConfig
+from mplearn_agents.rl.config import AlgorithmName, EnvVersion, PriorUse
 from mplearn_envs.execution.bodies import BodyName
 from mplearn_envs.execution.modes import Dynamics
 from mplearn_envs.tasks import TASKS
 from mplearn_envs.varied.people import SPLITS
-
-from .contest import Contest, Game
-from .policies import POLICIES
-from .rl import TrainingConfig
-from .rl.config import AlgorithmName, EnvVersion, PriorUse
-from .suited import NEEDS_TASK, SUITED, suited
 
 DYNAMICS = get_args(Dynamics)
 SLOW = ("search",)  # plays as few episodes as the simulated robot does

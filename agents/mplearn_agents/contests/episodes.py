@@ -10,8 +10,7 @@ import gymnasium
 import numpy as np
 
 from mplearn.errors import InvalidValueError
-
-from .policies import Policy
+from mplearn_agents.policies import Policy
 
 
 @dataclass(frozen=True)

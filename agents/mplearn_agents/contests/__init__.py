@@ -1,0 +1,1 @@
+"""Who does a task how well: contestants, their episodes, the tables."""

@@ -1,0 +1,1 @@
+"""What all commands share: options, text that is only text, tables, Ctrl-C, what they return."""
