@@ -24,6 +24,11 @@ class Trajectory:
 
     Raises:
         InvalidValueError: Shapes disagree, a value is not finite, or ``starts`` does not fit.
+
+    Example:
+        >>> motion = Trajectory(np.zeros((4, 1)), 50.0, ("knee_r",), np.array([7, 7, 9, 9]))
+        >>> motion.starts.tolist()
+        [0, 2]
     """
 
     frames: FloatArray

@@ -86,6 +86,13 @@ class LeftRightHMM(GaussianStates):
 
     Raises:
         ModelError: Shapes disagree, or a value is not finite, not positive or no probability.
+
+    Example:
+        >>> model = LeftRightHMM([[0.0], [1.0]], [[0.1], [0.1]], [np.log(0.9), 0.0])
+        >>> model.durations_frames.round(3).tolist()
+        [10.0]
+        >>> model.decode(np.array([[0.1], [0.0], [0.9], [1.1]])).tolist()
+        [0, 0, 1, 1]
     """
 
     means: FloatArray

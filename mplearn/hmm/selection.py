@@ -54,6 +54,11 @@ def select_size(
 
     Raises:
         InvalidValueError: The criterion is unknown, or no size is left.
+
+    Example:
+        >>> still = [np.full((30, 1), k / 100) for k in range(3)]
+        >>> select_size(still, (1, 2, 4), variance_floor=1e-2).n_states
+        1
     """
     if criterion not in CRITERIA:
         raise InvalidValueError(f"criterion must be one of {CRITERIA}, not {criterion!r}")

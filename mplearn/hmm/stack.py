@@ -83,6 +83,14 @@ def score_batch(
 
     Raises:
         ModelError: The models' widths differ from each other or from the sequences'.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.hmm import fit
+        >>> up = np.linspace(0.0, 1.0, 40)[:, None]
+        >>> models = [fit([motion], 4, variance_floor=1e-2) for motion in (up, -up)]
+        >>> score_batch(models, [up, -up]).argmax(axis=0).tolist()
+        [0, 1]
     """
     stack, batch = ModelStack.of(models), SequenceBatch.of(sequences, weights)
     pairs = np.indices((stack.n_models, batch.n_sequences)).reshape(2, -1).T

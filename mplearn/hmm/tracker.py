@@ -26,6 +26,16 @@ class MotionTracker:
 
     Raises:
         ModelError: There is no model, or their channels differ.
+
+    Example:
+        >>> from mplearn.hmm import fit
+        >>> up = np.linspace(0.0, 1.0, 40)[:, None]
+        >>> models = [fit([motion], 4, variance_floor=1e-2) for motion in (up, -up)]
+        >>> tracker = MotionTracker(models)
+        >>> for frame in up[:20]:
+        ...     tracker.update(frame)
+        >>> int(tracker.log_likelihoods.argmax()), bool(tracker.endings[0] < 0.1)  # half of it
+        (0, True)
     """
 
     def __init__(self, models: Sequence[LeftRightHMM]) -> None:

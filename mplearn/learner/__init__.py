@@ -1,5 +1,6 @@
 """The learner: where the stages meet, frame after frame."""
 
+from .buffer import FrameBuffer as FrameBuffer
 from .config import LearnerConfig as LearnerConfig
 from .config import learnable_rate as learnable_rate
 from .events import Anomaly as Anomaly

@@ -30,6 +30,12 @@ class CompactMotion:
         knots: Shape (K, D), 16 bit integers.
         exponents: Values are ``knots * 2 ** exponents``, shape (D,).
         n_frames: Number of frames T.
+
+    Example:
+        >>> t = np.linspace(0.0, 1.0, 101)[:, None]
+        >>> compact = CompactMotion.of(np.sin(2 * np.pi * t), 100.0)
+        >>> len(compact.knots), bool(abs(compact.frames - np.sin(2 * np.pi * t)).max() < 1e-3)
+        (26, True)
     """
 
     knots: NDArray[np.int16]

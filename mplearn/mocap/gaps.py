@@ -87,6 +87,14 @@ class GapTracker:
 
     Raises:
         InvalidValueError: A number lies outside its range.
+
+    Example:
+        >>> tracker = GapTracker(n_markers=1, rate_hz=100.0)
+        >>> for k in range(50):
+        ...     frame = tracker.update(np.array([[0.01 * k, 0.0, 1.0]]))
+        >>> hidden = tracker.update(np.array([[np.nan, np.nan, np.nan]]))
+        >>> bool(abs(hidden[0, 0] - 0.5) < 0.01)  # it went on
+        True
     """
 
     def __init__(self, n_markers: int, rate_hz: float, config: GapConfig | None = None) -> None:

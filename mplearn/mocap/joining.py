@@ -75,6 +75,12 @@ def with_channels(recording: Recording, channels: tuple[str, ...]) -> Recording:
 
     Raises:
         RecordingError: It lacks some.
+
+    Example:
+        >>> import numpy as np
+        >>> take = Recording(np.array([[1.0, 2.0, 3.0]]), 100.0, ("x", "y", "z"))
+        >>> with_channels(take, ("z", "x")).frames.tolist()
+        [[3.0, 1.0]]
     """
     place = {name: i for i, name in enumerate(recording.channels)}
     lacking = [name for name in channels if name not in place]

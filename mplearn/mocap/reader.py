@@ -33,6 +33,10 @@ class Hints:
         angle_unit: What the angles of a BVH or AMC file are in: ``"degrees"`` or ``"radians"``.
         joint_axes: With joint positions, also how each joint is turned: three points more
             (``Head>x``), 0.1 m along axes that turn with it.
+
+    Example:
+        >>> Hints(rate_hz=120.0, unit_m=0.001).unit_m  # millimetres
+        0.001
     """
 
     rate_hz: float | None = None

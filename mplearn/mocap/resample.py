@@ -35,6 +35,13 @@ def resample(recording: Recording, rate_hz: float) -> Recording:
 
     Raises:
         InvalidValueError: The rate lies outside its range.
+
+    Example:
+        >>> import numpy as np
+        >>> slow = Recording(np.arange(6.0)[:, None], 50.0, ("x",))
+        >>> fast = resample(slow, 100.0)
+        >>> len(fast), float(fast.frames[5, 0].round(2))
+        (11, 2.5)
     """
     if not 1.0 <= rate_hz <= 10_000.0:
         raise InvalidValueError(f"rate_hz must lie in [1, 10000] 1/s, not {rate_hz}")

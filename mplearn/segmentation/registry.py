@@ -30,6 +30,15 @@ def make_segmenter(name: str, n_channels: int, rate_hz: float) -> Segmenter:
 
     Raises:
         InvalidValueError: There is no such segmenter, or a number is out of range.
+
+    Example:
+        >>> import numpy as np
+        >>> segmenter = make_segmenter("zero-velocity", n_channels=1, rate_hz=100.0)
+        >>> t = np.arange(800) / 100.0
+        >>> swings = np.sin(2 * np.pi * t / 2.0)[:, None]  # turns each second
+        >>> found = [each for frame in swings for each in segmenter.update(frame)]
+        >>> len(found) >= 5
+        True
     """
     if name not in SEGMENTERS:
         raise InvalidValueError(f"segmenter must be one of {sorted(SEGMENTERS)}, not {name!r}")

@@ -100,7 +100,13 @@ def repetitions(table: SegmentTable, unit: Unit = "person") -> Measure:
 
 
 def durations(table: SegmentTable, unit: Unit = "person") -> Measure:
-    """Return how long each primitive takes, on average [s]."""
+    """Return how long each primitive takes, on average [s].
+
+    Example:
+        >>> rows = [RecognisedSegment("t", 0.0, 0.5, 1, "bow", "bow", 0.1, 0.9, "anna")]
+        >>> durations(SegmentTable(rows)).of("anna", "bow")
+        0.5
+    """
 
     def value(takes: Mapping[str, list[RecognisedSegment]], primitive: str) -> float:
         return _mean([row.duration_s for row in _executions(takes, primitive)])

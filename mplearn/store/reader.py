@@ -23,6 +23,16 @@ class StoreReader:
 
     Raises:
         StoreError: It cannot be read; the class says why.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner
+        >>> config = LearnerConfig(channels=("x", "y"), rate_hz=100.0)
+        >>> with LifelongLearner.open("life.db", lambda: MotionLearner(config)) as life:
+        ...     events = life.learn_many(np.zeros((300, 2)))
+        >>> StoreReader("life.db").life.n_frames
+        300
     """
 
     def __init__(self, path: str | Path) -> None:

@@ -18,6 +18,12 @@ class RandomWalk(Policy):
 
     Args:
         seed: Seed of the walk; None draws one.
+
+    Example:
+        >>> import numpy as np
+        >>> legal, prior = np.array([1, 1, 0]), np.array([0.0, 1.0, 0.0])
+        >>> RandomWalk(seed=0).act(None, {"action_mask": legal, "transition_prior": prior})
+        1
     """
 
     def __init__(self, seed: int | None = None) -> None:

@@ -149,6 +149,13 @@ def decode(data: bytes, robot: int, n_angles: int, key: bytes | None = None) -> 
 
     Raises:
         DatagramError: They are foreign or malformed; nothing else is raised, whatever comes.
+
+    Example:
+        >>> code = robot_code(["elbow_l"])
+        >>> base = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+        >>> sent = Datagram(1, 0, 0.0, base, np.array([0.5]))
+        >>> decode(encode(sent, code), code, 1).angles.tolist()
+        [0.5]
     """
     if data[:4] != MAGIC:
         raise DatagramError("foreign", f"begins with {data[:4]!r}, not {MAGIC!r}")

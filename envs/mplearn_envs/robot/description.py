@@ -48,6 +48,12 @@ class Robot:
             one flat sole; motions that bend them are refused.
         attention: Hinges that stand upright at another angle than 0 in the zero of the MJCF that
             the robot came from, and that angle [rad]: there they are at ours plus this.
+
+    Example:
+        >>> from mplearn_envs.robot import humanoid
+        >>> robot = humanoid()
+        >>> robot.name, robot.knees
+        ('robot', ('knee_l', 'knee_r'))
     """
 
     name: str
