@@ -23,7 +23,7 @@ from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.rendering.screen import RENDER_MODES, Screen
 from mplearn_envs.robot import Robot, humanoid, make_robot
 from mplearn_envs.skills.action_choices import HOLD, Choices
-from mplearn_envs.skills.repertoire import Repertoire, shared_repertoire
+from mplearn_envs.skills.repertoire import Manner, Repertoire, shared_repertoire
 from mplearn_envs.tasks import Choice, Scene, Task, make_task
 
 from .episode import Episode, EpisodeState
@@ -127,14 +127,21 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         self._stepped = False
 
     def _made_repertoire(self) -> Repertoire:
-        library, motion = self.source.now(), self.motion
-        what = (self.actions.capacity, motion.speed, motion.style, motion.feasibility)
-        upper_body, novel = motion.upper_body, self.actions.novel_penalty is not None
+        library = self.source.now()
         if self.source.live:
-            return Repertoire(
-                library, self.robot, *what, upper_body=upper_body, novel=novel, growing=True
-            )
-        return shared_repertoire(library, self.robot, *what, upper_body, novel)
+            return Repertoire(library, self.robot, **self._manner()._asdict(), growing=True)
+        return shared_repertoire(library, self.robot, self._manner())
+
+    def _manner(self) -> Manner:
+        motion, actions = self.motion, self.actions
+        return Manner(
+            actions.capacity,
+            motion.speed,
+            motion.style,
+            motion.feasibility,
+            motion.upper_body,
+            actions.novel_penalty is not None,
+        )
 
     @cached_property
     def performer(self) -> Performer:

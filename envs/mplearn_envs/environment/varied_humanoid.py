@@ -123,16 +123,13 @@ class VariedHumanoidEnv(MacroStepEnv):
 
     def _made_repertoire(self) -> Repertoire:
         """Return the repertoire of the first person; those of all share skills and memory."""
-        motion = self.motion
-        usual = self.robot == humanoid() and motion == MotionOptions()
-        novel = self.actions.novel_penalty is not None
-        what = (self.actions.capacity, motion.speed, motion.style, motion.feasibility)
-        how = (motion.upper_body, novel, foreknowledge() if usual else None)
-        first = shared_repertoire(library_of(0), self.robot, *what, *how)
+        usual = self.robot == humanoid() and self.motion == MotionOptions()
+        what = (self.robot, self._manner(), foreknowledge() if usual else None)
+        first = shared_repertoire(library_of(0), *what)
         if usual:
             _kept[:] = [first]
         self._repertoires = {
-            person: shared_repertoire(library_of(person), self.robot, *what, *how, like=first)
+            person: shared_repertoire(library_of(person), *what, like=first)
             for person in self.people
         }
         self._starts = starts() if usual else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Hashable
-from typing import Any
+from typing import Any, NamedTuple
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -246,29 +246,34 @@ class Repertoire:
 _SHARED: WeakValueDictionary[Hashable, Repertoire] = WeakValueDictionary()
 
 
+class Manner(NamedTuple):
+    """How a library is performed; fields are arguments of `Repertoire`."""
+
+    capacity: int | None
+    speed: float
+    style: StyleName
+    limits: FeasibilityConfig | None
+    upper_body: bool
+    novel: bool
+
+
 def shared_repertoire(
     library: PrimitiveLibrary,
     robot: Robot,
-    capacity: int | None,
-    speed: float,
-    style: StyleName,
-    limits: FeasibilityConfig | None,
-    upper_body: bool,
-    novel: bool,
+    manner: Manner,
     known: Foreknowledge | None = None,
     like: Repertoire | None = None,
 ) -> Repertoire:
-    """Return the repertoire of a library that will not change; arguments as `Repertoire`'s.
+    """Return the repertoire of a library that will not change.
 
     All environments of a process that ask for the same get the same. It shares skills and memory
     with the one that it is ``like``: of the same primitives, with other transitions.
     """
-    key = (library.version, robot, capacity, speed, style, limits, upper_body, novel)
+    key = (library.version, robot, manner)
     found = _SHARED.get(key)
     if found is None:
         skills = None if like is None else like.skills
-        what = (library, robot, capacity, speed, style, limits)
-        found = Repertoire(*what, upper_body=upper_body, novel=novel, skills=skills, known=known)
+        found = Repertoire(library, robot, **manner._asdict(), skills=skills, known=known)
         if like is not None:
             found.memory = like.memory
         _SHARED[key] = found
