@@ -202,7 +202,7 @@ ATTACKS: dict[str, Attack] = {
     "squat to 0.2 m": _held(lambda a: a.standing(height=0.2)),
     "hops to 5 m": _held(lambda a: a.standing(height=5.0)),
     "rolls and squats": _held(lambda a: a.standing(height=0.2, roll=-1.5, pitch=1.5)),
-    **{f"shakes all at {hz} Hz": _shaking(hz) for hz in (0.3, 0.7, 1.0, 1.5, 3.0, 7.0)},
+    **{f"shakes all at {hz} Hz": _shaking(hz) for hz in (0.3, 0.7, 1.0, 1.5, 2.0, 3.0, 7.0)},
     **{f"waves at {hz} Hz": _waving(hz) for hz in (0.3, 0.7, 1.0, 1.5, 3.0)},
     "times 1e-9 s apart": _no_time,
     "times that leap": _wild_time,

@@ -29,8 +29,8 @@ class LowerBody:
     """Balances, one call a control period; survives whatever the link does.
 
     Postures are followed as `Playback` plays them, evenly, however they come. Where no newer one
-    comes for ``hold_s``, the last one is held; after ``settle_s`` the robot goes back to standing.
-    When postures come again it follows them again. All these pass into each other within
+    comes for ``hold_s``, the robot comes to rest and stays; after ``settle_s`` it goes back to
+    standing. When postures come again it follows them again. All these pass into each other within
     ``fade_s``. A sender is not trusted: `Restraint` follows it no faster and no farther than the
     robot keeps standing, and `CommandLimiter` lets no command pass that is outside the limits of
     position, velocity and acceleration.
@@ -79,7 +79,6 @@ class LowerBody:
         self.limiter = CommandLimiter(robot, period_s, held)
         self._playback = Playback(period_s)
         self._plays = False
-        self._held: FloatArray | None = None
         self._fade: Iterator[FloatArray] = iter(())
         self._heard_s = -np.inf
 
@@ -102,16 +101,15 @@ class LowerBody:
         self.spent_s[self.phase] += self.period_s
         plays = self.phase in ("following", "holding")
         source = self._playback.advance() if plays else self._rest
-        if self.phase == "holding":  # braking passes the last posture; no motion back to it
-            self._held = self.restraint.stop if self._held is None else self._held
-            source = self._held
-        else:
-            self._held = None
         if anew or plays != self._plays:
             self._fade = self._fading(source)
         self._plays = plays
         frame = np.zeros(len(self.robot.channels))
-        frame[self._columns] = self.restraint.update(source + next(self._fade, 0.0))
+        wanted = source + next(self._fade, 0.0)
+        if self.phase == "holding":  # braking passes the last posture; no motion back to it
+            frame[self._columns] = self.restraint.brake()
+        else:
+            frame[self._columns] = self.restraint.update(wanted)
         return self.limiter.update(self.controller.update(frame))
 
     def _listen(self, now_s: float) -> bool:

@@ -21,7 +21,8 @@ class Playback:
 
     Args:
         period_s: Control period [s].
-        delay_s: How far behind the newest posture it plays; also how fast its speed changes [s].
+        delay_s: How far behind the newest posture it plays; half the time in which it comes up to
+            the sender's speed [s].
         longest_s: Longest gap that is interpolated, and most that it plays behind [s].
     """
 
@@ -62,7 +63,7 @@ class Playback:
     def advance(self) -> FloatArray:
         """Return the posture of one period later; one must have been added."""
         waiting = self._waiting
-        step = self.period_s / self.delay_s
+        step = 0.5 * self.period_s / self.delay_s
         ahead = (waiting[-1][0] - self._time_s) / self.delay_s
         self._speed = min(ahead, self._speed + step, _FASTEST)
         self._time_s += self._speed * self.period_s

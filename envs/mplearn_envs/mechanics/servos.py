@@ -41,6 +41,7 @@ def approach(
     fastest: FloatArray,
     strongest: FloatArray,
     period_s: float,
+    brake_s: float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
     """Follow what moves within limits of position, velocity and acceleration, one period on.
 
@@ -57,6 +58,8 @@ def approach(
         fastest: Velocity limits, shape (U,).
         strongest: Acceleration limits, shape (U,).
         period_s: The period [s].
+        brake_s: Time that all of it together needs to come to rest, where that is longer than each
+            coordinate needs [s].
 
     Returns:
         Position and velocity after the period, each of shape (U,).
@@ -65,11 +68,11 @@ def approach(
     for u in range(here.shape[0]):
         most, top = strongest[u], fastest[u]
         low, high = limits[u, 0], limits[u, 1]
-        up = min(top, _stoppable(high - here[u], most, period_s))
-        down = max(-top, -_stoppable(here[u] - low, most, period_s))
+        up = min(top, _stoppable(high - here[u], most, period_s, brake_s))
+        down = max(-top, -_stoppable(here[u] - low, most, period_s, brake_s))
         course = min(max(rate[u], -top), top)
         gap = min(max(wanted[u], low), high) - (here[u] + course * period_s)
-        closing = _stoppable(abs(gap), most, period_s)
+        closing = _stoppable(abs(gap), most, period_s, brake_s)
         wish = min(max(course + (closing if gap > 0 else -closing), down), up)
         step = most * period_s
         speed[u] = min(max(wish, velocity[u] - step), velocity[u] + step)
@@ -78,10 +81,11 @@ def approach(
 
 
 @njit(cache=True)
-def _stoppable(distance: float, acceleration: float, period_s: float) -> float:
+def _stoppable(distance: float, acceleration: float, period_s: float, brake_s: float) -> float:
     """Return the largest speed from which one can stop within a distance, a period from now."""
     room = 2.0 * max(distance, 0.0) / acceleration
-    return float(acceleration * (np.sqrt(period_s * period_s + room) - period_s))
+    alone = acceleration * (np.sqrt(period_s * period_s + room) - period_s)
+    return float(min(alone, max(distance, 0.0) / max(brake_s, period_s)))
 
 
 def servo_commands(robot: Robot, q: FloatArray, dq: FloatArray) -> FloatArray:

@@ -2,19 +2,22 @@
 
 import itertools
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from link_world import PERIOD_S, ROBOT
 
+from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix
 from mplearn_envs.link import LowerBody, Receiver, Sender, UpperBody
 from mplearn_envs.link.__main__ import main
 from mplearn_envs.link.attacks import ATTACKS, Attacker, under_attack
 from mplearn_envs.link.restraint import Restraint
 from mplearn_envs.mechanics import reference_robot, rest_reference
+from mplearn_envs.mechanics.kinematics import forward
 from mplearn_envs.mechanics.servos import approach
-from mplearn_envs.mechanics.velocity_ik import errors
+from mplearn_envs.mechanics.velocity_ik import errors, settle
 
 SECONDS = 2.0  # each attack begins within one
 
@@ -78,9 +81,6 @@ def test_an_infeasible_posture_is_followed_as_far_as_the_legs_balance():
     found = lower.controller.reference
     assert 0.05 < found.target[1] < 0.5 and min(shares) < 1.0
     assert found.target[3] == pytest.approx(0.4, abs=1e-3)  # the upper body goes on
-    from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix
-    from mplearn_envs.mechanics.kinematics import forward
-
     height = found.target[0] + reference.stance_height - reference.standing_height
     turn = roll_pitch_matrix(found.target[1], found.target[2])
     miss = errors(reference.stance, forward(reference.tree, found.q), height, turn)
@@ -94,9 +94,39 @@ def test_restraint_leaves_alone_what_is_slow_and_balances():
     bow[2] = 0.6
     path = [rest + bow * (0.5 - 0.5 * np.cos(np.pi * min(1.0, k / 500))) for k in range(600)]
     done = [restraint.update(posture) for posture in path]
-    late = round(0.02 / PERIOD_S)
+    late = round(0.008 / PERIOD_S)
     np.testing.assert_allclose(done[late:], path[:-late], atol=2e-3)
     assert restraint.share == 1.0
+
+
+@pytest.mark.parametrize("name", ["posture jumps", "shakes all at 1.5 Hz"])
+def test_what_is_followed_changes_the_momentum_no_faster_than_its_bounds(name):
+    """The oracle is MuJoCo: the momentum of the whole body, legs included."""
+    restraint, attacker = Restraint(ROBOT, PERIOD_S), Attacker(ROBOT, 0)
+    model, reference = ROBOT.model(), reference_robot(ROBOT)
+    data = mujoco.MjData(model)
+    momenta, before = [], restraint._q
+    low, high = attacker.reference.limits.T
+    for k in range(400):
+        phase = np.sin(3 * np.pi * k * PERIOD_S) if "shakes" in name else (k // 100) % 2 * 2 - 1
+        restraint.update(0.5 * (low + high) + 0.5 * (high - low) * phase)
+        height, roll, pitch = restraint.position[:3]
+        height += reference.stance_height - reference.standing_height
+        here = restraint._q
+        turn = roll_pitch_matrix(roll, pitch)
+        here, miss = settle(reference.tree, reference.stance, here, height, turn, 1e-12, 20)
+        assert miss < 1e-6
+        data.qpos[:] = here
+        mujoco.mj_differentiatePos(model, data.qvel, PERIOD_S, before, here)
+        before = here
+        mujoco.mj_forward(model, data)
+        mujoco.mj_subtreeVel(model, data)
+        lift = data.subtree_linvel[1][2] * model.body_subtreemass[1]
+        momenta.append([*data.subtree_angmom[1], lift])
+    attacker.sender.close()
+    change = np.abs(np.diff(momenta, axis=0)) / PERIOD_S / restraint.bounds
+    assert np.mean(change.max(axis=1)) > 0.2  # it is no slower than need be
+    assert np.percentile(change, 95) < 1.05 and change.max() < 2.0
 
 
 KEY = b"sixteen bytes or more"
