@@ -1,16 +1,20 @@
-"""How smooth and steady the page is: ``python -m benchmarks.live_page --seconds 20 --minutes 2``.
+"""How smooth and steady the page is: ``python -m benchmarks.live_page --seconds 20 --hours 4``.
 
 In headless Chromium: pictures a second while learning runs at 100 Hz, the time from a click to the
-moving figure, and the memory of all processes while an accelerated demonstrator goes on.
+moving figure, and the memory of all processes and of the page while an accelerated demonstrator
+goes on.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import statistics
 import time
 from typing import Any
+
+import psutil
+from rich.console import Console
+from rich.table import Table
 
 from .teaching_session import browser, live, until
 
@@ -54,47 +58,56 @@ _CLICK = """(k) => new Promise((done) => {
 })"""
 
 
-def memory(opened: Any, minutes: float, speed: float) -> None:
-    """Print the memory of each process, and of the page, while time goes by."""
-    with live("demonstrator", "--speed", f"{speed:g}") as (url, process):
+def memory(opened: Any, hours: float) -> None:
+    """Print the memory of each process, and of the page, while an accelerated stream goes on."""
+    table = Table(
+        "stream [h]", "server [MB]", "learner", "robot", "page", "its nodes", "primitives"
+    )
+    seen: list[tuple[float, ...]] = []
+    with live("demonstrator", "--speed", "inf") as (url, process):
         page = opened.new_page(viewport={"width": 1280, "height": 720})
         page.goto(url)
-        until(lambda: page.locator("#tree .row").count() >= 3, 300, "three primitives")
-        end, began = time.monotonic() + 60 * minutes, time.monotonic()
-        while time.monotonic() < end:
-            page.wait_for_timeout(60_000 * minutes / 6)
-            used = [_megabytes(pid) for pid in (process.pid, *_children(process.pid))]
-            heap = page.evaluate("performance.memory.usedJSHeapSize") / 1e6
-            passed_h = page.evaluate("document.querySelector('#log time')?.textContent ?? ''")
-            print(
-                f"after {time.monotonic() - began:4.0f} s (stream {passed_h}): processes "
-                f"{', '.join(f'{mb:.0f}' for mb in used)} MB, page {heap:.1f} MB, "
-                f"{page.locator('#tree .row').count()} primitives"
-            )
+        inside = page.context.new_cdp_session(page)
+        begun = time.monotonic()
+        for k in range(1, 9):
+            frames = 100.0 * 3600.0 * hours * k / 8
+            while float(page.get_attribute("html", "data-frames") or 0) < frames:
+                page.wait_for_timeout(500)
+            inside.send("HeapProfiler.collectGarbage")
+            used = [
+                psutil.Process(pid).memory_info().rss / 1e6
+                for pid in (process.pid, *_children(process.pid))
+            ]
+            heap = inside.send("Runtime.getHeapUsage")["usedSize"] / 1e6
+            nodes = inside.send("Memory.getDOMCounters")["nodes"]
+            n_primitives = page.locator("#tree .row").count()
+            seen.append((*used, heap, nodes, n_primitives))
+            cells = (f"{value:.1f}" for value in (*used, heap))
+            table.add_row(f"{hours * k / 8:.1f}", *cells, str(nodes), str(n_primitives))
+        took = time.monotonic() - begun
+    last, first = seen[-1], seen[len(seen) // 2 - 1]
+    table.add_row("end / half", *(f"{b / a:.2f}" for a, b in zip(first, last, strict=True)))
+    table.title = f"{hours:g} h of stream in {took / 60:.0f} minutes"
+    Console(width=100).print(table)
 
 
 def _children(pid: int) -> list[int]:
-    with open(f"/proc/{pid}/task/{pid}/children", encoding="ascii") as file:  # noqa: PTH123
-        return [int(word) for word in file.read().split()]
-
-
-def _megabytes(pid: int) -> float:
-    with open(f"/proc/{pid}/statm", encoding="ascii") as file:  # noqa: PTH123
-        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+    """Return the learner's and the robot's process."""
+    workers = psutil.Process(pid).children()
+    return [w.pid for w in workers if any("spawn_main" in word for word in w.cmdline())]
 
 
 def main() -> None:
     """Measure."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0)
-    parser.add_argument("--minutes", type=float, default=2.0)
-    parser.add_argument("--speed", type=float, default=100.0)
+    parser.add_argument("--hours", type=float, default=4.0, help="of stream")
     args = parser.parse_args()
     with browser() as opened:
         if args.seconds:
             smoothness(opened, args.seconds)
-        if args.minutes:
-            memory(opened, args.minutes, args.speed)
+        if args.hours:
+            memory(opened, args.hours)
 
 
 if __name__ == "__main__":

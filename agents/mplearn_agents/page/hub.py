@@ -80,11 +80,18 @@ class Hub:
     Args:
         settings: What is watched.
         robot: Whether a robot performs.
+
+    Attributes:
+        begun: Done when the source is open, or the learner ended before it was.
+        failed: Done, with the reason, when the source cannot be opened at all.
+        clients: Who looks on.
     """
 
     def __init__(self, settings: Watch, *, robot: bool = True) -> None:
         self.settings = settings
-        self.failed: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+        loop = asyncio.get_running_loop()
+        self.failed: asyncio.Future[str] = loop.create_future()
+        self.begun: asyncio.Future[None] = loop.create_future()
         self.clients: set[Client] = set()
         self._numbers = itertools.count(1)
         self._latest: dict[str, Header] = {}
@@ -202,6 +209,7 @@ class Hub:
             case "status":
                 if self._state["learner"] != "there":
                     self._set("learner", "there")
+                    self._has_begun()
                 self._show(header)
             case _:
                 self._show(header)
@@ -237,7 +245,12 @@ class Hub:
             self.failed.set_result(text)
         self._happened(happening("source", text, 0.0))
 
+    def _has_begun(self) -> None:
+        if not self.begun.done():
+            self.begun.set_result(None)
+
     def _learner_ended(self, reason: str) -> None:
+        self._has_begun()
         self._person = _NO_POSE
         self._set("learner", "stopped")
         then = "it goes on from the store" if self.settings.store else "it begins anew"

@@ -35,7 +35,7 @@ def serve(
         port: Port; 0 takes one that is free.
         token: Needed to look on; where empty, loopback is open to who is on this machine.
         robot: Whether a robot performs.
-        ready: Called with the page's address when it can be opened.
+        ready: Called with the page's address when it can be opened, and the source is open.
 
     Raises:
         InvalidValueError: Host or port cannot be had.
@@ -60,10 +60,13 @@ async def _serve(
     hub = Hub(settings, robot=robot)
     server = uvicorn.Server(uvicorn.Config(make_app(hub, token=token), **page_config()))
     hub.start()
-    ready()
     serving = asyncio.create_task(server.serve(sockets=[listening]))
+    ends = (serving, hub.failed)
     try:
-        await asyncio.wait((serving, hub.failed), return_when=asyncio.FIRST_COMPLETED)
+        await asyncio.wait((*ends, hub.begun), return_when=asyncio.FIRST_COMPLETED)
+        if not any(end.done() for end in ends):
+            ready()
+            await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         if hub.failed.done():
             raise InvalidValueError(hub.failed.result())
     finally:

@@ -247,5 +247,6 @@ def test_with_a_token_only_who_knows_it_looks_on():
 )
 def test_what_cannot_be_is_refused_in_a_line(options, why, capsys):
     assert main(["live", *options]) == 2
-    said = capsys.readouterr().err
-    assert why in said and len(said.splitlines()) == 1
+    told = capsys.readouterr()
+    assert why in told.err and len(told.err.splitlines()) == 1
+    assert not told.out  # no address of a page that will not be there

@@ -125,6 +125,7 @@ function status() {
   const stopped = p.learner === "stopped" || p.learner === "starting";
   const state = stopped ? `the learner is ${p.learner}` : `${s.source ?? ""} — ${s.paused ? "learning is paused" : s.state ?? "starting"}`;
   set(find("#state"), state);
+  root.dataset.frames = s.frames;
   find("#state").dataset.live = !stopped && s.state === "live" && !s.paused ? "yes" : "no";
   world.paused = Boolean(s.paused);
   set(find("#pause"), world.paused ? "Resume" : "Pause");
