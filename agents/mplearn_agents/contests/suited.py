@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias
 #: divergence from it (instead of the entropy bonus).
 PriorUse: TypeAlias = Literal["feature", "logits", "regulariser"]
 
-_PATHS = ("likely-path", "short-path", "quick-path", "pooled-path")
+_PATHS = ("likely-path", "short-path", "quick-path", "pooled-path", "experienced")
 
 
 @dataclass(frozen=True)

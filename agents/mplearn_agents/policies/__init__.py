@@ -9,6 +9,7 @@ import gymnasium
 from .base import Policy as Policy
 from .base import legal_actions as legal_actions
 from .base import transition_prior as transition_prior
+from .experienced import Experienced as Experienced
 from .greedy import Greedy as Greedy
 from .imitation import Imitation as Imitation
 from .mirror import Mirror as Mirror
@@ -28,6 +29,7 @@ POLICIES: dict[str, Callable[[gymnasium.Env[Any, Any]], Policy]] = {
     "short-path": partial(PathToTask.for_env, prefer="short"),
     "quick-path": partial(PathToTask.for_env, prefer="quick"),
     "pooled-path": partial(PathToTask.for_env, prefer="quick", pooled=True),
+    "experienced": Experienced.for_env,
     "mirror": lambda _: Mirror(),
     "search": Search.for_env,
 }

@@ -81,6 +81,7 @@ class Search(Policy):
         if env.spec is None:
             raise InvalidValueError("a twin needs env.spec, which gymnasium.make supplies")
         options = {**env.spec.kwargs, "dynamics": "kinematic", "render_mode": None}
+        options["body"] = "nominal"  # else it would foresee who falls when
         twin = gymnasium.make(env.spec.id, **options, disable_env_checker=True)
         return cls(env, twin, horizon_s, beam)
 

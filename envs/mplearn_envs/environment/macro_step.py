@@ -17,7 +17,7 @@ from mplearn.errors import InvalidValueError
 from mplearn.library import PrimitiveLibrary
 from mplearn_envs.data.library_source import LibrarySource
 from mplearn_envs.execution.bodies import Body, make_body
-from mplearn_envs.execution.modes import Dynamics, make_performer, require_simulated
+from mplearn_envs.execution.modes import Dynamics, make_performer, require_fit
 from mplearn_envs.execution.performer import Performer
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.rendering.screen import RENDER_MODES, Screen
@@ -103,7 +103,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         self.actions = ActionOptions.of(from_plain(actions), "actions")
         self.pictures = PictureOptions.of(from_plain(pictures), "pictures")
         self.body = make_body(from_plain(body))
-        require_simulated(dynamics, self.body)
+        require_fit(dynamics, self.body)
         self.repertoire = self._made_repertoire()
         self.capacity = self.repertoire.capacity
         self._n_speeds = len(self.actions.speeds)

@@ -13,7 +13,9 @@ from mplearn_envs.mechanics.reference import Reference, rest_reference
 from mplearn_envs.planning.plan import Plan
 from mplearn_envs.skills.repertoire import Repertoire
 
+from .bodies import NOMINAL, Body
 from .performer import Outcome, Performer, PerformerState
+from .risk import FallRisk, risk_of, strain_of
 from .sensors import Measured, Sensors
 from .tracking_report import TrackingReport
 
@@ -27,28 +29,38 @@ class _Place(NamedTuple):
 
 
 class _Known(NamedTuple):
-    """An outcome, and where it led."""
+    """An outcome, where it led, and what of it bears on the risk of falling."""
 
     outcome: Outcome
     place: _Place
+    strain: FloatArray
 
 
 class KinematicPerformer(Performer):
     """Takes plans at their word: the robot is where its reference is, without contact or delay.
 
-    COG and zero-moment point come from the plan; nothing ever falls. What comes of an action
-    depends on the reference posture at its start and the motion alone, so it is remembered,
-    exactly, in the repertoire's memory.
+    COG and zero-moment point come from the plan. What comes of an action depends on the reference
+    posture at its start and the motion alone, so it is remembered, exactly, in the repertoire's
+    memory. A body that is as the robot believes never falls; one of another level falls as often as
+    it was seen to in simulation, see `FallRisk`.
+
+    Args:
+        repertoire: What can be performed.
+        hold_s: Duration of holding [s].
+        body: What the body may be like: one of the levels.
     """
 
-    def __init__(self, repertoire: Repertoire, hold_s: float) -> None:
+    def __init__(self, repertoire: Repertoire, hold_s: float, body: Body = NOMINAL) -> None:
         super().__init__(repertoire, hold_s)
+        self._risk = risk_of(body)
+        self._draw, self._count = 0, 0
         self._sensors = Sensors(self.simulation)
         self._rest = self._arrive(rest_reference(self.simulation.robot))
         self._here = self._rest
 
     def reset(self, draw: int = 0) -> Measured:
         """Stand upright at rest, arms hanging; return how the robot stands."""
+        self._draw, self._count = draw, 0
         self._here = self._rest
         self.reference = self._rest.reference
         return self._rest.measured
@@ -65,24 +77,34 @@ class KinematicPerformer(Performer):
         key = (self._here.key, motion)
         known: _Known | None = self.repertoire.memory.get(key)
         if known is None or on_frame is not None:
-            plan = self._plan(id, speed)
+            plan = self.plan(id, speed)
             known = self._performed(plan)
             self.repertoire.memory.put(key, known)
             if on_frame is not None:
                 self._play(plan, on_frame, frame_steps)
         self._here = known.place
         self.reference = known.place.reference
-        return known.outcome
+        self._count += 1
+        return known.outcome if self._risk is None else self._chanced(known, self._risk)
 
     def state(self) -> PerformerState:
         """Return all that the future depends on."""
-        return PerformerState(self.reference, None)
+        return PerformerState(self.reference, None, self._draw, self._count)
 
     def load_state(self, state: PerformerState) -> Measured:
         """Go on from there, from the reference where the state is a simulation's."""
+        self._draw, self._count = state.draw, state.n_performed
         self._here = self._arrive(state.reference)
         self.reference = state.reference
         return self._here.measured
+
+    def _chanced(self, known: _Known, risk: FallRisk) -> Outcome:
+        """Return the outcome, or a fall on the way, as luck will have it."""
+        rng = np.random.default_rng([self._draw, 2, self._count])
+        outcome = known.outcome
+        if rng.random() >= risk.probability(known.strain, outcome.report.duration_s):
+            return outcome
+        return outcome._replace(report=outcome.report.fallen_at(float(rng.random())))
 
     def show(self) -> None:
         """Put the simulated robot where the reference is."""
@@ -91,7 +113,7 @@ class KinematicPerformer(Performer):
     def _performed(self, plan: Plan) -> _Known:
         report = TrackingReport.as_planned(plan)
         place = self._arrive(plan.end, velocities(plan.q[-2:], plan.knot_s)[-1])
-        return _Known(Outcome.of(report, place.measured, plan.speed), place)
+        return _Known(Outcome.of(report, place.measured, plan.speed), place, strain_of(plan))
 
     def _arrive(self, reference: Reference, velocity: FloatArray | None = None) -> _Place:
         key = tuple(np.asarray(part).tobytes() for part in reference)

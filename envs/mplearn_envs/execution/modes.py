@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias, get_args
 from mplearn.errors import InvalidValueError
 from mplearn_envs.skills.repertoire import Repertoire
 
-from .bodies import NOMINAL, Body
+from .bodies import BODIES, NOMINAL, Body
 from .kinematic import KinematicPerformer
 from .performer import Performer
 from .simulated import SimulatedPerformer
@@ -26,18 +26,18 @@ def make_performer(
     if dynamics == "simulated":
         return SimulatedPerformer(repertoire, hold_s, body)
     if dynamics == "kinematic":
-        return KinematicPerformer(repertoire, hold_s)
+        return KinematicPerformer(repertoire, hold_s, body)
     raise InvalidValueError(f"dynamics must be one of {get_args(Dynamics)}, not {dynamics!r}")
 
 
-def require_simulated(dynamics: Dynamics, body: Body) -> None:
+def require_fit(dynamics: Dynamics, body: Body) -> None:
     """Check that a mode knows bodies of a kind.
 
     Raises:
-        InvalidValueError: It takes plans at their word, and the body is not as planned for.
+        InvalidValueError: Nothing is simulated, and how often such a body falls was never seen.
     """
-    if dynamics == "kinematic" and body != NOMINAL:
+    if dynamics == "kinematic" and body not in BODIES.values():
         raise InvalidValueError(
-            "dynamics='kinematic' takes plans at their word, and no body but 'nominal': "
-            "use dynamics='simulated'"
+            f"dynamics='kinematic' knows how often bodies of the levels {tuple(BODIES)} fall, and "
+            "of no others: use dynamics='simulated'"
         )

@@ -122,7 +122,13 @@ class Performer(ABC):
     def show(self) -> None:
         """Bring ``simulation`` up to date, to be drawn."""
 
-    def _plan(self, id: int | None, speed: float = 1.0) -> Plan:
+    def plan(self, id: int | None, speed: float = 1.0) -> Plan:
+        """Return how a primitive is performed from where the reference robot is; None holds.
+
+        Args:
+            id: The primitive.
+            speed: As a share of the usual speed.
+        """
         if id is None:
             return self.repertoire.skills.hold(self.reference, self.hold_s)
         return self.repertoire.skills.plan(self.reference, id, speed)

@@ -38,7 +38,7 @@ class SimulatedPerformer(Performer):
         speed: float = 1.0,
     ) -> Outcome:
         """Perform a primitive; None holds. See `Performer.perform`."""
-        plan = self._plan(id, speed)
+        plan = self.plan(id, speed)
         simulation = self.simulation
         pushes = simulation.draw_pushes(self._count, plan.duration_s)
         self._count += 1

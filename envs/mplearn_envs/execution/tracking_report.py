@@ -59,6 +59,12 @@ class TrackingReport(NamedTuple):
             plan.duration_s,
         )
 
+    def fallen_at(self, share: float) -> TrackingReport:
+        """Return what happens where the robot falls after a share of the time."""
+        n = 1 + int(share * (len(self.time_s) - 1))
+        time_s, error, deviation, margin = (part[:n] for part in self[:4])
+        return TrackingReport(time_s, error, deviation, margin, True, float(time_s[-1]))
+
 
 def assess(robot: Robot, plan: Plan, q: FloatArray, v: FloatArray, fallen: bool) -> TrackingReport:
     """Compare what was recorded with what was planned.

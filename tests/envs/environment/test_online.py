@@ -252,5 +252,5 @@ def test_each_episode_has_a_body_of_its_own():
     nominal = humanoid().model().body_mass
     assert not np.allclose(masses[0], nominal) and not np.allclose(masses[0], masses[1])
     np.testing.assert_array_equal(masses[0], masses[2])
-    with pytest.raises(InvalidValueError, match="no body but 'nominal'"):
-        make(body="harsh")
+    with pytest.raises(InvalidValueError, match="and of no others: use dynamics='simulated'"):
+        make(body={"masses": 0.1})

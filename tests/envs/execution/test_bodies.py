@@ -124,6 +124,6 @@ def test_every_value_is_documented():
         assert f"{each.name}:" in Body.__doc__
 
 
-def test_kinematic_mode_has_no_other_body():
+def test_kinematic_mode_has_no_body_whose_falls_were_never_counted():
     with pytest.raises(InvalidValueError, match="simulated"):
-        gym.make(ENV, dynamics="kinematic", body="harsh")
+        gym.make(ENV, dynamics="kinematic", body={"level": "harsh", "masses": 0.1})
