@@ -226,16 +226,16 @@ class Chain:
             if id in self.graph:
                 self.graph.remove_node(id)
             self._rename({id}, None)
-        for seen in self._segments:
+        for seen in self._segments if moved else ():
             seen.primitive = moved.get(seen.number, seen.primitive)
             if seen.primitive == ROOT:
                 seen.primitive = None
         for id in change.born:
             self.graph.add_node(id)
         events: list[Event] = []
-        for i in range(1, len(self._segments)) if change.born else ():
-            pair = {self._segments[i - 1].primitive, self._segments[i].primitive}
-            if pair & set(change.born):
+        born = set(change.born)
+        for i, (one, other) in enumerate(pairwise(self._segments), start=1) if born else ():
+            if one.primitive in born or other.primitive in born:
                 events += self._count(i)
         return events
 

@@ -626,11 +626,14 @@ class MotionLearner:
 
     def _unlike(self, segment: Segment, placement: Placement) -> list[Event]:
         """Return the anomaly of a segment that was not recognised, if it is one."""
-        matrices, allowed = self.tree.matrices(self.person), self.config.false_alarms
-        if placement.nearest is None or (1 + sum(map(len, matrices.values()))) * allowed < 1:
+        if placement.nearest is None:
             return []
-        rules = self.config.tree
-        novelty = MotionNovelty(matrices, rules.n_nearest)
-        length = make_distance(rules).length(placement.distance)
+        ids, apart = self.tree.nearest_others(self.person)
+        n_exemplars = np.maximum((~np.isnan(apart)).sum(axis=1), 1).sum()
+        allowed = self.config.false_alarms
+        if (1 + n_exemplars) * allowed < 1:
+            return []
+        novelty = MotionNovelty.of(ids, apart)
+        length = make_distance(self.config.tree).length(placement.distance)
         found = novelty.score([(placement.nearest, float(length))])
         return [Anomaly(segment, "motion", *found)] if found.p_value <= allowed else []

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..recording import FloatArray
+from ..recording import FloatArray, IntArray
+from ..tree.nodes.search import nearest_others
 
 if TYPE_CHECKING:
     from ..tree import Recogniser
@@ -44,13 +45,36 @@ class MotionNovelty:
     """
 
     def __init__(self, matrices: Mapping[int, FloatArray], n_nearest: int) -> None:
-        inside = {id: _left_out(matrix, n_nearest) for id, matrix in matrices.items()}
-        inside = {id: distances for id, distances in inside.items() if len(distances)}
-        shared = float(np.mean([d.mean() for d in inside.values()])) if inside else 0.0
+        several = {id: matrix for id, matrix in matrices.items() if len(matrix) > 1}
+        apart = np.full((len(several), max(map(len, several.values()), default=0)), np.nan)
+        for row, matrix in zip(apart, several.values(), strict=True):
+            row[: len(matrix)] = nearest_others(matrix, n_nearest)
+        self._hold(np.array(list(several), np.int64), apart)
+
+    @classmethod
+    def of(cls, ids: IntArray, apart: FloatArray) -> MotionNovelty:
+        """Return what holds distances against those of exemplars to the nearest others.
+
+        Args:
+            ids: Primitives, shape (n,).
+            apart: Of each exemplar, the mean distance to the ``n_nearest`` others of its primitive,
+                shape (n, K); NaN where there are fewer.
+        """
+        novelty = cls({}, 1)
+        novelty._hold(ids, apart)
+        return novelty
+
+    def _hold(self, ids: IntArray, apart: FloatArray) -> None:
+        order = np.argsort(ids)
+        self._ids, apart = ids[order], apart[order]
+        seen = ~np.isnan(apart)
+        n, total = seen.sum(axis=1), np.where(seen, apart, 0.0).sum(axis=1)
+        some = n > 0
+        shared = float(np.mean(total[some] / n[some])) if some.any() else 0.0
         self._shared = max(shared, 1e-12)
-        self._usual = {id: self._scale(d.sum(), len(d)) for id, d in inside.items()}
-        scores = [d / self._scale(d.sum() - d, len(d) - 1) for d in inside.values()]
-        self._ranks = np.sort(np.concatenate(scores)) if scores else np.zeros(0)
+        self._usual = self._scale(total, n)
+        left = np.maximum(n - 1, 0)[:, None]
+        self._ranks = (apart / self._scale(total[:, None] - apart, left))[seen]
 
     def score(self, distances: Iterable[tuple[int, float]]) -> AnomalyScore:
         """Score a motion.
@@ -61,24 +85,18 @@ class MotionNovelty:
         Returns:
             Its score is infinite where there is nothing to compare with.
         """
-        score = min((d / self._usual.get(id, self._shared) for id, d in distances), default=np.inf)
-        as_large = len(self._ranks) - np.searchsorted(self._ranks, score, side="left")
+        score = min((d / self._usual_of(id) for id, d in distances), default=np.inf)
+        as_large = np.count_nonzero(self._ranks >= score)
         return AnomalyScore(float(score), float((1 + as_large) / (1 + len(self._ranks))))
 
-    def _scale(self, total: FloatArray | float, n: int) -> FloatArray:
+    def _usual_of(self, id: int) -> float:
+        k = int(np.searchsorted(self._ids, id))
+        return float(self._usual[k]) if id in self._ids[k : k + 1] else self._shared
+
+    def _scale(self, total: FloatArray, n: IntArray) -> FloatArray:
         return np.asarray((total + _SHARED * self._shared) / (n + _SHARED))
 
 
 def novelty_of(recogniser: Recogniser) -> MotionNovelty:
     """Return what the motions that a recogniser knows are held against."""
     return MotionNovelty(recogniser.matrices(), recogniser.config.n_nearest)
-
-
-def _left_out(matrix: FloatArray, n_nearest: int) -> FloatArray:
-    """Return the distance of each exemplar to the nearest others, shape (k,); empty for one."""
-    if len(matrix) < 2:
-        return np.zeros(0)
-    apart = np.array(matrix, dtype=np.float64)
-    np.fill_diagonal(apart, np.inf)
-    nearest = np.sort(apart, axis=1)[:, : min(n_nearest, len(apart) - 1)]
-    return np.asarray(nearest.mean(axis=1))

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from ..errors import InvalidValueError
 from ..hmm import LeftRightHMM
-from ..recording import FloatArray
+from ..recording import FloatArray, IntArray
 from ..state import require, validated, within
 from ..tree import (
     ROOT,
@@ -164,13 +166,18 @@ class PeopleTree:
         """
         return self.n_placed(id) < self.config.confirmed
 
-    def matrices(self, person: int) -> dict[int, FloatArray]:
-        """Return the distances among a person's own exemplars of each primitive, shape (k, k).
+    def nearest_others(self, person: int) -> tuple[IntArray, FloatArray]:
+        """Return how far a person's own exemplars are from the nearest others of their primitive.
 
-        They are the lengths of `Placement.distance` (`Distance.length`). Empty for a person of whom
-        nothing was seen; of several leaves in one primitive the fullest counts.
+        Empty for a person of whom nothing was seen; of several leaves in one primitive the fullest
+        counts.
+
+        Returns:
+            Ids of primitives, shape (n,), and distances as of `PrimitiveTree.nearest_others`.
         """
-        return self._primitives.matrices(person) if person in self._trees else {}
+        if person not in self._trees:
+            return np.zeros(0, np.int64), np.zeros((0, 0))
+        return self._primitives.nearest_others(person)
 
     def recogniser(self) -> Recogniser:
         """Return what would be recognised now, whoever moves, frozen."""

@@ -6,9 +6,11 @@ from collections.abc import Collection, Mapping, Sequence
 from operator import is_not
 from typing import Protocol
 
+import numpy as np
+
 from ..errors import UnknownPrimitiveError
 from ..hmm import LeftRightHMM
-from ..recording import FloatArray
+from ..recording import FloatArray, IntArray
 from ..tree import Change, Exchange, Node, Placement, PrimitiveTree, Recogniser
 from . import editing
 from .common import CommonRecogniser, common_model
@@ -56,8 +58,8 @@ class Primitives(Protocol):
     def n_placed(self, id: int) -> int:
         """Return how many segments were ever placed in a node."""
 
-    def matrices(self, person: int) -> dict[int, FloatArray]:
-        """Return the distances among a person's exemplars of each primitive, shape (k, k)."""
+    def nearest_others(self, person: int) -> tuple[IntArray, FloatArray]:
+        """Return how far a person's exemplars are from others of their primitive."""
 
     def recogniser(self) -> Recogniser:
         """Return what would be recognised now, frozen."""
@@ -139,9 +141,9 @@ class OnePersonsPrimitives:
         """Return how many segments were ever placed in a node of the tree."""
         return self.tree.node(id).n_placed
 
-    def matrices(self, person: int) -> dict[int, FloatArray]:
-        """Return the distances among the exemplars of each primitive."""
-        return {id: self.tree.node(id).matrix for id in self.tree.leaves}
+    def nearest_others(self, person: int) -> tuple[IntArray, FloatArray]:
+        """Return how far exemplars are from others of their leaf."""
+        return np.array(self.tree.leaves, np.int64), self.tree.nearest_others()
 
     def recogniser(self) -> Recogniser:
         """Return what the tree would recognise now."""
@@ -265,15 +267,16 @@ class SharedPrimitives:
         """Return how many segments were ever placed in any of the leaves."""
         return sum(self._trees[p].node(leaf).n_placed for p, leaf in self._leaves_of(id))
 
-    def matrices(self, person: int) -> dict[int, FloatArray]:
-        """Return the distances among a person's exemplars; of several leaves the fullest counts."""
-        found: dict[int, FloatArray] = {}
+    def nearest_others(self, person: int) -> tuple[IntArray, FloatArray]:
+        """Return how far a person's exemplars are from others; of several leaves the fullest's."""
+        tree, fullest = self._trees[person], dict[int, tuple[int, int]]()
         for leaf in self.sharing.leaves:
             if leaf.person == person:
-                own = self._trees[person].node(leaf.local).matrix
-                if len(own) > len(found.get(leaf.primitive, ())):
-                    found[leaf.primitive] = own
-        return found
+                size = len(tree.node(leaf.local).members)
+                if size > fullest.get(leaf.primitive, (0, 0))[0]:
+                    fullest[leaf.primitive] = size, leaf.local
+        rows = np.searchsorted(tree.leaves, [local for _, local in fullest.values()])
+        return np.array(list(fullest), np.int64), tree.nearest_others()[rows]
 
     def recogniser(self) -> Recogniser:
         """Return what would be recognised now, whoever moves."""

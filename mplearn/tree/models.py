@@ -40,7 +40,7 @@ class GroupModels:
     def __init__(self, config: TreeConfig, structure: Structure) -> None:
         self._config = config
         self._structure = structure
-        self._kept: dict[tuple[_Members, _Members], Model] = {}
+        self._kept: dict[int, tuple[tuple[_Members, _Members], Model]] = {}
         self._variances = self._floor()
 
     def of(self, id: int) -> Model:
@@ -58,20 +58,21 @@ class GroupModels:
         node = self._structure.nodes[id]
         neighbour = self._neighbour(node) if self._config.max_chains > 1 else None
         key = tuple(node.members), tuple(neighbour.members) if neighbour else ()
-        if key not in self._kept:
-            self._kept[key] = self._apart(*key) if neighbour else self._alone(key[0])
-        return self._kept[key]
+        known, model = self._kept.get(id, (None, None))
+        if model is None or known != key:
+            model = self._apart(*key) if neighbour else self._alone(key[0])
+            self._kept[id] = key, model
+        return model
 
     def of_segment(self, number: int) -> LeftRightHMM:
         """Return the model of one segment by itself."""
         return self._single((number,))
 
     def forget(self) -> None:
-        """Let the models of nodes that are gone, or have changed, go."""
-        if not self._kept:
-            return
-        held = {tuple(node.members) for node in self._structure.nodes.values()}
-        self._kept = {key: model for key, model in self._kept.items() if key[0] in held}
+        """Let the models of nodes that are gone go, once they are many."""
+        nodes = self._structure.nodes
+        if len(self._kept) > len(nodes):
+            self._kept = {id: model for id, model in self._kept.items() if id in nodes}
 
     def _alone(self, members: _Members) -> LeftRightHMM | SemiMarkovHMM:
         if self._config.durations == "geometric":

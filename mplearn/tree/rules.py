@@ -113,8 +113,8 @@ def forget_chances(structure: Structure, when: int) -> Change:
         when: Segments seen.
     """
     config = structure.config
-    nodes = structure.nodes.values()
-    young = [n for n in nodes if n.n_placed < config.confirmed and n.id != ROOT and n.is_leaf]
+    few = (structure.nodes[id] for id in structure.index.leaves_below(config.confirmed))
+    young = [leaf for leaf in few if leaf.n_placed < config.confirmed]
     patience = max(config.patience, 4 * int(structure.index.leaves.sum()))
     change = Change()
     for leaf in young:

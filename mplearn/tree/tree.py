@@ -199,7 +199,16 @@ class PrimitiveTree:
     @property
     def leaves(self) -> tuple[int, ...]:
         """Ids of the primitives, in the order of their birth."""
-        return tuple(node.id for node in self.nodes if node.id != ROOT and node.is_leaf)
+        return self._structure.index.leaf_ids
+
+    def nearest_others(self) -> FloatArray:
+        """Return how far each exemplar of each of the `leaves` is from the nearest others of it.
+
+        Returns:
+            The mean to the ``n_nearest`` of the rules, on their scale, shape (n, K); NaN where a
+            leaf holds fewer exemplars, or only one.
+        """
+        return self._structure.index.nearest_others()
 
     @property
     def nodes(self) -> tuple[Node, ...]:

@@ -1,3 +1,5 @@
+from itertools import product
+
 import numpy as np
 import pytest
 from library_examples import CHANNELS, RATE, demonstrations, example_library
@@ -8,6 +10,7 @@ from mplearn.hmm import fit
 from mplearn.library import MotionNovelty, Primitive, PrimitiveLibrary
 from mplearn.tree import PrimitiveTree, TreeConfig
 
+KINDS = (((0, 1), 5), ((1, 2), 2), ((2, 3), 14), ((3, 0), 3))
 PAIRS = ((0, 1), (1, 2), (2, 3), (3, 0))
 
 
@@ -69,6 +72,21 @@ def test_scores_by_hand():
     assert middle.p_value == pytest.approx((1 + sum(r >= 1.2 for r in ranks)) / 7)
     nothing = MotionNovelty({}, 2).score([])
     assert (nothing.score, nothing.p_value) == (np.inf, 1.0)
+
+
+def test_a_learner_scores_by_the_same_as_the_matrices_of_its_primitives():
+    tree = PrimitiveTree(TreeConfig(cutoff=0.7), len(CHANNELS), RATE)
+    motions = [list(demonstrations(*pair, seed=k, n=n)) for k, (pair, n) in enumerate(KINDS)]
+    for frames in (each for motion in motions for each in motion):
+        tree.insert(frames)
+    tree.merge(*tree.leaves[:2])
+    matrices = {id: tree.node(id).matrix for id in tree.leaves}
+    expected = MotionNovelty(matrices, tree.config.n_nearest)
+    found = MotionNovelty.of(np.array(tree.leaves), tree.nearest_others())
+    for id, distance in [*product((*tree.leaves, 99), (0.1, 0.4, 0.8, 3.0))]:
+        one, other = expected.score([(id, distance)]), found.score([(id, distance)])
+        assert one.score == pytest.approx(other.score, rel=1e-12)
+        assert one.p_value == other.p_value
 
 
 def test_wrong_motions_score_higher_than_right_ones(library):

@@ -67,6 +67,11 @@ def test_the_index_that_grew_is_the_one_built_anew():
         tree.merge(*tree.leaves[-2:])
     index, bank = tree._structure.index, tree._memory.bank
     anew = type(index).from_state(tree.config, bank, index.state())
+    assert tree.leaves == tuple(n.id for n in tree.nodes if n.id and n.is_leaf)
+    for id, distances in zip(tree.leaves, tree.nearest_others(), strict=True):
+        matrix = tree.node(id).matrix
+        nearest = [np.sort(np.delete(row, k))[:2].mean() for k, row in enumerate(matrix)]
+        np.testing.assert_allclose(distances[~np.isnan(distances)], nearest)
     means = np.stack([bank.mean_profile(group) for group in index.members])
     for m in range(15):
         points = tree.recogniser()._bank.model(np.resize(motions.perform(m), (16, 3)))

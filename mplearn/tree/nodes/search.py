@@ -96,7 +96,9 @@ class NodeIndex:
         self.caps: FloatArray | None = None
         self.members: list[list[int]] = []
         self._known = np.zeros(0, _KNOWN)
-        self._means = SlotArrays((bank.n_channels * config.normalisation.n_points,))
+        self._leaf_ids: tuple[int, ...] | None = None
+        n_values = bank.n_channels * config.normalisation.n_points
+        self._of_node = SlotArrays((n_values,), (config.max_exemplars,))  # mean, `nearest_others`
 
     @property
     def ids(self) -> IntArray:
@@ -108,42 +110,87 @@ class NodeIndex:
         """Which of them are leaves, shape (n,)."""
         return np.asarray(self._known["is_leaf"])
 
+    @property
+    def leaf_ids(self) -> tuple[int, ...]:
+        """Ids of the leaves, in order."""
+        if self._leaf_ids is None:
+            self._leaf_ids = tuple(self.ids[self.leaves].tolist())
+        return self._leaf_ids
+
+    def leaves_below(self, size: int) -> list[int]:
+        """Return the ids of the leaves that hold fewer exemplars than that, in order."""
+        found: list[int] = self.ids[self.leaves & (self._known["size"] < size)].tolist()
+        return found
+
+    def nearest_others(self) -> FloatArray:
+        """Return `nearest_others` of the leaves, in order, shape (n, K); NaN where there is none.
+
+        Of nodes that were put here, not of those that a state described.
+        """
+        return self._of_node.gather(self._known["slot"][self.leaves], 1)
+
     def put(self, node: Node, bank: ExemplarBank) -> None:
         """Take note of a node: that it is there and is searched, or what has changed in it."""
         if node.parent is None or (self.config.n_candidates and not node.is_leaf):
             self.drop(node.id)
         else:
             facts = (node.id, node.parent, node.is_leaf, node.diameter)
-            self.enter(facts, node.members, bank)
+            self.enter(facts, node.members, bank, node.matrix)
 
     def drop(self, id: int) -> None:
         """Forget a node, if it is known."""
         k = int(np.searchsorted(self.ids, id))
         if id in self.ids[k : k + 1]:
-            self._means.release(int(self._known["slot"][k]))
+            self._of_node.release(int(self._known["slot"][k]))
+            self._leaf_ids = None
             self._known = np.delete(self._known, k)
             del self.members[k]
 
     def enter(
-        self, facts: tuple[int, int, bool, float], members: Sequence[int], bank: ExemplarBank
+        self,
+        facts: tuple[int, int, bool, float],
+        members: Sequence[int],
+        bank: ExemplarBank,
+        matrix: FloatArray | None = None,
     ) -> None:
-        """Take note of a node: its id, its parent's, whether it is a leaf, its diameter."""
+        """Take note of a node: its id, its parent's, whether it is a leaf, its diameter.
+
+        Args:
+            facts: Those.
+            members: Numbers of its exemplars.
+            bank: Holds them.
+            matrix: Distances among them, shape (k, k), for `nearest_others`.
+        """
         k = int(np.searchsorted(self.ids, facts[0]))
         if facts[0] not in self.ids[k : k + 1]:
-            new = np.array([(*facts, np.inf, self._means.take(), 0)], _KNOWN)
+            new = np.array([(*facts, np.inf, self._of_node.take(), 0)], _KNOWN)
             self._known = np.insert(self._known, k, new)
             self.members.insert(k, [])
+            self._leaf_ids = None
         known = self._known[k]
+        if known["is_leaf"] != facts[2]:
+            self._leaf_ids = None
         known["parent"], known["is_leaf"], known["diameter"] = facts[1:]
         if self.members[k] != members:
             self.members[k] = list(members)
             known["size"] = len(members)
             known["extent"] = _mean_extents(bank, [members])[0]
-            self._means.write(int(known["slot"]), (bank.mean_profile(members),))
+            others = np.full(self.config.max_exemplars, np.nan)
+            if matrix is not None and len(matrix) > 1:
+                others[: len(matrix)] = nearest_others(matrix, self.config.n_nearest)
+            self._of_node.write(int(known["slot"]), (bank.mean_profile(members), others))
 
-    def remeasured(self, diameters: Mapping[int, float], bank: ExemplarBank) -> None:
-        """Take note of nodes' new diameters, by id, and of the new models of their exemplars."""
-        self._known["diameter"] = [diameters[id] for id in self.ids.tolist()]
+    def remeasured(self, nodes: Mapping[int, Node], bank: ExemplarBank) -> None:
+        """Take note of new distances in nodes, by id, and of the new models of their exemplars."""
+        n_nearest = self.config.n_nearest
+        for k, id in enumerate(self.ids.tolist()):
+            matrix, slot = nodes[id].matrix, int(self._known["slot"][k])
+            self._known["diameter"][k] = nodes[id].diameter
+            mean, others = self._of_node.read(slot)
+            if len(matrix) > 1:
+                others = others.copy()
+                others[: len(matrix)] = nearest_others(matrix, n_nearest)
+                self._of_node.write(slot, (mean, others))
         self._known["extent"] = _mean_extents(bank, self.members)
 
     def scale(self, but: int | None = None) -> float:
@@ -214,7 +261,7 @@ class NodeIndex:
             return np.arange(len(self.ids))
         profile, slots = bank.profile(exemplar), self._known["slot"]
         nearness, best = np.empty(len(slots)), np.full(self.config.n_candidates, np.inf)
-        for (means,), rows, here in self._means.parted(slots):
+        for (means, _), rows, here in self._of_node.parted(slots):
             nearness[here] = _squared_offsets(means, rows, profile, best)
         return np.sort(np.argsort(nearness, kind="stable")[: self.config.n_candidates])
 
@@ -251,7 +298,7 @@ class NodeIndex:
         """Return an index that knows the same, and goes on apart; see `ExemplarBank.fork`."""
         twin = copy(self)
         twin._known, twin.members = self._known.copy(), list(self.members)
-        twin._means = self._means.fork()
+        twin._of_node = self._of_node.fork()
         return twin
 
     def state(self) -> IndexState:
@@ -282,6 +329,13 @@ class NodeIndex:
 def mean_nearest(distances: FloatArray, n_nearest: int) -> FloatArray:
     """Return the mean of the smallest distances along the last axis, (..., k) -> (...)."""
     return np.asarray(np.sort(distances, axis=-1)[..., :n_nearest].mean(axis=-1))
+
+
+def nearest_others(matrix: FloatArray, n_nearest: int) -> FloatArray:
+    """Return how far each of at least two exemplars is from the nearest others, (k, k) -> (k,)."""
+    apart = np.array(matrix, dtype=np.float64)
+    np.fill_diagonal(apart, np.inf)
+    return mean_nearest(apart, min(n_nearest, len(apart) - 1))
 
 
 @njit(cache=True)

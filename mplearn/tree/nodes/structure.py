@@ -69,8 +69,7 @@ class Structure:
         """Take over distances in the nodes that were measured again."""
         for id, node in self.nodes.items():
             node.matrix = matrices[id]
-        diameters = {id: node.diameter for id, node in self.nodes.items()}
-        self.index.remeasured(diameters, self.memory.bank)
+        self.index.remeasured(self.nodes, self.memory.bank)
         self.tune()
 
     def remeasure(self) -> None:
