@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 
 from ..errors import InvalidValueError
-from ..hmm.kernels import Gaussians, log_densities, log_likelihood
+from ..hmm.kernels import log_likelihood
 from ..recording import FloatArray, IntArray
 from .config import TreeConfig
 
@@ -31,7 +31,7 @@ class Exemplar(NamedTuple):
         columns: Points, shape (D, P).
         means: Shape (N, D).
         variances: Shape (N, D).
-        log_norms: Shape (N, D).
+        log_norms: Log of what normalises the Gaussian of each state, shape (N,).
         log_stay: Shape (N,).
         log_next: Shape (N,).
         own: Log-likelihood of the points under the model, shape ().
@@ -162,29 +162,80 @@ def make_distance(config: TreeConfig) -> Distance:
 
 
 class _Chain(NamedTuple):
-    """The model of an exemplar."""
+    """The model of an exemplar, ``scales`` being -1 / (2 variance)."""
 
-    gaussians: Gaussians
+    means: FloatArray
+    variances: FloatArray
+    scales: FloatArray
+    log_norms: FloatArray
     log_stay: FloatArray
     log_next: FloatArray
 
 
 @njit(cache=True)
 def _of_one(exemplar: Exemplar) -> _Chain:
-    gaussians = Gaussians(exemplar.means, exemplar.variances, exemplar.log_norms)
-    return _Chain(gaussians, exemplar.log_stay, exemplar.log_next)
+    means, variances, norms = exemplar.means, exemplar.variances, exemplar.log_norms
+    scales = -0.5 / variances
+    return _Chain(means, variances, scales, norms, exemplar.log_stay, exemplar.log_next)
 
 
 @njit(cache=True)
 def _of_many(others: Exemplar, row: int) -> _Chain:
-    gaussians = Gaussians(others.means[row], others.variances[row], others.log_norms[row])
-    return _Chain(gaussians, others.log_stay[row], others.log_next[row])
+    means, variances, norms = others.means[row], others.variances[row], others.log_norms[row]
+    scales = -0.5 / variances
+    return _Chain(means, variances, scales, norms, others.log_stay[row], others.log_next[row])
 
 
 @njit(cache=True)
 def _score(columns: FloatArray, model: _Chain, weights: FloatArray) -> float:
-    densities = log_densities(columns, weights, 0, len(weights), model.gaussians)
+    """Return log P(points | model), of points (D, P).
+
+    As of a `LeftRightHMM`, but in another order: four channels at a time, which halves what is read
+    and written, and norms and missing values apart from the rest.
+    """
+    n_channels, n_points = columns.shape
+    densities = np.empty((len(model.means), n_points))
+    whole = n_channels - n_channels % 4
+    for n, row in enumerate(densities):
+        mean, scale = model.means[n], model.scales[n]
+        row[:] = model.log_norms[n]
+        for d in range(0, whole, 4):
+            a, b, c, e = columns[d], columns[d + 1], columns[d + 2], columns[d + 3]
+            p, q, r, s = mean[d], mean[d + 1], mean[d + 2], mean[d + 3]
+            i, j, k, m = scale[d], scale[d + 1], scale[d + 2], scale[d + 3]
+            for t in range(n_points):
+                u, v, w, x = a[t] - p, b[t] - q, c[t] - r, e[t] - s
+                row[t] = row[t] + i * u * u + j * v * v + k * w * w + m * x * x
+        for d in range(whole, n_channels):
+            column, p, i = columns[d], mean[d], scale[d]
+            for t in range(n_points):
+                u = column[t] - p
+                row[t] += i * u * u
+        for t in range(n_points):
+            if row[t] != row[t]:
+                row[t] = _seen_density(columns[:, t], mean, model.variances[n], model.log_norms[n])
+            row[t] *= weights[t]
     return log_likelihood(densities, model.log_stay, model.log_next, True)
+
+
+@njit(cache=True)
+def _seen_density(
+    point: FloatArray, mean: FloatArray, variance: FloatArray, log_norm: float
+) -> float:
+    """Return the log-density of the channels of a point that are not missing."""
+    total = log_norm
+    for d in range(len(point)):
+        if point[d] == point[d]:
+            total -= 0.5 * (point[d] - mean[d]) ** 2 / variance[d]
+        else:
+            total += 0.5 * np.log(2 * np.pi * variance[d])
+    return total
+
+
+@njit(cache=True)
+def own_score(exemplar: Exemplar, weights: FloatArray) -> float:
+    """Return the log-likelihood of an exemplar's points under its model, as distances take it."""
+    return _score(exemplar.columns, _of_one(exemplar), weights)
 
 
 @njit(cache=True)
@@ -204,7 +255,7 @@ def _likelihood(
 @njit(cache=True)
 def _generated(model: _Chain, moves: FloatArray, noise: FloatArray) -> FloatArray:
     """Return a sequence of a left-right model that ends in its last state, shape (D, P)."""
-    means, variances = model.gaussians.means, model.gaussians.variances
+    means, variances = model.means, model.variances
     n_states, n_points = len(means), len(moves)
     out = np.empty_like(noise)
     state = 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mplearn.errors import ModelError
-from mplearn.hmm import fit
+from mplearn.hmm import LeftRightHMM, distance, fit
 from mplearn.tree import Exemplar, TreeConfig
 from mplearn.tree.exemplars import normalisation
 from mplearn.tree.exemplars.bank import ExemplarBank
@@ -38,15 +38,39 @@ def test_a_model_is_that_of_one_step_of_em(n_missing: int) -> None:
     model = fit(
         [seen], bank.config.n_states, weights=[weights], n_steps=1, variance_floor=bank.floor
     )
-    for name in ("means", "variances", "log_norms", "log_stay", "log_next"):
+    for name in ("means", "variances", "log_stay", "log_next"):
         np.testing.assert_array_equal(getattr(exemplar, name), getattr(model, name))
-    assert exemplar.own == model.score(seen, weights)
+    np.testing.assert_allclose(exemplar.log_norms, model.log_norms.sum(axis=1), rtol=1e-14)
+    assert exemplar.own == pytest.approx(model.score(seen, weights), rel=1e-12)
     still = np.broadcast_to(
         normalisation.mean_posture(seen.astype(float), bank.config.normalisation), seen.shape
     )
     other = ExemplarBank(replace(bank.config, extent_share=np.inf), D, bank.floor)
     other.add(0, other._modelled(still, 90.0))
     np.testing.assert_array_equal(exemplar.extent, other.distances(exemplar, [0])[0])
+
+
+@pytest.mark.parametrize("width", [1, 3, 4, 9])
+def test_distances_are_those_of_general_models_whatever_is_missing(width: int) -> None:
+    rng = np.random.default_rng(width)
+    config = TreeConfig()
+    weights = normalisation.weights(config.normalisation)
+    bank = ExemplarBank(config, width, np.linspace(0.01, 0.2, width))
+    for number in range(6):
+        seen = rng.normal(0, 0.5, (len(weights), width)).cumsum(axis=0)
+        if number % 2 and width > 1:
+            seen.ravel()[rng.choice(seen.size, seen.size // 4, replace=False)] = np.nan
+        bank.add(number, bank.model(seen))
+    matrix = np.stack([bank.distances(bank[n], range(6)) for n in range(6)])
+    np.testing.assert_array_equal(matrix, matrix.T)
+    assert (np.diag(matrix) == 0).all()  # a copy is no way off
+    models = [
+        LeftRightHMM(e.means, e.variances, e.log_stay) for e in map(bank.__getitem__, range(6))
+    ]
+    for i, j in [(0, 1), (1, 3), (2, 4), (5, 0)]:
+        one, other = bank[i].columns.T, bank[j].columns.T
+        expected = distance(models[i], [one], models[j], [other], [weights], [weights])
+        assert matrix[i, j] ** 2 == pytest.approx(expected, rel=1e-10)
 
 
 def test_a_model_of_what_was_never_seen_is_refused() -> None:

@@ -11,12 +11,12 @@ import numpy as np
 
 from ...hmm import SequenceBatch, fit
 from ...hmm.em import em
-from ...hmm.kernels import Gaussians, log_norms, score_frames
+from ...hmm.kernels import log_norms
 from ...hmm.parameters import empty_parameters
 from ...recording import FloatArray, IntArray
 from ...state import Array, State, require
 from ..config import TreeConfig
-from ..distance import Exemplar, make_distance
+from ..distance import Exemplar, make_distance, own_score
 from . import normalisation
 from .slot_arrays import SlotArrays
 
@@ -71,8 +71,8 @@ class ExemplarBank:
         per_state, per_transition = (config.n_states, n_channels), (config.n_states,)
         self._arrays = SlotArrays(
             (n_channels, config.normalisation.n_points),
-            *(per_state, per_state, per_state),
-            *(per_transition, per_transition),
+            *(per_state, per_state),
+            *(per_transition, per_transition, per_transition),
             *((), (), ()),
         )
 
@@ -124,12 +124,11 @@ class ExemplarBank:
         if not np.isfinite(likelihood + model.means[0].sum()):  # says what is wrong
             n_states = self.config.n_states
             fit([points], n_states, weights=[weights], n_steps=1, variance_floor=self.floor)
-        stay, following = model.log_stay, model.log_next
-        following[:-1] = np.log(-np.expm1(stay[:-1]))
-        gaussians = Gaussians(model.means, model.variances, log_norms(model.variances))
-        own = score_frames(points, weights, gaussians, stay, following, True)
-        scalars = np.array(own), np.array(float(duration)), np.array(np.inf)
-        return Exemplar(columns, *gaussians, stay, following, *scalars)
+        model.log_next[:-1] = np.log(-np.expm1(model.log_stay[:-1]))
+        gaussians = model.means, model.variances, log_norms(model.variances).sum(axis=1)
+        parts = columns, *gaussians, model.log_stay, model.log_next
+        exemplar = Exemplar(*parts, np.array(0.0), np.array(float(duration)), np.array(np.inf))
+        return exemplar._replace(own=np.array(own_score(exemplar, weights)))
 
     def add(self, number: int, exemplar: Exemplar) -> None:
         """Remember an exemplar."""
