@@ -366,7 +366,7 @@ def merge_files(parts: Sequence[Path], to: Path) -> None:
         MPLearnError: One cannot be read, or the file cannot be written.
     """
     state = merged_state(_learner_of(part) for part in parts)
-    replace(FILES, compression=1).write(to, to_plain(state))
+    replace(FILES, compression=0).write(to, to_plain(state))  # it is read once, and goes
 
 
 def _learner_of(path: Path) -> MotionLearner:

@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mplearn.errors import InvalidValueError
 from mplearn.learner.buffer import FrameBuffer
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.integers(1, 700), st.integers(0, 900)), min_size=1, max_size=6))
 def test_a_buffer_is_a_window_on_the_stream(steps: list[tuple[int, int]]) -> None:
     buffer, stream = FrameBuffer(2), []
