@@ -26,7 +26,6 @@ from mplearn.store import LifelongLearner, info
 from mplearn.store.store import Store
 
 _BLOCK = 10  # frames that come at once: 100 ms
-_AGAIN_S = 7.5  # until a motion's variant comes again
 
 
 @dataclass
@@ -51,14 +50,22 @@ def motions() -> tuple[FloatArray, tuple[str, ...], float]:
 
 
 def scene(frames: FloatArray, rng: np.random.Generator, kind: int) -> FloatArray:
-    """Return the motions as somebody else would make them: a kind is a pattern of joints."""
+    """Return the motions as somebody else would make them: a kind is a pattern of joints.
+
+    All begin and end in the posture that the motions begin in, as people stand between motions: a
+    leap from one kind to the next would be a motion of its own, and there are many such.
+    """
     own = np.random.default_rng(kind)
-    mean = frames.mean(axis=0)
+    stands = frames[0]
     size = own.uniform(0.6, 1.3, frames.shape[1]) * np.where(
         own.random(frames.shape[1]) < 0.2, -1, 1
     )
     varied = size * rng.normal(1.0, 0.02)
-    return np.asarray(mean + (frames - mean) * varied + 1e-3 * rng.normal(size=frames.shape))
+    out = stands + (frames - stands) * varied
+    n = len(out) // 50
+    fade = np.linspace(0.0, 1.0, n)[:, None]
+    out[-n:] = (1.0 - fade) * out[-n:] + fade * stands
+    return np.asarray(out + 1e-3 * rng.normal(size=frames.shape))
 
 
 def live(hours: float, path: Path, checkpoint_s: float = 30.0) -> Figures:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -89,7 +90,8 @@ class PrimitiveLibrary:
         names = [primitive.name for primitive in self.primitives]
         for what, values in (("ids", ids), ("names", names), ("channels", self.channels)):
             if len(set(values)) != len(values):
-                raise InvalidValueError(f"{what} of a library must differ, not {values}")
+                twice = [value for value, n in Counter(map(str, values)).items() if n > 1]
+                raise InvalidValueError(f"{what} of a library must differ, not {', '.join(twice)}")
         for primitive in self.primitives:
             if primitive.hmm.n_channels != len(self.channels):
                 raise InvalidValueError(
@@ -410,7 +412,7 @@ class PrimitiveLibrary:
     @property
     def _recogniser(self) -> Recogniser:
         if self.recogniser is None:
-            raise InvalidValueError("this library holds no recogniser")
+            raise InvalidValueError("this library holds no recogniser: it can only be performed")
         return self.recogniser
 
     @cached_property

@@ -50,6 +50,17 @@ def test_the_help_has_an_example_that_parses(command, capsys):
     assert args.run is command_modules()[command].run
 
 
+def test_what_a_library_cannot_do_is_said_before_anything_is_read(tmp_path, capsys):
+    path = tmp_path / "acts.mplearn"
+    library = LibrarySource(None).now()
+    library.save(path)
+    code, _, error = said(capsys, "recognise", path, tmp_path / "nothing.c3d")
+    assert code == 2 and "no recogniser" in error and "mplearn learn" in error
+    one, two = (p.name for p in library.primitives[:2])
+    code, _, error = said(capsys, "rename", path, one, two)
+    assert code == 2 and f"must differ, not {two}\n" in error
+
+
 def test_every_action_of_a_store_has_an_example_that_parses(capsys):
     actions = said(capsys, "store", "nothing")[2].split("choose from ")[1].rstrip(")\n")
     for action in actions.replace("'", "").split(", "):

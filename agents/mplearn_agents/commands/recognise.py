@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mplearn.errors import RecordingError
+from mplearn.errors import InvalidValueError, RecordingError
 from mplearn_agents.recordings.reading import (
     add_corpus_arguments,
     add_reading_arguments,
@@ -61,6 +61,11 @@ def run(args: argparse.Namespace) -> None:
         recognise_in_chunks(args)
         return
     library = PrimitiveLibrary.load(args.library)
+    if library.recogniser is None:
+        raise InvalidValueError(
+            f"{args.library} holds no recogniser: it can only be performed; `mplearn learn` writes "
+            "libraries that recognise"
+        )
     aside = open_console(stderr=True)
     recordings = _read(args, library, aside)
     found = []
