@@ -17,12 +17,16 @@ import pytest
 from mocap_writers import (
     amc_values,
     bvh_values,
+    smpl_poses,
     write_amc,
     write_asf,
     write_bvh,
     write_c3d,
+    write_g1_csv,
     write_mvnx,
+    write_smpl,
 )
+from scipy.spatial.transform import Rotation
 
 from mplearn.demonstrator import demonstrate
 from mplearn.errors import InvalidValueError, RecordingError
@@ -427,6 +431,37 @@ def test_an_mvnx_file_with_decimal_commas(tmp_path: Path) -> None:
     path.write_text(re.sub(r"(-?\d)\.(\d{9})", r"\1,\2", path.read_text()))
     found = open_recording(path, positions=True)
     assert found.rate_hz == plain.rate_hz
+    assert found.frames == pytest.approx(plain.frames, abs=1e-12)
+
+
+@pytest.mark.parametrize("form", ["matrices", "matrices in a row", "w first", "w last"])
+def test_poses_of_smpl_in_other_forms(tmp_path: Path, form: str) -> None:
+    vectors = 0.3 * smpl_poses(n_joints=24).reshape(12, 24, 3)
+    plain = open_recording(write_smpl(tmp_path / "a.npz", poses=vectors), positions=True)
+    turns = Rotation.from_rotvec(vectors.reshape(-1, 3))
+    poses = turns.as_matrix().reshape(12, 24, 3, 3)
+    if "w" in form.split():
+        poses = turns.as_quat(scalar_first=form == "w first").reshape(12, 24, 4)
+    elif "row" in form:
+        poses = poses.reshape(12, -1)
+    found = open_recording(write_smpl(tmp_path / "b.npz", poses=poses), positions=True)
+    assert found.frames == pytest.approx(plain.frames, abs=1e-6)
+    assert found.report is not None
+    said = "; ".join([*found.report.notes, *found.report.warnings])
+    assert ("matrices" if "matrices" in form else "quaternions") in said
+
+
+def test_six_numbers_a_joint_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"shape \(12, 24, 6\)"):
+        open_recording(write_smpl(tmp_path / "a.npz", poses=np.ones((12, 24, 6))))
+
+
+def test_a_table_of_the_g1_with_decimal_commas_and_its_rate_in_the_name(tmp_path: Path) -> None:
+    plain = open_recording(write_g1_csv(tmp_path / "a.csv"))
+    path = write_g1_csv(tmp_path / "dance_60fps.csv")
+    path.write_text(path.read_text().replace(",", ";").replace(".", ","))
+    found = open_recording(path)
+    assert (plain.rate_hz, found.rate_hz) == (30.0, 60.0)
     assert found.frames == pytest.approx(plain.frames, abs=1e-12)
 
 

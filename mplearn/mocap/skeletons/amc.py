@@ -12,6 +12,7 @@ from ..files import bad_file, cmu_subject, read_text, stem, suffix
 from ..findings import Findings
 from ..numbers import numbers
 from ..placing.space import Space
+from ..rates import rate_beside
 from ..reader import Hints, Reader
 from .asf import read_asf
 from .cmu_humanoid import CMU_SKELETON, cmu_humanoid_recording
@@ -40,7 +41,8 @@ class AMCReader(Reader):
         findings = Findings(self.format)
         degrees, layout, table = _frames(path, findings)
         skeleton_file = _skeleton_file(path, hints, findings)
-        rate_hz = hints.rate_hz or _named_rate(stem(path)) or _RATE_HZ
+        rate_hz = hints.rate_hz or _named_rate(stem(path)) or rate_beside(path, findings)
+        rate_hz = rate_hz or _RATE_HZ
         if skeleton_file is None:
             skeleton = CMU_SKELETON
             name = "CMU's skeleton (its ASF is not beside it)"

@@ -23,6 +23,7 @@ from ..findings import Findings
 from ..numbers import numbers
 from ..options import option
 from ..placing.space import Space
+from ..rates import rate_beside
 from ..reader import Hints, Reader
 from .g1 import BASE, G1_JOINTS, g1_joints
 from .skeletal import Column, SkeletalMotion, skeletal_recording
@@ -102,6 +103,8 @@ class G1CSVReader(Reader):
         if "time" in at:
             clock = even_clock(path, table[:, at["time"]])
             values, rate_hz = clock.even(values), hints.rate_hz or clock.rate_hz
+        elif hints.rate_hz is None and (beside := rate_beside(path, findings)):
+            rate_hz = beside
         elif hints.rate_hz is None:
             findings.note(f"{rate_hz:g} Hz, usual in such tables, which do not say it")
         motion = SkeletalMotion(
@@ -114,8 +117,9 @@ class G1CSVReader(Reader):
 
 
 def _cells(line: str) -> list[str]:
-    for separator in (",", ";", "\t"):
+    for separator in (";", "\t", ","):
         if separator in line:
+            line = line if separator == "," else line.replace(",", ".")  # decimal commas
             return [cell.strip() for cell in line.rstrip().rstrip(separator).split(separator)]
     return line.split()
 

@@ -12,12 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ...maths.rotations import rotation_vector_to_matrix
+from ...maths.rotations import matrix_to_quaternion, rotation_vector_to_matrix
 from ...recording import FloatArray, Recording
 from ..files import bad_file
 from ..findings import Findings
 from ..options import option
 from ..placing.space import Space
+from ..rates import rate_beside
 from ..reader import Hints, Reader
 from .npz_file import NPZFile
 from .skeletal import Limbs, limb_order, skeletal_recording
@@ -65,6 +66,7 @@ _MODELS = {24: "SMPL", 52: "SMPL-H", 55: "SMPL-X", 22: "the body alone", 23: "SM
 _POSES = ("poses", "smpl_poses", "fullpose", "full_pose", "pose")
 _ROOTS = ("root_orient", "global_orient")
 _BODIES = ("pose_body", "body_pose")
+_SQUARE = 0.01  # by which matrices and quaternions are off rotations, at most
 _PLACES = ("trans", "transl", "smpl_trans", "root_trans")
 _RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
 
@@ -72,9 +74,9 @@ _RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps
 class SMPLReader(Reader):
     """Reads the poses of SMPL's family from ``.npz`` files: see the module's docstring.
 
-    The rotations are axis-angle vectors [rad] under ``poses``, or under ``root_orient`` and
-    ``pose_body`` (``global_orient`` and ``body_pose``); places under ``trans`` [m]; the rate under
-    ``mocap_framerate``. The world of AMASS is z up.
+    The rotations are axis-angle vectors [rad], matrices or quaternions, under ``poses``, or under
+    ``root_orient`` and ``pose_body`` (``global_orient`` and ``body_pose``); places under ``trans``
+    [m]; the rate under ``mocap_framerate``. The world of AMASS is z up.
     """
 
     format = "SMPL"
@@ -85,7 +87,7 @@ class SMPLReader(Reader):
         findings = Findings(self.format)
         archive = NPZFile(path)
         vectors = _vectors(archive, findings)
-        rate_hz = hints.rate_hz or _rate(archive)
+        rate_hz = hints.rate_hz or _rate(archive) or rate_beside(path, findings)
         if rate_hz is None:
             raise bad_file(path, f"none of {', '.join(_RATES)}", f"one, or {option('rate_hz')}")
         limbs = mean_person()
@@ -119,9 +121,9 @@ def _vectors(archive: NPZFile, findings: Findings) -> FloatArray:
     name = _first(archive, _POSES)
     root, body = _first(archive, _ROOTS), _first(archive, _BODIES)
     if name is not None:
-        poses = _numbers(archive, name)
+        poses = _as_vectors(archive, name, findings)
     elif root is not None and body is not None:
-        parts = [_numbers(archive, part) for part in (root, body)]
+        parts = [_as_vectors(archive, part, findings) for part in (root, body)]
         if len({len(part) for part in parts}) > 1:
             raise bad_file(archive.path, f"{root} and {body} of other lengths", "a row a frame")
         poses = np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)
@@ -145,6 +147,42 @@ def _vectors(archive: NPZFile, findings: Findings) -> FloatArray:
         findings.leave_out([f"rotations of {n_joints - _N_BODY} joints of hands and face"])
     findings.note(f"the poses are those of {model}")
     return poses.reshape(len(poses), n_joints, 3)[:, :_N_BODY]
+
+
+def _as_vectors(archive: NPZFile, name: str, findings: Findings) -> FloatArray:
+    """Return an array of rotations as rotation vectors, whatever it holds; others as they are.
+
+    Raises:
+        RecordingError: It holds so many numbers a joint as no rotation has that is known here.
+    """
+    values = _numbers(archive, name)
+    per_joint = values.shape[-1] if values.ndim == 3 else 3
+    width = int(np.prod(values.shape[1:]))
+    if width and width % 9 == 0 and len(values):
+        matrices = values.reshape(len(values), -1, 3, 3)
+        square = np.einsum("tjik,tjil->tjkl", matrices, matrices)
+        if np.abs(square - np.eye(3)).max() < _SQUARE:
+            findings.note(f"{name} holds matrices")
+            return _rotation_vectors(matrix_to_quaternion(matrices))
+    if per_joint == 4 and np.abs(np.linalg.norm(values, axis=2) - 1.0).max() < _SQUARE:
+        share = np.abs(values).mean(axis=(0, 1))  # joints are turned little: w is large
+        order, places = ("w, x, y, z", [0, 1, 2, 3]), ("x, y, z, w", [3, 0, 1, 2])
+        said, columns = order if share[0] > share[3] else places
+        findings.warn(f"{name} holds quaternions, taken as {said}")
+        return _rotation_vectors(values[..., columns])
+    if values.ndim == 3 and per_joint != 3:
+        raise bad_file(
+            archive.path, f"{name} of shape {values.shape}", "rotation vectors, three numbers each"
+        )
+    return values
+
+
+def _rotation_vectors(quaternions: FloatArray) -> FloatArray:
+    """Return rotation vectors [rad] of quaternions (w, x, y, z), (T, J, 4) to (T, J, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    turns = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True)
+    return np.asarray(turns.as_rotvec().reshape(*quaternions.shape[:2], 3))
 
 
 def _places(archive: NPZFile, n_frames: int, findings: Findings) -> FloatArray:

@@ -27,6 +27,7 @@ from .glb import CORNERS, VERTICES, Document, numbers, read_glb
 from .shapes import surfaces
 
 _UPRIGHT = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])  # x, y, z: y is up
+_ROUNDED = 1e-6  # by which share a rate is off for times that have seven digits
 _STILL = 1e-9  # what moves less does not
 _TO_XYZW = [1, 2, 3, 0]
 
@@ -93,9 +94,15 @@ def _reading(
     places = in_order(path, "node", names, model.body_names)
     pos = pos[:, places] @ upright
     quat = matrix_to_quaternion(upright.T @ turn[:, places])
-    rate_hz = float((len(times) - 1) / (times[-1] - times[0]))
-    reading = Reading(rate_hz, pos[:, 0], quat[:, 0], None, pos, quat, times_s=times)
+    reading = Reading(_rate(times), pos[:, 0], quat[:, 0], None, pos, quat, times_s=times)
     return reading.require(path, model)
+
+
+def _rate(times: FloatArray) -> float:
+    """Return frames per second [1/s]: the plainest number that the times, rounded floats, allow."""
+    rate_hz = float((len(times) - 1) / (times[-1] - times[0]))
+    plain = (round(rate_hz, decimals) for decimals in range(6))
+    return next((rate for rate in plain if abs(rate / rate_hz - 1.0) < _ROUNDED), rate_hz)
 
 
 def _turned() -> FloatArray:
