@@ -270,7 +270,7 @@ def test_two_processes_perform_a_primitive():
         ],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=600,
         check=False,
     )
     assert done.returncode == 0, done.stderr
