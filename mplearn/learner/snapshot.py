@@ -12,6 +12,8 @@ from ..people import PeopleTree
 from ..state import SharedState
 from ..tree import Node
 
+_LOOKED_AT = 256  # primitives that `prepare` looks at in one part
+
 
 @dataclass(frozen=True, eq=False)
 class FrozenState(SharedState):
@@ -39,6 +41,7 @@ class Snapshots:
         self._rate_hz = rate_hz
         self._body = body
         self._made: dict[int, tuple[LeftRightHMM, Primitive]] = {}
+        self._left: list[int] | None = None  # what `prepare` has still to look at
         self.frozen: dict[int, FrozenState] = {}
 
     def freeze(self, tree: PeopleTree, id: int) -> None:
@@ -47,17 +50,26 @@ class Snapshots:
         self.frozen[id] = FrozenState(self._primitive(tree, node)[1])
 
     def prepare(self, tree: PeopleTree) -> bool:
-        """Make one of the primitives that `take` would have to make; return whether there is none.
+        """Make one of the primitives that `take` would have to make; return whether none is left.
+
+        It goes through them once, a part at a time; what changes behind it is left to `take`.
 
         Args:
             tree: See `take`.
         """
-        nodes = {node.id: node for node in tree.nodes}
-        for id in tree.leaves:
-            made = self._primitive(tree, nodes[id])
-            if id not in self._made or self._made[id][1] is not made[1]:
+        if self._left is None:
+            self._left = list(reversed(tree.leaves))
+        part = set(self._left[-_LOOKED_AT:]) & set(tree.leaves)
+        nodes = {node.id: node for node in tree.nodes if node.id in part}
+        for _ in range(min(len(self._left), _LOOKED_AT)):
+            id = self._left.pop()
+            made = self._primitive(tree, nodes[id]) if id in nodes else None
+            if made and (id not in self._made or self._made[id][1] is not made[1]):
                 self._made[id] = made
                 return False
+        if self._left:
+            return False
+        self._left = None
         return True
 
     def take(self, tree: PeopleTree, graph: TransitionGraph) -> PrimitiveLibrary:
