@@ -14,6 +14,7 @@ import numpy as np
 from mplearn.maths.compiling import kernel
 from mplearn.maths.plane import turn_in_plane
 from mplearn.recording import FloatArray, IntArray
+from mplearn_envs.mechanics.heels import foot_places, on_toes
 from mplearn_envs.mechanics.pendulum import pendulum_rate
 from mplearn_envs.mechanics.reference import reference_robot
 from mplearn_envs.mechanics.support import GRAVITY
@@ -61,8 +62,9 @@ class AnkleFeedback(NamedTuple):
     """What corrects the commands of one plan, step by step.
 
     Attributes:
-        wanted: DCM seen from the feet (x, y) [m] and the left foot's share of the weight after
-            each command, shape (N, 3); nothing is corrected where there is none.
+        wanted: DCM seen from the feet (x, y) [m], the left foot's share of the weight, and how
+            flat the left and the right sole lie, 0 to 1, after each command, shape (N, 5); nothing
+            is corrected where there is none.
         rate: Of the pendulum [1/s].
         gain: Shift of the zero-moment point per error of the DCM.
         largest_m: Largest shift [m].
@@ -102,7 +104,7 @@ def make_ankle_feedback(
     hinges, sides = ankles(robot)
     weight = float(ref.tree.mass.sum()) * GRAVITY
     return AnkleFeedback(
-        _wanted(plan) if corrects else np.empty((0, 3)),
+        _wanted(robot, plan) if corrects else np.empty((0, 5)),
         pendulum_rate(float(plan.cog[:, 2].mean())),
         gain,
         largest_m,
@@ -113,15 +115,20 @@ def make_ankle_feedback(
     )
 
 
-def _wanted(plan: Plan) -> FloatArray:
-    """Return DCM [m] and share of the weight that a plan wants after each command, (N, 3)."""
+def _wanted(robot: Robot, plan: Plan) -> FloatArray:
+    """Return what a plan wants after each command, see `AnkleFeedback`, shape (N, 5).
+
+    The ankle of a foot whose heel is raised moves no weight: the sole would turn about its edge.
+    """
     cog, rate = plan.cog[:, :2], pendulum_rate(float(plan.cog[:, 2].mean()))
-    seen = support(plan.share, plan.ground)
+    feet = foot_places(reference_robot(robot).corners, plan.ground, plan.heel)
+    seen = support(plan.share, feet)
     dcm = seen.see(cog + np.gradient(cog, plan.knot_s, axis=0) / rate)
     n_knots = len(plan.q) - 1
     at = np.arange(1.0, len(plan.commands) + 1.0) * (n_knots / len(plan.commands))
     knots = np.arange(n_knots + 1.0)
-    return np.stack([np.interp(at, knots, x) for x in (*dcm.T, plan.share)], axis=1)
+    flat = 1.0 - on_toes(plan.heel).T
+    return np.stack([np.interp(at, knots, x) for x in (*dcm.T, plan.share, *flat)], axis=1)
 
 
 def ankles(robot: Robot) -> tuple[IntArray, IntArray]:
@@ -163,7 +170,7 @@ def correct(law: AnkleFeedback, step: int, views: Views) -> float:
     for k in range(law.ankles.shape[0]):
         j = law.ankles[k]
         axis = views.xaxis[j + 1]
-        carried = left if law.sides[k] == 0 else right
+        carried = (left if law.sides[k] == 0 else right) * wanted[3 + law.sides[k]]
         change = carried * law.softness[k] * (axis[1] * x - axis[0] * y)
         low, high = law.limits[k]
         command[j] = min(max(command[j] + change, low), high)

@@ -225,7 +225,7 @@ class Reflexes:
             if worst < _REACHED:
                 break
         still, swing = np.zeros_like(target), np.zeros_like(rest.swing)
-        parts = (target, still, found, rest.swing, swing, np.zeros(2), ground)
+        parts = (target, still, found, rest.swing, swing, np.zeros(2), ground, np.zeros(2))
         return Reference(*(np.round(part, GRID_DECIMALS) for part in parts))
 
     def return_commands(self, arrival: Reference, commands: FloatArray) -> FloatArray:

@@ -9,6 +9,7 @@ from numba import njit
 
 from mplearn.recording import FloatArray
 from mplearn_envs.control.ankle_feedback import support
+from mplearn_envs.mechanics.heels import bearing_corners
 from mplearn_envs.mechanics.momentum import ground_reaction, momenta
 from mplearn_envs.mechanics.reference import Reference, reference_robot, sole_middles
 from mplearn_envs.mechanics.support import margins_along
@@ -80,11 +81,12 @@ def assess(robot: Robot, plan: Plan, q: FloatArray, v: FloatArray, fallen: bool)
     n = len(q)
     cog, linear, angular, soles = momenta(ref.tree, ref.inertia, ref.stance.feet, ref.corners, q, v)
     zmp = ground_reaction(float(ref.tree.mass.sum()), cog, linear, angular, plan.knot_s)
-    share, ground = plan.share[:n], plan.ground[:n]
-    seen = support(share, _feet(soles)).see(cog[:, :2])
-    planned = np.concatenate((sole_middles(ref, ground), ground[..., 2:]), axis=-1)
+    share, ground, heel = plan.share[:n], plan.ground[:n], plan.heel[:n]
+    bearing = bearing_corners(soles, heel)
+    seen = support(share, _feet(soles, bearing)).see(cog[:, :2])
+    planned = np.concatenate((sole_middles(ref, ground, heel), ground[..., 2:]), axis=-1)
     wanted = support(share, planned).see(plan.cog[:n, :2])
-    soles = soles[1:]
+    soles = bearing[1:]
     landed = soles[..., 2].min(axis=2).max(axis=1) < TOUCHES_M
     up = np.where(landed, -1, plan.up[1:n])
     margin = margins_along(soles[..., :2], up, np.nan_to_num(zmp, nan=np.inf))
@@ -100,11 +102,16 @@ def assess(robot: Robot, plan: Plan, q: FloatArray, v: FloatArray, fallen: bool)
     )
 
 
-def _feet(soles: FloatArray) -> FloatArray:
-    """Return middle x, y [m] and yaw [rad] of soles with corners (S, 2, 4, 3), front ones first."""
+def _feet(soles: FloatArray, bearing: FloatArray) -> FloatArray:
+    """Return where feet are, shape (S, 2, 3): middle of what they stand on [m] and yaw [rad].
+
+    Args:
+        soles: Corners of the soles, front ones first, shape (S, 2, 4, 3) [m].
+        bearing: Corners of what they stand on, same shape [m].
+    """
     ahead = soles[..., :2, :2].sum(axis=2) - soles[..., 2:, :2].sum(axis=2)
     yaw = np.arctan2(ahead[..., 1], ahead[..., 0])
-    return np.concatenate((soles[..., :2].mean(axis=2), yaw[..., None]), axis=-1)
+    return np.concatenate((bearing[..., :2].mean(axis=2), yaw[..., None]), axis=-1)
 
 
 @njit(cache=True, nogil=True)

@@ -69,6 +69,6 @@ def learned_table(
         ("learned from", "feasible", "lift a foot", "walks", "falls", "COG off [cm]", "refused"),
         tuple(rows),
         f"At {speed:g} of the human's speed; masses, gains and friction wrong by up to "
-        f"{100 * error:.0f} %; any primitive follows any other. Feet that stand apart in the "
-        "recording stand side by side here, and soles are flat.",
+        f"{100 * error:.0f} %; any primitive follows any other. Feet stand as "
+        "far apart as they were shown, or as a step reaches.",
     )

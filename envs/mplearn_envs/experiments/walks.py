@@ -146,7 +146,7 @@ def _figures(
     stood = [side for side in range(2) if side not in (plan.up[0], plan.up[-1])]
     if stood and not report.fallen:
         feet = places(ref.tree, ref.stance.feet, np.stack((before, after)))[:, stood[0]]
-        wanted = plan.ground[[0, -1], stood[0]]
+        wanted = places(ref.tree, ref.stance.feet, plan.q[[0, -1]])[:, stood[0]]
         moved = _moved(feet) - _moved(wanted)
         drift, turn = float(np.hypot(moved[0], moved[1])), float(abs(moved[2]))
     return (

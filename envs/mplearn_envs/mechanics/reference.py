@@ -14,6 +14,7 @@ from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.robot import Robot
 from mplearn_envs.robot.feet import sole_corners
 
+from .heels import bearing_corners
 from .kinematics import MassTree, forward, mass_tree
 from .velocity_ik import Stance, settle
 
@@ -65,6 +66,7 @@ class Reference(NamedTuple):
         swing_velocity: Their velocities, shape (n_legs + 2,) [rad/s, m/s].
         up: 1 for the foot that is in the air, shape (2,).
         ground: Where each foot stands or left the ground: x, y [m] and yaw [rad], shape (2, 3).
+        heel: By how much each heel is raised, the front edge of the sole staying, shape (2,) [rad].
     """
 
     target: FloatArray
@@ -74,6 +76,7 @@ class Reference(NamedTuple):
     swing_velocity: FloatArray
     up: FloatArray
     ground: FloatArray
+    heel: FloatArray
 
     @property
     def lifted(self) -> int:
@@ -159,9 +162,8 @@ def rest_reference(robot: Robot) -> Reference:
     target = np.zeros(len(ref.limits))
     target[0] = ref.standing_height
     swing = np.append(ref.rest[7 + robot.leg_joints], np.zeros(2))
-    return Reference(
-        target, np.zeros_like(target), ref.rest, swing, 0.0 * swing, np.zeros(2), ref.ground
-    )
+    still, flat = np.zeros_like(target), np.zeros(2)
+    return Reference(target, still, ref.rest, swing, 0.0 * swing, np.zeros(2), ref.ground, flat)
 
 
 def tracked_columns(robot: Robot) -> IntArray:
@@ -178,15 +180,33 @@ def soles(robot: Robot, q: FloatArray) -> FloatArray:
     return np.stack([local[s] @ pose.rotation[f].T + pose.position[f] for s, f in enumerate(feet)])
 
 
-def sole_middles(robot: ReferenceRobot, ground: FloatArray) -> FloatArray:
-    """Return the middles of both soles, shape (..., 2, 2) [m], for feet at (..., 2, 3)."""
-    middle = robot.corners.mean(axis=1)[:, :2]
-    turned = turn_in_plane(middle[:, 0], middle[:, 1], ground[..., 2])
+def sole_middles(
+    robot: ReferenceRobot, ground: FloatArray, heel: FloatArray | None = None
+) -> FloatArray:
+    """Return the middles of what both soles stand on, shape (..., 2, 2) [m].
+
+    Args:
+        robot: The reference robot.
+        ground: Where the feet stand: x, y [m] and yaw [rad], shape (..., 2, 3).
+        heel: By how much their heels are raised, shape (..., 2) [rad]; None is not at all.
+    """
+    corners = robot.corners if heel is None else bearing_corners(robot.corners, heel)
+    middle = corners.mean(axis=-2)[..., :2]
+    turned = turn_in_plane(middle[..., 0], middle[..., 1], ground[..., 2])
     return np.asarray(ground[..., :2] + np.stack(turned, axis=-1))
 
 
-def sole_outlines(robot: ReferenceRobot, ground: FloatArray) -> FloatArray:
-    """Return the corners of both soles, shape (..., 2, 4, 2) [m], for feet at (..., 2, 3)."""
-    corners = robot.corners[..., :2]
+def sole_outlines(
+    robot: ReferenceRobot, ground: FloatArray, heel: FloatArray | None = None
+) -> FloatArray:
+    """Return the corners of what both soles stand on, shape (..., 2, 4, 2) [m].
+
+    Args:
+        robot: The reference robot.
+        ground: Where the feet stand: x, y [m] and yaw [rad], shape (..., 2, 3).
+        heel: By how much their heels are raised, shape (..., 2) [rad]; None is not at all.
+    """
+    corners = robot.corners if heel is None else bearing_corners(robot.corners, heel)
+    corners = corners[..., :2]
     turned = turn_in_plane(corners[..., 0], corners[..., 1], ground[..., 2, None])
     return np.asarray(ground[..., None, :2] + np.stack(turned, axis=-1))

@@ -57,6 +57,7 @@ class Draft(NamedTuple):
         margin: Its distance from the edge of the soles that stand, shape (K + 1,) [m].
         ground: Where each foot stands or would: x, y [m] and yaw [rad], shape (K + 1, 2, 3).
         up: Side of the foot in the air at each, -1 for none, shape (K + 1,).
+        heel: By how much each heel is raised, shape (K + 1, 2) [rad].
     """
 
     timeline: Timeline
@@ -68,6 +69,7 @@ class Draft(NamedTuple):
     margin: FloatArray
     ground: FloatArray
     up: IntArray
+    heel: FloatArray
 
 
 class Drafter:
@@ -100,28 +102,30 @@ class Drafter:
         ref, knot_s = self._reference, self.knot_s
         pose = forward(ref.tree, start.q)
         here = pose.moment[0] / pose.carried[0]
-        timeline, targets = self._targets(start, motion, pace, here)
+        timeline, targets, heel = self._targets(start, motion, pace, here)
         ground = plan_ground(ref, timeline, motion.footwork, start.ground, knot_s)
         standing = np.concatenate((start.ground[None], ground))
         up = np.concatenate(([start.lifted], timeline.up))
-        weight = plan_weight(timeline, sole_middles(ref, ground), here[:2], knot_s)
+        weight = plan_weight(timeline, sole_middles(ref, ground, heel), here[:2], knot_s)
+        heels = np.concatenate((start.heel[None], heel))
         path = weight.path(here[2], knot_s)
-        q, error = self._follow(start, targets, ground, path)
-        cog, zmp, margin = self._balance(q, standing, up)
+        q, error = self._follow(start, motion, targets, ground, heel, path)
+        cog, zmp, margin = self._balance(q, standing, up, heels)
         if not weight.still and margin.min() < CLOSE_M and np.isfinite(zmp).all():
             off = zmp - zmp_along(np.vstack((here[:2], path)), here[2], knot_s)
             path = weight.path(here[2], knot_s, np.clip(off, -_SOLE_M, _SOLE_M))
-            q, error = self._follow(start, targets, ground, path)
-            cog, zmp, margin = self._balance(q, standing, up)
-        return Draft(timeline, targets, q, error, cog, zmp, margin, standing, up)
+            q, error = self._follow(start, motion, targets, ground, heel, path)
+            cog, zmp, margin = self._balance(q, standing, up, heels)
+        return Draft(timeline, targets, q, error, cog, zmp, margin, standing, up, heels)
 
     def _targets(
         self, start: Reference, motion: Motion, pace: Pace, here: FloatArray
-    ) -> tuple[Timeline, FloatArray]:
-        """Return the times, and tracked coordinates and swing at the knots after the start.
+    ) -> tuple[Timeline, FloatArray, FloatArray]:
+        """Return the times, and what is wanted at the knots after the start.
 
         Returns:
-            The timeline, and targets of shape (K, U + n_legs + 2) [m, rad].
+            The timeline, tracked coordinates and swing, shape (K, U + n_legs + 2) [m, rad], and by
+            how much each heel is raised, shape (K, 2) [rad].
         """
         footwork, speed, knot_s = motion.footwork, pace.speed, self.knot_s
         n_frames = len(motion.frames)
@@ -176,7 +180,13 @@ class Drafter:
         path[:, :width] = limit_velocity(
             path[:, :width], before[:width], self._rates[:width] * knot_s
         )
-        return timeline, path
+        heel = np.zeros((len(at), 2))
+        if motion.stance is not None:
+            heel += interpolate_linearly(motion.stance.heel, at)
+        if start.heel.any() or heel.any():
+            lower = start.heel - (0.0 if motion.stance is None else motion.stance.heel[0])
+            heel += fading(np.maximum(time - late_s, 0.0), blend_s, lower, 0.0 * lower)
+        return timeline, path, np.maximum(heel, 0.0)
 
     def _swings(self, timeline: Timeline) -> dict[int, tuple[float, float]]:
         """Return when which foot is raised or lowered while the motion waits for it [s]."""
@@ -188,17 +198,25 @@ class Drafter:
         return out
 
     def _follow(
-        self, start: Reference, targets: FloatArray, ground: FloatArray, cog: FloatArray
+        self,
+        start: Reference,
+        motion: Motion,
+        targets: FloatArray,
+        ground: FloatArray,
+        heel: FloatArray,
+        cog: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
         """Return the reference postures and their errors; see `balanced_path`."""
         width = len(self._reference.limits)
-        carried = np.clip(targets[:, -2:] / CARRY_M, 0.0, 1.0)
-        carried = smooth_step(carried)
+        carried = smooth_step(np.clip(targets[:, -2:] / CARRY_M, 0.0, 1.0))
+        if motion.footwork is not None and not motion.footwork.free:
+            carried[:] = 0.0
         path: tuple[FloatArray, FloatArray] = balanced_path(
             self._reference,
             targets[:, :width],
             targets[:, width:],
             ground,
+            heel,
             carried,
             cog,
             start.q,
@@ -207,7 +225,7 @@ class Drafter:
         return path
 
     def _balance(
-        self, q: FloatArray, ground: FloatArray, up: IntArray
+        self, q: FloatArray, ground: FloatArray, up: IntArray, heel: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return COG (K + 1, 3), zero-moment point (K + 1, 2) and its margin (K + 1,) [m]."""
         ref, knot_s = self._reference, self.knot_s
@@ -216,5 +234,5 @@ class Drafter:
         between = ground_reaction(self._mass, cog, linear, angular, knot_s)
         zmp = np.vstack((between[:1], 0.5 * (between[1:] + between[:-1]), between[-1:]))
         points = np.nan_to_num(zmp, nan=np.inf)
-        margin = margins_along(sole_outlines(ref, ground), up, points)
+        margin = margins_along(sole_outlines(ref, ground, heel), up, points)
         return cog, zmp, margin

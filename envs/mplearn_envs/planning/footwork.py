@@ -23,6 +23,8 @@ from mplearn_envs.robot.feet import DOWN_M, LIFT_M
 CLEAR_M = 0.015  # a foot on its way clears the ground by this
 MOVING_M_S = 0.15  # a foot that still moves over the ground so fast has not landed
 _LONGEST_S = 0.4  # for which a foot may skim the ground before it lifts or after it lands
+_TILT_RAD = 0.13  # so much the base's tilt may be wrong, which raises a foot that is far away,
+_NEAR_M = 0.12  # if it is farther than this from its place beside the other
 _SOFT_M = 0.02  # lifts begin and end smoothly: below about this they are made lower
 
 
@@ -49,12 +51,15 @@ class Footwork(NamedTuple):
             how a foot gets there from the ground, and back, is planned (`plan_rise`).
         left_from_right: The left foot in the right one's frame: x, y [m] and yaw [rad], (T, 3).
         lifts: What leaves the ground, in order of time.
+        free: Whether a foot that is high follows its leg's motion; otherwise it goes from place to
+            place.
     """
 
     legs: FloatArray
     rise: FloatArray
     left_from_right: FloatArray
     lifts: tuple[Lift, ...]
+    free: bool = True
 
     def up_at(self, end: bool) -> int:
         """Return the side of the foot that is up at the start (or the end); -1 for none."""
@@ -80,7 +85,10 @@ def read_footwork(robot: Robot, frames: FloatArray, rate_hz: float) -> Footwork:
         moving = np.linalg.norm(np.gradient(relative[:, :2], axis=0), axis=1) * rate_hz
     skims = moving > MOVING_M_S
     longest = round(_LONGEST_S * rate_hz)
-    lifts = _lifts(gap, skims, longest)
+    beside = ref.ground[0, :2] - ref.ground[1, :2]
+    apart = np.linalg.norm(relative[:, :2] - beside, axis=1)
+    sure = gap - _TILT_RAD * np.maximum(apart - _NEAR_M, 0.0)[:, None]
+    lifts = _lifts(gap, sure, skims, longest)
     rise = np.zeros_like(gap)
     for side, start, end in lifts:
         inside = slice(max(start, 0), end + 1)
@@ -114,11 +122,12 @@ def sole_heights(robot: Robot, frames: FloatArray) -> FloatArray:
     return _feet(ref.tree, ref.stance.feet, ref.corners, np.ascontiguousarray(frames))[0]
 
 
-def _lifts(gap: FloatArray, skims: BoolArray, longest: int) -> list[Lift]:
+def _lifts(gap: FloatArray, sure: FloatArray, skims: BoolArray, longest: int) -> list[Lift]:
     """Return when each foot is off the ground, with hysteresis, in order of time.
 
     Args:
         gap: Heights of the soles over the lower one, shape (T, 2) [m].
+        sure: Of these, what is more than an error of the base's tilt, same shape [m].
         skims: Whether a foot moves over the ground, shape (T,).
         longest: Frames for which it may do so before it lifts or after it lands.
     """
@@ -127,7 +136,7 @@ def _lifts(gap: FloatArray, skims: BoolArray, longest: int) -> list[Lift]:
     for side in range(2):
         off = (gap[:, side] > DOWN_M).astype(np.int8)
         for start, end in np.flatnonzero(np.diff(off, prepend=0, append=0)).reshape(-1, 2).tolist():
-            if gap[start:end, side].max() > LIFT_M:
+            if sure[start:end, side].max() > LIFT_M:
                 found.append((start, end, side))
     found.sort()
     out: list[Lift] = []

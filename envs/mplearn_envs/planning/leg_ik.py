@@ -9,6 +9,7 @@ from mplearn.maths.plane import turn_in_plane
 from mplearn.maths.rotation_kernels import rotation_error, turn_about_vertical, turn_by_vector
 from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix
 from mplearn.recording import FloatArray
+from mplearn_envs.mechanics.heels import raised_foot
 from mplearn_envs.mechanics.kinematics import forward
 from mplearn_envs.mechanics.reference import ReferenceRobot
 from mplearn_envs.mechanics.velocity_ik import Stance, errors, nearer
@@ -27,6 +28,7 @@ def balanced_path(
     targets: FloatArray,
     swing: FloatArray,
     ground: FloatArray,
+    heel: FloatArray,
     carried: FloatArray,
     cog: FloatArray,
     start: FloatArray,
@@ -43,6 +45,7 @@ def balanced_path(
         swing: Angles of the legs' hinges [rad] that feet in the air follow, and heights of the left
             and the right sole [m], shape (K, n_legs + 2).
         ground: Where each foot stands or would: x, y [m] and yaw [rad], shape (K, 2, 3).
+        heel: By how much each heel is raised, shape (K, 2) [rad].
         carried: How far each foot follows its leg's motion instead, shape (K, 2), 0 to 1.
         cog: Horizontal COG, shape (K, 2) [m].
         start: Posture before them, shape (7 + n,).
@@ -92,7 +95,7 @@ def balanced_path(
         for iteration in range(_MAX_ITERATIONS + 1):
             pose = forward(robot.tree, q)
             for side in range(2):
-                _aim(robot, stance, side, q, ground[k], swing[k])
+                _aim(robot, stance, side, q, ground[k], swing[k], heel[k, side])
             rows = errors(stance, pose, height, orientation)
             worst[k + 1] = np.max(np.abs(rows))
             if worst[k + 1] < TOLERANCE or iteration == _MAX_ITERATIONS:
@@ -112,6 +115,7 @@ def _aim(
     q: FloatArray,
     ground: FloatArray,
     swing: FloatArray,
+    heel: float,
 ) -> None:
     """Write where a foot shall be: on the ground, or as the leg's motion has it, or in between.
 
@@ -120,10 +124,9 @@ def _aim(
     n_legs = stance.leg_joints.shape[0]
     rise, share = swing[n_legs + side], stance.carried[side]
     flat = robot.stance.foot_rotation[side]
-    there_x, there_y, yaw = ground[side]
-    rotation = turn_about_vertical(yaw, flat)
     height = robot.stance.foot_position[side, 2]
-    x, y, z = there_x, there_y, height + rise
+    place, rotation = raised_foot(robot.corners[side], flat, height, ground[side], heel)
+    x, y, z = place[0], place[1], place[2] + rise
     if share > 0.0:
         there = q.copy()
         for i in range(n_legs):
@@ -131,9 +134,10 @@ def _aim(
                 there[7 + stance.leg_joints[i]] = swing[i]
         pose = forward(robot.tree, there)
         foot = stance.feet[side]
+        lowest = _lowest(robot.corners[side], rotation)
         turn = rotation_error(pose.rotation[foot], rotation)
         rotation = turn_by_vector(share * turn, rotation)
-        z += _lowest(robot.corners[side], flat) - _lowest(robot.corners[side], rotation)
+        z += lowest - _lowest(robot.corners[side], rotation)
         x += share * (pose.position[foot, 0] - x)
         y += share * (pose.position[foot, 1] - y)
         low = min(max(1.5 - rise / LOW_M, 0.0), 1.0)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from mplearn.maths.plane import turn_in_plane
+from mplearn.maths.quaternions import quaternion_product, vector_quaternion
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.mechanics.reference import Reference
 
 from .footwork import Footwork
+from .stance import Stance
 
 
 @dataclass(frozen=True)
@@ -48,12 +52,14 @@ class Motion(NamedTuple):
         rate_hz: Frames per second [1/s].
         footwork: What the feet do; None where both stay down.
         flight_m: How high both soles are at once, at most, see `read_flight` [m].
+        stance: How it stands before a foot leaves the ground; None as the robot does.
     """
 
     frames: FloatArray
     rate_hz: float
     footwork: Footwork | None = None
     flight_m: float = 0.0
+    stance: Stance | None = None
 
     @property
     def duration_s(self) -> float:
@@ -78,6 +84,7 @@ class Plan(NamedTuple):
         ground: Where each foot stands or would: x, y [m] and yaw [rad], shape (K + 1, 2, 3).
         up: Side of the foot in the air at each posture, 0 left, 1 right, -1 none, shape (K + 1,).
         share: Which share of the weight the left foot carries, shape (K + 1,).
+        heel: By how much each heel is raised, shape (K + 1, 2) [rad].
     """
 
     commands: FloatArray
@@ -92,6 +99,7 @@ class Plan(NamedTuple):
     ground: FloatArray
     up: IntArray
     share: FloatArray
+    heel: FloatArray
 
     @property
     def duration_s(self) -> float:
@@ -102,3 +110,50 @@ class Plan(NamedTuple):
     def steps(self) -> bool:
         """Whether a foot is in the air or the weight moves."""
         return bool((self.up >= 0).any() or np.ptp(self.cog[:, :2], axis=0).max() > 1e-3)
+
+
+def joined(plans: Sequence[Plan]) -> Plan:
+    """Return plans one after another as one, seen from where the first one begins.
+
+    Args:
+        plans: One or more, each of which begins where the one before ends.
+    """
+    if len(plans) == 1:
+        return plans[0]
+    place = np.zeros(3)  # x, y, yaw of the present plan's origin
+    moved = []
+    for plan in plans:
+        moved.append(_moved(plan, place))
+        ground = moved[-1].ground[-1]
+        place = np.append(ground[:, :2].mean(axis=0), ground[:, 2].mean())
+
+    def series(name: str) -> Any:
+        return np.concatenate([getattr(plan, name)[int(i > 0) :] for i, plan in enumerate(moved)])
+
+    return moved[-1]._replace(
+        commands=np.concatenate([plan.commands for plan in moved]),
+        q=series("q"),
+        error=series("error"),
+        cog=series("cog"),
+        zmp=series("zmp"),
+        zmp_margin_m=series("zmp_margin_m"),
+        ground=series("ground"),
+        up=series("up"),
+        share=series("share"),
+        heel=series("heel"),
+    )
+
+
+def _moved(plan: Plan, place: FloatArray) -> Plan:
+    """Return a plan as seen from where its origin is at x, y [m] and yaw [rad]."""
+    if not place.any():
+        return plan
+    turn = vector_quaternion(0.0, 0.0, place[2])
+    q, ground, cog = plan.q.copy(), plan.ground.copy(), plan.cog.copy()
+    q[:, 3:7] = np.stack(quaternion_product(turn, tuple(q[:, 3:7].T)), axis=1)
+    zmp = plan.zmp.copy()
+    for points in (q, ground, cog, zmp):
+        x, y = turn_in_plane(points[..., 0], points[..., 1], place[2])
+        points[..., 0], points[..., 1] = x + place[0], y + place[1]
+    ground[..., 2] += place[2]
+    return plan._replace(q=q, ground=ground, cog=cog, zmp=zmp)

@@ -30,7 +30,10 @@ from .footwork import Footwork, Lift, read_flight, read_footwork
 from .plan import Motion as Motion
 from .plan import Plan as Plan
 from .plan import PlannerConfig as PlannerConfig
+from .plan import joined
+from .restance import Restance
 from .splines import refine
+from .stance import OWN_M, OWN_RAD, Stance, astray, balanced, read_stance
 from .stride import SAME_PLACE_M, SAME_YAW_RAD, left_from_right, left_share, recentred
 
 GRID_DECIMALS = 6
@@ -59,6 +62,7 @@ class Planner:
         self._stiffness = robot.per_joint("stiffness")
         self._tracked = tracked_columns(robot)
         self._cache = LRUCache(self.config.cache_size)
+        self._restance = Restance(robot, self._plan_step)
 
     def motion(self, frames: FloatArray, rate_hz: float) -> Motion:
         """Return the motion of frames in the robot's channels, what its feet do included.
@@ -82,7 +86,19 @@ class Planner:
         footwork = read_footwork(self.robot, frames, rate_hz)
         tracked = np.ascontiguousarray(frames[:, self._tracked])
         flight_m = read_flight(self.robot, frames)
-        return Motion(tracked, rate_hz, footwork if footwork.lifts else None, flight_m)
+        lifts = footwork.lifts
+        stance, until = None, lifts[0].start if lifts else len(frames)
+        if until >= 0:
+            until = max(until, 1)
+            stance = read_stance(self.robot, frames, until, lifts)
+            far, turned = astray(self._reference, stance.place)
+            if far < OWN_M and turned < OWN_RAD:
+                place = left_from_right(self._reference.ground)
+                stance = Stance(place, np.zeros((len(frames), 2)))
+            else:
+                stance = self._restance.within_reach(stance)
+            tracked, stance = balanced(self.robot, tracked, rate_hz, stance, until)
+        return Motion(tracked, rate_hz, footwork if lifts else None, flight_m, stance)
 
     def plan(
         self, start: Reference, motion: Motion, speed: float = 0.5, key: Hashable = None
@@ -130,24 +146,49 @@ class Planner:
             footwork = Footwork(
                 np.stack((legs, legs)), np.stack((rise, rise)), np.zeros((2, 3)), lifts
             )
-        motion = Motion(np.stack((here, here)), 1.0 / duration_s, footwork)
+        stance = Stance(left_from_right(start.ground), np.stack((start.heel, start.heel)))
+        motion = Motion(np.stack((here, here)), 1.0 / duration_s, footwork, stance=stance)
         return self.plan(start, motion, 1.0, ("hold", duration_s))
 
     def _plan(self, start: Reference, motion: Motion, speed: float) -> Plan:
+        """Return the plan of a motion, and of the steps into its stance before it."""
+        plan, sound = self._plan_after(self._restance.into(start, motion), start, motion, speed)
+        if not sound and (steps := self._restance.together(start, motion)):
+            again, better = self._plan_after(steps, start, motion, speed)
+            plan = again if better else plan
+        return plan
+
+    def _plan_after(
+        self, steps: list[Motion], start: Reference, motion: Motion, speed: float
+    ) -> tuple[Plan, bool]:
+        """Return the plan of steps and a motion after them, and whether all of it is sound."""
+        plans, sounds = [], []
+        for each, pace in [*((step, 1.0) for step in steps), (motion, speed)]:
+            plan, sound = self._plan_one(start, each, pace)
+            plans.append(plan)
+            sounds.append(sound)
+            start = plan.end
+        return joined(plans), all(sounds)
+
+    def _plan_step(self, start: Reference, motion: Motion) -> tuple[Plan, bool]:
+        return self._plan_one(start, motion, 1.0)
+
+    def _plan_one(self, start: Reference, motion: Motion, speed: float) -> tuple[Plan, bool]:
+        """Return a motion's plan, and whether the robot reaches what is wanted, and stands."""
         draft, pace = self._balanced(start, motion, Pace(speed))
-        if not self._sound(draft) and self._strides(start):
+        if not self._sound(draft) and self._strides(start) and self._gathers(motion):
             gathered = Pace(speed, in_turn=True, gathers=True)
             again, its_pace = self._balanced(start, motion, gathered)
             if self._sound(again) or again.error.max() < draft.error.max():
                 draft, pace = again, its_pace
         knot_s = self._drafter.knot_s
-        middles = sole_middles(self._reference, draft.ground)
+        middles = sole_middles(self._reference, draft.ground, draft.heel)
         borne = np.where(np.isfinite(draft.zmp), draft.zmp, draft.cog[:, :2])  # it may fly
         share = left_share(middles, draft.up, borne)
         torque = holding_torques(self._reference, draft.q, share, borne, middles)
         led = draft.q[:, 7:] + torque / self._stiffness  # a servo gives way to what it holds
         position, rate = refine(led, knot_s, self.config.knot_steps)
-        return Plan(
+        plan = Plan(
             commands=servo_commands(self.robot, position, rate),
             q=draft.q,
             knot_s=knot_s,
@@ -160,7 +201,9 @@ class Planner:
             ground=draft.ground,
             up=draft.up,
             share=share,
+            heel=draft.heel,
         )
+        return plan, self._sound(draft)
 
     def _balanced(self, start: Reference, motion: Motion, pace: Pace) -> tuple[Draft, Pace]:
         """Return a motion as slow as it must be, and how slow that is."""
@@ -182,6 +225,10 @@ class Planner:
         """Return whether the feet are apart; where motions are judged they are side by side."""
         off = left_from_right(start.ground) - left_from_right(self._reference.ground)
         return bool(np.hypot(off[0], off[1]) > SAME_PLACE_M or abs(off[2]) > SAME_YAW_RAD)
+
+    def _gathers(self, motion: Motion) -> bool:
+        """Return whether a motion may begin with the feet beside each other."""
+        return motion.stance is None or astray(self._reference, motion.stance.place)[0] < OWN_M
 
     def _slower(self, draft: Draft, start: Reference, motion: Motion, pace: Pace) -> Pace:
         """Return the pace that velocity limits and balance ask for; the same where it is right.
@@ -220,5 +267,7 @@ class Planner:
         if up >= 0:
             lifted[up] = 1.0
         q, ground = recentred(draft.q[-1], draft.ground[-1])
-        parts = (targets[-1, :width], rate[:width], q, targets[-1, width:], rate[width:], lifted)
-        return Reference(*(np.round(part, GRID_DECIMALS) for part in (*parts, ground)))
+        tracked = targets[-1, :width], rate[:width], q
+        swing = targets[-1, width:], rate[width:], lifted
+        parts = (*tracked, *swing, ground, draft.heel[-1])
+        return Reference(*(np.round(part, GRID_DECIMALS) for part in parts))

@@ -150,6 +150,9 @@ class FeasibilityCheck:
         """Return the reference robot at rest where a motion begins, on one foot or on two."""
         here = rest_reference(self.planner.robot)
         first = np.repeat(motion.frames[:1], 2, axis=0)
+        stance = motion.stance
+        if stance is not None:
+            stance = stance._replace(heel=np.repeat(stance.heel[:1], 2, axis=0))
         footwork = motion.footwork
         up = -1 if footwork is None else footwork.up_at(False)
         if footwork is not None and up >= 0:
@@ -160,7 +163,7 @@ class FeasibilityCheck:
             return self.planner.plan(
                 here, Motion(first, 1.0, Footwork(legs, rise, apart, (Lift(up, -1, 2),))), 1.0
             ).end
-        return self.planner.plan(here, Motion(first, 1.0), 1.0).end
+        return self.planner.plan(here, Motion(first, 1.0, stance=stance), 1.0).end
 
     def _flight(self, motion: Motion) -> tuple[Problem, ...]:
         """Look for soles in the air while the base is higher than it can stand."""

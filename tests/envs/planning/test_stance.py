@@ -1,0 +1,146 @@
+"""Stances as they are shown: feet apart, a heel raised, and what balances where no chair is."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from standing_library import BOW, RATE_HZ, STANDING_M, sweep
+
+from mplearn.maths.plane import turn_in_plane
+from mplearn_envs.execution.simulation import Simulation
+from mplearn_envs.experiments.model_error import disturb
+from mplearn_envs.mechanics import reference_robot, rest_reference
+from mplearn_envs.mechanics.heels import bearing_corners, foot_places, raised_foot
+from mplearn_envs.mechanics.kinematics import places
+from mplearn_envs.mechanics.reference import sole_middles, soles
+from mplearn_envs.planning import Planner
+from mplearn_envs.planning.stance import stand
+from mplearn_envs.planning.stride import left_from_right
+from mplearn_envs.robot import humanoid
+from mplearn_envs.skills.feasibility import FeasibilityCheck
+
+HUMANOID = humanoid()
+REFERENCE = reference_robot(HUMANOID)
+REST = rest_reference(HUMANOID)
+PLANNER = Planner(HUMANOID)
+SPLIT = np.array([-0.5, 0.2, 0.0])  # the left foot behind
+
+
+def shown(place, heel, base):
+    """Return the features of a posture, shape (3 + n,), and check that it is one."""
+    target = REST.target.copy()
+    target[:3] = STANDING_M + base[0], base[1], base[2]
+    q, worst = stand(REFERENCE, place, np.array(heel), target, 0.5)
+    assert worst < 1e-3
+    return np.concatenate((target[:3], q[7:]))
+
+
+def between(first, last, seconds=1.2):
+    x = np.linspace(0.0, 1.0, round(seconds * RATE_HZ) + 1)[:, None]
+    share = x**3 * (10 - 15 * x + 6 * x**2)
+    return first * (1 - share) + last * share
+
+
+def lunge():
+    high, low = shown(SPLIT, (0.5, 0.0), (-0.1, 0, 0.1)), shown(SPLIT, (0.9, 0.0), (-0.3, 0, 0.1))
+    return PLANNER.motion(between(high, low), RATE_HZ)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.floats(-3.0, 3.0), st.floats(0.0, 1.2), st.integers(0, 1))
+def test_a_raised_heel_leaves_the_front_edge_where_it_is(yaw, heel, side):
+    place = np.array([0.3, -0.2, yaw])
+    corners, flat = REFERENCE.corners[side], REFERENCE.stance.foot_rotation[side]
+    height = REFERENCE.stance.foot_position[side, 2]
+    before, after = (
+        corners @ rotation.T + position
+        for position, rotation in (
+            raised_foot(corners, flat, height, place, angle) for angle in (0.0, heel)
+        )
+    )
+    np.testing.assert_allclose(after[:2], before[:2], atol=1e-12)
+    length = np.ptp(corners[:, 0])
+    np.testing.assert_allclose(after[2:, 2] - after[:2, 2], length * np.sin(heel), atol=1e-12)
+    position, _ = raised_foot(corners, flat, height, place, heel)
+    found = foot_places(REFERENCE.corners, np.stack((place, place)), np.array([heel, heel]))[side]
+    np.testing.assert_allclose(found, (position[0], position[1], yaw), atol=1e-9)
+
+
+def test_who_stands_on_toes_stands_on_the_front_edge():
+    flat, tilted = np.zeros(2), np.array([0.0, 0.6])
+    assert bearing_corners(REFERENCE.corners, flat) is REFERENCE.corners
+    left, right = bearing_corners(REFERENCE.corners, tilted)
+    np.testing.assert_array_equal(left, REFERENCE.corners[0])
+    assert np.ptp(right[:, 0]) == 0.0 and np.ptp(right[:, 1]) == np.ptp(REFERENCE.corners[1, :, 1])
+    moved = sole_middles(REFERENCE, REFERENCE.ground, tilted)
+    moved -= sole_middles(REFERENCE, REFERENCE.ground)
+    half = 0.5 * np.ptp(REFERENCE.corners[1, :, 0])
+    np.testing.assert_allclose(moved, [[0.0, 0.0], [half, 0.0]], atol=1e-12)
+
+
+def test_stances_are_read_from_the_motion():
+    motion = lunge()
+    np.testing.assert_allclose(motion.stance.place, SPLIT, atol=0.02)
+    np.testing.assert_allclose(motion.stance.heel[[0, -1]], [[0.5, 0.0], [0.9, 0.0]], atol=0.02)
+    assert motion.footwork is None
+    beside = PLANNER.motion(sweep({}, BOW, 1.0), RATE_HZ).stance
+    np.testing.assert_array_equal(beside.place, left_from_right(REFERENCE.ground))
+    assert not beside.heel.any()
+
+
+def test_a_foot_far_away_that_seems_high_stands():
+    """A base that is measured 4 degrees too far on one side raises a foot 0.6 m away by 4 cm."""
+    place = np.array([0.0, 0.6, 0.4])
+    frames = np.tile(shown(place, (0.0, 0.0), (-0.15, 0.0, 0.2)), (50, 1))
+    frames[:, 1] += 0.07
+    assert PLANNER.motion(frames, RATE_HZ).footwork is None
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_lunge_is_stepped_into_and_out_of_with_a_wrong_model(seed):
+    simulation = Simulation(HUMANOID)
+    disturb(simulation.model, 0.1, np.random.default_rng(seed))
+    simulation.reset()
+    down = PLANNER.plan(REST, lunge(), 0.5)
+    assert down.error.max() < 1e-3 and down.zmp_margin_m.min() > 0.01
+    np.testing.assert_allclose(left_from_right(down.end.ground), SPLIT, atol=0.1)
+    assert down.end.heel[0] == pytest.approx(0.9, abs=0.02) and down.end.heel[1] == 0.0
+    # as one plan: no jump where one step ends and the next begins
+    assert np.abs(np.diff(down.q, axis=0)).max() < 0.1
+    feet = places(REFERENCE.tree, REFERENCE.stance.feet, down.q)
+    edge = foot_places(REFERENCE.corners, down.ground, down.heel)
+    standing = down.up != 0
+    np.testing.assert_allclose(feet[standing, 0, :2], edge[standing, 0, :2], atol=1e-4)
+    assert not simulation.perform(down).fallen
+    back = simulation.soles()[0, 2:, 2].mean()
+    assert 0.1 < back < 0.24  # the heel is up
+    bow = PLANNER.plan(down.end, PLANNER.motion(sweep({}, BOW, 1.0), RATE_HZ), 0.5)
+    assert not simulation.perform(bow).fallen
+    np.testing.assert_allclose(bow.end.ground, REFERENCE.ground, atol=0.02)
+    assert not bow.end.heel.any()
+
+
+def test_feet_stand_as_wide_as_shown_or_as_a_step_reaches():
+    wide = np.array([*turn_in_plane(0.0, 0.45, 0.25), 0.5])
+    frames = np.tile(shown(wide, (0.0, 0.0), (-0.1, 0.0, 0.1)), (50, 1))
+    np.testing.assert_allclose(PLANNER.motion(frames, RATE_HZ).stance.place, wide, atol=0.02)
+    far = np.array([-0.9, 0.2, 0.0])
+    frames = np.tile(shown(far, (0.9, 0.0), (-0.3, 0.0, 0.2)), (50, 1))
+    place = PLANNER.motion(frames, RATE_HZ).stance.place
+    assert 0.5 < -place[0] < 0.9
+
+
+def test_who_sits_down_without_a_chair_leans_as_far_as_must_be():
+    """Upright, ankles would have to bend too far; the depth is kept."""
+    frames = sweep({}, {"base_height": -0.42}, 1.5)
+    motion = PLANNER.motion(frames, RATE_HZ)
+    lean = motion.frames[:, 2] - frames[:, 2]
+    np.testing.assert_allclose(motion.frames[:, 0], frames[:, 0], atol=1e-9)
+    assert lean[0] == 0.0 and 0.05 < lean[-1] < 0.5 and lean.min() >= 0.0
+    assert FeasibilityCheck(PLANNER).judge(motion, 0.5).feasible
+    simulation = Simulation(HUMANOID)
+    simulation.reset()
+    assert not simulation.perform(PLANNER.plan(REST, motion, 0.5)).fallen
+    assert soles(HUMANOID, simulation.data.qpos)[..., 2].max() < 0.005
+    shallow = sweep({}, {"base_height": -0.1}, 1.0)
+    np.testing.assert_array_equal(PLANNER.motion(shallow, RATE_HZ).frames[:, 0], shallow[:, 0])
