@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from standing_library import ARMS, BOW, KICK, RATE_HZ, SQUAT, STANDING_M, posture, sweep
 
-from mplearn_envs.planning import Planner
+from mplearn_envs.mechanics.reference import tracked_columns
+from mplearn_envs.planning import Motion, Planner
 from mplearn_envs.robot import humanoid
 from mplearn_envs.skills.feasibility import FeasibilityCheck, FeasibilityConfig
 
@@ -69,8 +70,11 @@ def test_what_is_beyond_the_joints_is_refused():
 
 
 def test_a_squat_too_deep_for_the_legs_is_out_of_reach():
+    """With the trunk upright, that is; leaning ahead the robot reaches it."""
     deep = sweep({}, {"base_height": -0.47}, 2.0)
-    verdict = judged(CHECK, deep, RATE_HZ, 0.5)
+    upright = Motion(np.ascontiguousarray(deep[:, tracked_columns(humanoid())]), RATE_HZ)
+    assert judged(CHECK, deep, RATE_HZ, 0.5).feasible
+    verdict = CHECK.judge(upright, 0.5)
     assert not verdict.feasible and "reach" in kinds(verdict)
     where = next(each.where for each in verdict.problems if each.kind == "reach")
     assert where.startswith("ankle_pitch_l, ankle_pitch_r")
