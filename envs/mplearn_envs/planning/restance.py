@@ -20,8 +20,8 @@ from mplearn_envs.robot import Robot
 
 from .footwork import Footwork, Lift
 from .plan import Motion, Plan
-from .stance import Approach, Stance, approaches
-from .stride import SAME_PLACE_M, SAME_YAW_RAD, left_from_right
+from .stance import OWN_RAD, Approach, Stance, approaches
+from .stride import SAME_PLACE_M, left_from_right
 
 _RATE_HZ, _FRAMES = 100.0, 211  # of a step
 _LEAVES, _LANDS = 45, 100  # frames at which its foot leaves the ground, and lands
@@ -177,7 +177,7 @@ def _apart(here: FloatArray, there: FloatArray) -> tuple[float, float]:
 
 
 def _near(apart: tuple[float, float]) -> bool:
-    return apart[0] < SAME_PLACE_M and apart[1] < SAME_YAW_RAD
+    return apart[0] < SAME_PLACE_M and apart[1] < OWN_RAD
 
 
 def _upright(start: Reference, upper: FloatArray, lean: float) -> bool:

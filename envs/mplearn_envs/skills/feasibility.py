@@ -19,6 +19,7 @@ from mplearn_envs.planning.plan import Motion, Plan
 from mplearn_envs.planning.planner import Planner
 
 SLOWER = 0.8  # share of the speed that is tried next
+_LEAST_MARGIN = 0.5  # of the margin at the edge is enough while one motion gives way to another
 _AT_LIMIT = 1e-3  # so near its limit a joint is what does not reach [rad]
 ProblemKind: TypeAlias = Literal["flight", "limit", "velocity", "reach", "torque", "balance"]
 
@@ -35,6 +36,8 @@ class FeasibilityConfig:
         reach_error: How far feet, COG and base may stay off what is wanted [m, rad].
         torque_share: Share of the torque limits that may be used.
         zmp_margin_m: How near the zero-moment point may come to the edge of the soles [m].
+        transitions: Whether it is also judged, of each two primitives, if one can follow the other
+            (`Skills.follows`), and what cannot is masked. Each is planned when it is first asked.
     """
 
     flight_m: float = 0.06
@@ -43,6 +46,7 @@ class FeasibilityConfig:
     reach_error: float = 0.01
     torque_share: float = 0.9
     zmp_margin_m: float = 0.015
+    transitions: bool = False
 
 
 @dataclass(frozen=True)
@@ -145,6 +149,19 @@ class FeasibilityCheck:
             found.append(Problem("balance", "the soles", margin, self.config.zmp_margin_m))
         tempo = motion.duration_s / plan.duration_s
         return Feasibility(tuple(found), speed, margin, share, tempo, *feet)
+
+    def judge_plan(self, plan: Plan) -> tuple[Problem, ...]:
+        """Return why a plan from anywhere cannot be performed: out of reach, or out of balance.
+
+        Args:
+            plan: Of one motion after another, what is between them included.
+        """
+        margin = float(np.nan_to_num(plan.zmp_margin_m, nan=-np.inf).min())
+        found = list(self._out_of_reach(plan))
+        if margin < _LEAST_MARGIN * self.config.zmp_margin_m:
+            least = _LEAST_MARGIN * self.config.zmp_margin_m
+            found.append(Problem("balance", "the soles", margin, least))
+        return tuple(found)
 
     def posture(self, motion: Motion) -> Reference:
         """Return the reference robot at rest where a motion begins, on one foot or on two."""

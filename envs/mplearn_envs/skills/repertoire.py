@@ -150,7 +150,7 @@ class Repertoire:
                 graph = self.library.graph
                 row = graph.prior(id)
                 self._after[id] = self._choices(
-                    {graph.ids[i]: float(row[i]) for i in np.flatnonzero(row)}
+                    {graph.ids[i]: float(row[i]) for i in np.flatnonzero(row)}, id
                 )
             return self._after[id]
 
@@ -211,17 +211,23 @@ class Repertoire:
             f"{len(self.ids)} primitives ({reasons})"
         )
 
-    def _choices(self, weights: dict[int, float]) -> Choices:
+    def _choices(self, weights: dict[int, float], before: int | None = None) -> Choices:
+        """Return what can be done of what was seen, after a primitive or where none was before."""
         possible, refused = {}, {}
+        limits = self.skills.limits
+        if limits is None or not limits.transitions:
+            before = None
         for id, weight in weights.items():
             slot = self.slots.get(id)
             if slot is None:
                 continue
-            verdict = self.skills.feasibility(id)
-            if verdict.feasible:
-                possible[slot] = weight
+            problems = self.skills.feasibility(id).problems
+            if not problems and before is not None:
+                problems = self.skills.follows(before, id)
+            if problems:
+                refused[slot] = tuple(str(problem) for problem in problems)
             else:
-                refused[slot] = tuple(str(problem) for problem in verdict.problems)
+                possible[slot] = weight
         novel = tuple(self.slots[id] for id in self.feasible_ids) if self.novel else ()
         return choose_among(possible, refused, novel, self.capacity)
 

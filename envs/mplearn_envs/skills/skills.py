@@ -18,7 +18,7 @@ from mplearn_envs.mechanics.reference import N_BASE, Reference, rest_reference
 from mplearn_envs.planning import Motion, Plan, Planner
 from mplearn_envs.robot import Retargeting, Robot
 
-from .feasibility import Feasibility, FeasibilityCheck, FeasibilityConfig
+from .feasibility import Feasibility, FeasibilityCheck, FeasibilityConfig, Problem
 
 
 class Foreknowledge(NamedTuple):
@@ -144,6 +144,7 @@ class Skills:
             self._fresh: set[int] = set()  # ids whose skill is known to be this library's
             self._ends: dict[tuple[int, int], Reference] = {}
             self._transitions_s: dict[Hashable, float] = {}
+            self._following: dict[Hashable, tuple[Problem, ...]] = {}
 
     def frames_of(self, generated: Trajectory) -> FloatArray:
         """Return a motion that the library generated, in the robot's channels, (T, 3 + n)."""
@@ -230,6 +231,20 @@ class Skills:
             if key not in self._transitions_s:
                 self._transitions_s[key] = self.plan(self.end(before), after).duration_s
             return self._transitions_s[key]
+
+    def follows(self, before: int, after: int) -> tuple[Problem, ...]:
+        """Return why a primitive cannot follow another where that has ended; empty where it can.
+
+        Args:
+            before: The one that has ended, which the robot can perform.
+            after: The one that is performed then, which it can perform from where it starts.
+        """
+        with self.lock:
+            key = (self.key(before), self.key(after))
+            if key not in self._following:
+                plan = self.plan(self.end(before), after)
+                self._following[key] = self._check.judge_plan(plan)
+            return self._following[key]
 
     def foreknown_s(self, before: int, after: int) -> float | None:
         """Return what `transition_s` does where that was found out before; None elsewhere."""

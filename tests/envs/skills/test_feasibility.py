@@ -2,12 +2,24 @@
 
 import numpy as np
 import pytest
-from standing_library import ARMS, BOW, KICK, RATE_HZ, SQUAT, STANDING_M, posture, sweep
+from standing_library import (
+    ARMS,
+    BOW,
+    KICK,
+    RATE_HZ,
+    SQUAT,
+    STANDING_M,
+    posture,
+    standing_library,
+    sweep,
+)
 
 from mplearn_envs.mechanics.reference import tracked_columns
 from mplearn_envs.planning import Motion, Planner
 from mplearn_envs.robot import humanoid
-from mplearn_envs.skills.feasibility import FeasibilityCheck, FeasibilityConfig
+from mplearn_envs.skills.feasibility import FeasibilityCheck, FeasibilityConfig, Problem
+from mplearn_envs.skills.repertoire import Repertoire
+from mplearn_envs.skills.skills import Skills
 
 CHECK = FeasibilityCheck(Planner(humanoid()))
 
@@ -102,3 +114,31 @@ def test_standing_postures_are_reached():
     reference = CHECK.posture(motion)
     np.testing.assert_allclose(reference.target, motion.frames[0], atol=1e-6)
     assert np.abs(reference.velocity).max() < 1e-6
+
+
+def test_transitions_are_judged_where_that_is_wanted(monkeypatch):
+    """A real plan from the end of one to the end of the other; what cannot follow is masked."""
+    library, robot = standing_library(("arms up", "arms down", "bow down", "bow up")), humanoid()
+    skills = Skills(library, robot)
+    pairs = [(a, b) for a in library.ids for b in library.ids]
+    assert not any(skills.follows(a, b) for a, b in pairs)
+    assert CHECK.judge_plan(skills.plan(skills.end(pairs[1][0]), pairs[1][1])) == ()
+    up, down = (library[name].id for name in ("arms up", "arms down"))
+    plan = skills.plan(skills.end(up), down)
+    off = plan._replace(error=plan.error + 0.1, zmp_margin_m=plan.zmp_margin_m - 0.2)
+    assert [each.kind for each in CHECK.judge_plan(off)] == ["reach", "balance"]
+
+    after = Repertoire(library, robot).after(down)
+    asked = []
+
+    def refuse(self, before, after):
+        asked.append((before, after))
+        return (Problem("balance", "the soles", -0.01, 0.0),)
+
+    monkeypatch.setattr(Skills, "follows", refuse)
+    same = Repertoire(library, robot).after(down)
+    np.testing.assert_array_equal(same.mask, after.mask)
+    assert not asked
+    judged_too = Repertoire(library, robot, limits=FeasibilityConfig(transitions=True)).after(down)
+    assert asked and all(before == down for before, _ in asked)
+    assert after.mask.sum() - judged_too.mask.sum() == len(asked) > 0
