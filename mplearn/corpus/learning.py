@@ -279,7 +279,7 @@ class _Run:
         while len(level) > 1 or depth == 0:
             parts = [tuple(level[k : k + _FAN_IN]) for k in range(0, len(level), _FAN_IN)]
             to = [folder / f"{depth}-{k:04d}.mplearn" for k in range(len(parts))]
-            work = list(zip(parts, to, strict=True))
+            work = [(own, path, len(parts) == 1) for own, path in zip(parts, to, strict=True)]
 
             def done(k: int, _: None, work: list[Any] = work) -> None:
                 self._merged += len(work[k][0]) - 1
@@ -359,13 +359,18 @@ class _Run:
         )
 
 
-def merge_files(parts: Sequence[Path], to: Path) -> None:
+def merge_files(parts: Sequence[Path], to: Path, last: bool) -> None:
     """Merge what some stores, or files of learners, know; write it to a file.
+
+    Args:
+        parts: The stores and files.
+        to: The file.
+        last: Whether these are all, see `merged_state`.
 
     Raises:
         MPLearnError: One cannot be read, or the file cannot be written.
     """
-    state = merged_state(_learner_of(part) for part in parts)
+    state = merged_state((_learner_of(part) for part in parts), last=last)
     replace(FILES, compression=0).write(to, to_plain(state))  # it is read once, and goes
 
 

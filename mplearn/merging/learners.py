@@ -23,7 +23,9 @@ def merge_learners(learners: Sequence[MotionLearner]) -> MotionLearner:
     have learned become one (`merge_people`); the counts of transitions are added, so that they do
     not depend on the order of the learners but for the names of primitives; what none had
     recognised alone is counted where it is known now. The first learner's primitives keep their
-    ids, as far as they stay what they were.
+    ids, as far as they stay what they were. Where there are several people, primitives with fewer
+    executions, of all of them, than several people need (`PeopleConfig.min_exemplars`) wait again:
+    they were born while each person was alone.
 
     Each learner is copied once, however many there are; exemplars never are.
 
@@ -47,18 +49,27 @@ def merge_learners(learners: Sequence[MotionLearner]) -> MotionLearner:
     for other in learners[1:]:
         _check_rules(learners[0], other)
     merged = _merged(_copied(each) for each in learners)
+    merged.withdraw_young()
     return merged.learner()
 
 
-def merged_state(learners: Iterable[MotionLearner]) -> LearnerState:
+def merged_state(learners: Iterable[MotionLearner], *, last: bool = True) -> LearnerState:
     """Return the state of what `merge_learners` makes of some, all of which are used up.
 
     Nothing is copied, and two at a time are held, so that many fit into memory.
 
+    Args:
+        learners: The learners.
+        last: Whether these are all; if what comes of it will be merged with others, nothing is made
+            to wait again, so that the order in which many are merged does not matter to it.
+
     Raises:
         InvalidValueError: As `merge_learners`; some are used up by then.
     """
-    return _merged(learners).state()
+    merged = _merged(learners)
+    if last:
+        merged.withdraw_young()
+    return merged.state()
 
 
 def _merged(learners: Iterable[MotionLearner]) -> _Merged:
@@ -133,9 +144,18 @@ class _Merged:
             person=people.get(state.person, self._state.person),
         )
 
+    @property
+    def _alone(self) -> bool:
+        return self._tree is self.first.tree and self._graph is self.first.graph
+
+    def withdraw_young(self) -> None:
+        """Let what several people have shown too seldom wait again, if there were several parts."""
+        if not self._alone:
+            self._chain.revise(self._tree.withdraw_young())
+
     def learner(self) -> MotionLearner:
         """Return a learner that knows it all."""
-        if self._tree is self.first.tree and self._graph is self.first.graph:
+        if self._alone:
             return self.first
         return MotionLearner.from_state(self.state())
 

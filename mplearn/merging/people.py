@@ -135,7 +135,8 @@ def _join_trees(
         moved: tuple[tuple[int, int], ...] = ()
         local = {node.id: node.id for node in own.nodes}
         if home in mine.trees:
-            own, local, shift, change = merge_trees(mine.trees[home], own)
+            least = mine.rules.min_exemplars
+            own, local, shift, change = merge_trees(mine.trees[home], own, least)
             moved = change.moved
         mine.trees[home] = own
         here = mine.numbers.setdefault(home, {})

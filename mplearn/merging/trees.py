@@ -36,13 +36,19 @@ class MergedTree(NamedTuple):
     change: Change
 
 
-def merge_trees(first: PrimitiveTree, second: PrimitiveTree) -> MergedTree:
+def merge_trees(first: PrimitiveTree, second: PrimitiveTree, least: int = 2) -> MergedTree:
     """Merge two trees; neither changes, and their exemplars are not copied.
 
     A leaf of the second becomes one with a leaf of the first if the distance from the exemplars of
     each to those of the other is, on average, hardly above its radius; one to one, the nearest
     pairs first. All others stay what they were. Statistics add up as if one tree had seen all
     segments; those that wait in the roots are placed where they fit now.
+
+    Args:
+        first: One tree.
+        second: The other.
+        least: Members from which on what waits becomes a primitive, if that is more than by the
+            rules.
 
     Raises:
         InvalidValueError: The trees have other rules, channels or rates.
@@ -56,6 +62,7 @@ def merge_trees(first: PrimitiveTree, second: PrimitiveTree) -> MergedTree:
     new_id = {node.id: node.id + shift if node.id != ROOT else ROOT for node in b.nodes}
     tree = PrimitiveTree(first.config, first.n_channels, first.rate_hz, first.groups)
     tree.load_state(_joined(tree, a, b, new_id))
+    tree.require_exemplars(least)
     tree.remeasure()
     gone = _merge(tree, first.leaves, [new_id[id] for id in second.leaves])
     older = tree.leaves

@@ -105,6 +105,10 @@ class Constraints:
         constraints._apart = (self._apart | other._apart) - constraints._together
         return constraints
 
+    def keys(self) -> set[Key]:
+        """Return the leaves of which something was said."""
+        return {key for pair in self._together | self._apart for key in pair}
+
     def state(self) -> ConstraintsState:
         """Return everything that was said."""
         return ConstraintsState(tuple(sorted(self._together)), tuple(sorted(self._apart)))

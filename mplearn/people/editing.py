@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -139,6 +140,26 @@ def remove(sharing: Sharing, id: int, *, forget: bool) -> Change:
     gone = [id, *(leaf.primitive for leaf in leaves)]
     removed = tuple(dict.fromkeys(each for each in gone if each not in sharing.primitives))
     return settled(sharing, Change(moved=() if forget else tuple(moved), removed=removed))
+
+
+def withdraw_young(sharing: Sharing) -> Change:
+    """Let what is no primitive by the rules of several people wait until it is shown more often.
+
+    Its leaves were born while each person was alone. What a person had a hand in stays.
+    """
+    shown = Counter(each.primitive for each in sharing.provisional for _ in each.shapes)
+    by_hand: set[int] = set()
+    asked = sharing.constraints.keys()
+    for leaf in sharing.leaves:
+        node = sharing.trees[leaf.person].node(leaf.local)
+        shown[leaf.primitive] += node.n_placed
+        if node.by_hand or leaf.key in asked:
+            by_hand.add(leaf.primitive)
+    change = Change()
+    for id in sharing.primitives:
+        if shown[id] < sharing.rules.min_exemplars and id not in by_hand:
+            change = change.then(remove(sharing, id, forget=False))
+    return change
 
 
 def freeze(sharing: Sharing, id: int, frozen: bool) -> Change:

@@ -23,6 +23,7 @@ from ..tree import (
     TreeConfig,
 )
 from .config import PeopleConfig
+from .editing import withdraw_young
 from .people_state import PeopleState, PersonState
 from .primitives import OnePersonsPrimitives, Primitives, SharedPrimitives
 from .reversal import PeopleEdit
@@ -292,6 +293,16 @@ class PeopleTree:
             self._primitives = primitives = SharedPrimitives(sharing)
             self._require_exemplars()
         return primitives.sharing
+
+    def withdraw_young(self) -> Change:
+        """Let primitives wait again that have fewer members than several people need.
+
+        They were born while each person was alone. Where there is one person, nothing changes.
+        """
+        primitives = self._primitives
+        if not isinstance(primitives, SharedPrimitives) or len(self._trees) == 1:
+            return Change()
+        return withdraw_young(primitives.sharing)
 
     def adopt(self, trees: dict[int, PrimitiveTree], n_seen: int) -> None:
         """Go on with other trees, by person, that have seen so many segments."""

@@ -118,8 +118,7 @@ def forget_chances(structure: Structure, when: int) -> Change:
     patience = max(config.patience, 4 * int(structure.index.leaves.sum()))
     change = Change()
     for leaf in young:
-        by_hand = leaf.whole or leaf.frozen or leaf.apart or len(leaf.history) > 1
-        if when - leaf.born_at > patience and not by_hand:
+        if when - leaf.born_at > patience and not leaf.by_hand:
             change = change.then(structure.remove(leaf, when, forget=True))
     return change
 

@@ -95,6 +95,11 @@ class Node:
         return not self.children
 
     @property
+    def by_hand(self) -> bool:
+        """Whether a person, or a merge, had a hand in it: it is no chance."""
+        return bool(self.whole or self.frozen or self.apart or len(self.history) > 1)
+
+    @property
     def diameter(self) -> float:
         """Largest distance between its exemplars, D_max^G."""
         return float(self.matrix.max()) if self.matrix.size else 0.0
