@@ -42,11 +42,15 @@ class Figures:
     primitives: list[int] = field(default_factory=list)
 
 
-def motions() -> tuple[FloatArray, tuple[str, ...], float]:
-    """Return half a minute of features in which four primitives come, and their channels."""
+def motions(n: int = 40) -> tuple[list[FloatArray], tuple[str, ...], float]:
+    """Return n performances of half a minute, in which four primitives come, and their channels.
+
+    No two repetitions are alike, as a person's are not: few that came again and again to the bit
+    would be told apart, and each become a primitive.
+    """
     script = ["BAR", "BAL", "BAD", "BAU"] * 6
-    shown = observe(demonstrate(script, seed=4).recording)
-    return shown.frames, shown.channels, shown.rate_hz
+    shown = [observe(demonstrate(script, seed=seed).recording) for seed in range(n)]
+    return [each.frames for each in shown], shown[0].channels, shown[0].rate_hz
 
 
 def scene(frames: FloatArray, rng: np.random.Generator, kind: int) -> FloatArray:
@@ -70,7 +74,7 @@ def scene(frames: FloatArray, rng: np.random.Generator, kind: int) -> FloatArray
 
 def live(hours: float, path: Path, checkpoint_s: float = 30.0) -> Figures:
     """Live for so long [h of stream], and measure a hundred times."""
-    frames, channels, rate_hz = motions()
+    performances, channels, rate_hz = motions()
     config = LearnerConfig(channels, rate_hz)
     rng = np.random.default_rng(0)
     figures = Figures()
@@ -93,6 +97,7 @@ def live(hours: float, path: Path, checkpoint_s: float = 30.0) -> Figures:
         while life.n_frames < n_frames:
             share = life.n_frames / n_frames
             n_kinds = max(n_kinds, min(1 + int(share * 10 * 6), 6))
+            frames = performances[rng.integers(len(performances))]
             shown = scene(frames, rng, int(rng.integers(n_kinds)))
             for at in range(0, len(shown), _BLOCK):
                 life.learn_many(shown[at : at + _BLOCK])
