@@ -111,6 +111,7 @@ def _path(
     handed = 1.0 if (j - i) % 3 == 1 else -1.0
     out = np.full_like(angles, np.nan)
     last = np.zeros(3)
+    begun = False
     for t in range(len(angles)):
         a, b, c = angles[t]
         if np.isnan(a + b + c):
@@ -123,7 +124,7 @@ def _path(
         step_other = np.sqrt(((other - last) ** 2).sum())
         if step_other < step:
             best, step = other, step_other
-        if stays[t] and step > _LEAP * turned[t]:
+        if begun and stays[t] and step > _LEAP * turned[t]:
             share = 1.0 / (1.0 + (_NEAR_LOCK / max(off_lock[t], 1e-12)) ** 6)
             a = last[0] + share * (best[0] - last[0])
             # what is left, R_j(b) R_k(c), as nearly as this a allows; rows of R_i(a)^T R
@@ -141,4 +142,5 @@ def _path(
             best = np.array([a, _near(b, last[1]), _near(c, last[2])])
         out[t] = best
         last = best
+        begun = True
     return out

@@ -92,6 +92,15 @@ def test_a_joint_that_rests_at_gimbal_lock_rests(order: str, side: float) -> Non
 
 
 @pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("off_deg", [0.3, 2.0, 5.0])
+def test_a_joint_that_rests_near_gimbal_lock_does_not_creep(order: str, off_deg: float) -> None:
+    angles = np.tile(np.radians([40.0, 90.0 - off_deg, -20.0]), (100, 1))
+    got = continuous_euler(order, angles)
+    assert np.ptp(got, axis=0).max() < 1e-9
+    assert off(order, got, Rotation.from_euler(order, angles)).max() < 1e-7
+
+
+@pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("noise_deg", [0.01, 0.1, 0.5])
 def test_noise_at_gimbal_lock_makes_nothing_drift(order: str, noise_deg: float) -> None:
     rng = np.random.default_rng(5)
