@@ -206,6 +206,16 @@ def test_a_rate_beside_the_table(
                 open_recording(path)
 
 
+@pytest.mark.parametrize("remark", ["# fps: 50", "% by hand", "fps,50", "Sampling rate: 50 Hz"])
+def test_remarks_above_a_narrow_table(tmp_path: Path, remark: str) -> None:
+    rows = "".join(f"{i},{0.1 * i:.2f},{0.2 * i:.2f},0.3,0.4\n" for i in range(20))
+    path = tmp_path / "a_50hz.csv"
+    path.write_text(f"{remark}\nframe,hip,knee,ankle,toe\n{rows}")
+    recording = open_recording(path)
+    assert recording.channels == ("hip", "knee", "ankle", "toe")
+    assert (len(recording), recording.rate_hz) == (20, 50.0)
+
+
 def test_a_column_says_the_rate(tmp_path: Path, standing: Recording, points: np.ndarray) -> None:
     text = table(points, standing.marker_names, clock=lambda i: "50")
     path = tmp_path / "a.csv"

@@ -151,8 +151,9 @@ def find_header(sheet: Sheet) -> Header:
         if line == 0 or not above:
             width = _width_below(sheet, line)
             said = _RATE.search(sheet.lines[line])
-            remark = cells[0][:1] in _COMMENT or said or not _data_follow(sheet, line, width)
-            if 4 * sum(map(bool, cells)) < width and remark:
+            filled = sum(map(bool, cells))
+            marked = 2 * filled < width and (cells[0][:1] in _COMMENT or said)
+            if marked or (4 * filled < width and not _data_follow(sheet, line, width)):
                 rate_hz = float(said[1]) if said else rate_hz
                 continue  # a remark, not the names
             cells = _uncommented(cells)
