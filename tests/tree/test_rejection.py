@@ -51,10 +51,10 @@ def test_the_estimate_and_the_threshold_are_inverse():
     assert rates == sorted(rates) and rates[0] == 0.0 and rates[-1] == pytest.approx(1.0)
 
 
-def crowded(seed, n_motions):
+def crowded(seed, n_motions, size=0.25):
     """Motions of few channels, so that some are as near to each other as executions of one."""
     motions = Motions(n_motions, 2, seed)
-    motions.keys *= 0.25
+    motions.keys *= size
     return motions
 
 
@@ -89,6 +89,26 @@ def test_a_recogniser_holds_the_rate_that_was_stated():
     for rate in (0.2, 0.1):
         assert share[rate] <= rate + 2 * np.sqrt(rate / 40)  # what so few known motions can tell
     assert missed[0.2].count(None) < 0.5 * len(missed[0.2])
+
+
+@pytest.mark.parametrize("size", [0.25, 0.15])
+def test_by_default_the_rate_holds_and_what_is_known_is_recognised(size):
+    accepted, missed = {}, {}
+    for seed in range(3):
+        known, strangers = crowded(seed, 24, size), crowded(100 + seed, 40, size)
+        tree = PrimitiveTree(TreeConfig(), 2, RATE_HZ)
+        for _, frames in known.session(6):
+            tree.insert(frames)
+        strange = [strangers.perform(m) for m in range(40)]
+        usual = [known.perform(m) for m in range(24)]
+        for rate in (0.2, 0.1):
+            recogniser = tree.recogniser().calibrated(rate)
+            accepted.setdefault(rate, []).extend(recogniser.recognise(x).primitive for x in strange)
+            missed.setdefault(rate, []).extend(recogniser.recognise(x).primitive for x in usual)
+    for rate in (0.2, 0.1):
+        share = 1 - accepted[rate].count(None) / len(accepted[rate])
+        assert share <= rate + 2 * np.sqrt(rate / 40)
+        assert missed[rate].count(None) <= 0.1 * len(missed[rate])
 
 
 def test_a_stated_rate_changes_what_is_recognised_and_not_what_is_learned():

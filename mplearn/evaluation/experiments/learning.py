@@ -34,7 +34,9 @@ COLUMNS = (
 NOTE = (
     "One presentation, on-line, from markers. A found segment shows the motion with which its "
     "intersection over union exceeds 0.5, one to one, boundaries within 0.25 s counting as equal. "
-    "A primitive's class is the majority among the segments it was formed from. False positives: "
+    "A primitive's class is the majority among the segments it was formed from; spurious ones have "
+    "none, in brackets those that are provisional at the end and are forgotten if nothing confirms "
+    "them. False positives: "
     "found segments recognised as another class, or though they show none. False negatives: not "
     "recognised in spite of a model of their class; both as shares of all found segments. "
     "Recognised: share of all motions that were recognised rightly as they came, the first ones of "
@@ -60,6 +62,12 @@ class Outcome:
     rates: LearningRates
     boundaries: BoundaryScore
     times_real_time: float
+
+    @property
+    def n_unsure(self) -> int:
+        """Spurious primitives that are provisional at the end: they are kept only if confirmed."""
+        classes, tree = self.rates.classes, self.learner.tree
+        return sum(not classes.get(id, "?") and tree.is_provisional(id) for id in tree.leaves)
 
 
 def learn_session(recording: Recording, truth: Sequence[LabelledSegment] | None = None) -> Outcome:
@@ -94,7 +102,7 @@ def outcome_row(name: str, outcome: Outcome) -> tuple[str, ...]:
     return (
         name,
         f"{len(rates.extracted)} of {rates.n_classes}",
-        str(rates.n_spurious),
+        f"{rates.n_spurious} ({outcome.n_unsure})",
         str(rates.n_duplicates),
         percent(rates.false_positive),
         percent(rates.false_negative),
@@ -121,7 +129,8 @@ def mean_row(name: str, outcomes: Sequence[Outcome]) -> tuple[str, ...]:
         name,
         f"{100 * np.mean([len(r.extracted) / r.n_classes for r in rates]):.1f} %"
         f" (fewest {min(len(r.extracted) - r.n_classes for r in rates):+d})",
-        f"{np.mean([r.n_spurious for r in rates]):.1f}",
+        f"{np.mean([r.n_spurious for r in rates]):.1f} "
+        f"({np.mean([o.n_unsure for o in outcomes]):.1f})",
         f"{np.mean([r.n_duplicates for r in rates]):.1f}",
         mean(positives, max(positives)),
         mean(negatives, max(negatives)),
