@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
@@ -226,17 +227,17 @@ class Chain:
             if id in self.graph:
                 self.graph.remove_node(id)
             self._rename({id}, None)
-        for seen in self._segments if moved else ():
-            seen.primitive = moved.get(seen.number, seen.primitive)
-            if seen.primitive == ROOT:
-                seen.primitive = None
+        known_now: set[int] = set()  # places of transitions that take part in what was born
+        for number, id in moved.items():
+            at = bisect_left(self._segments, number, key=lambda seen: seen.number)
+            if at < len(self._segments) and self._segments[at].number == number:
+                self._segments[at].primitive = None if id == ROOT else id
+                known_now |= {at, at + 1} if id in change.born else set()
         for id in change.born:
             self.graph.add_node(id)
         events: list[Event] = []
-        born = set(change.born)
-        for i, (one, other) in enumerate(pairwise(self._segments), start=1) if born else ():
-            if one.primitive in born or other.primitive in born:
-                events += self._count(i)
+        for i in sorted(known_now - {0, len(self._segments)}):
+            events += self._count(i)
         return events
 
     def _rename(self, ids: Collection[int], to: int | None) -> None:

@@ -79,6 +79,10 @@ class SlotArrays:
             yield self.blocks[0], slots, np.arange(len(slots))
             return
         block, row = np.divmod(slots, BLOCK)
-        for number in sorted(set(block.tolist())):
-            here = np.flatnonzero(block == number)
+        order = np.argsort(block, kind="stable")
+        sizes = np.bincount(block, minlength=1)
+        end = 0
+        for number in np.flatnonzero(sizes).tolist():
+            here = order[end : end + sizes[number]]
+            end += sizes[number]
             yield self.blocks[number], row[here], here
