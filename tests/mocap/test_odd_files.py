@@ -206,6 +206,16 @@ def test_a_rate_beside_the_table(
                 open_recording(path)
 
 
+def test_a_medial_marker_beside_a_lateral_one_is_kept(
+    tmp_path: Path, standing: Recording, points: np.ndarray
+) -> None:
+    names = (*standing.marker_names, f"{standing.marker_names[0]}_M")
+    more = np.concatenate([points, points[:, :1] + 0.05], axis=1)
+    path = tmp_path / "a.csv"
+    path.write_text(table(more, names))
+    check(path, more, names)
+
+
 @pytest.mark.parametrize("remark", ["# fps: 50", "% by hand", "fps,50", "Sampling rate: 50 Hz"])
 def test_remarks_above_a_narrow_table(tmp_path: Path, remark: str) -> None:
     rows = "".join(f"{i},{0.1 * i:.2f},{0.2 * i:.2f},0.3,0.4\n" for i in range(20))

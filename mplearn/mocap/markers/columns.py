@@ -50,7 +50,7 @@ _NO_POSITION = frozenset((
     "angle", "angles", "euler", "vel", "velocity", "acc", "acceleration", "gyro", "mag", "force",
     "moment", "torque", "grf", "cop", "power", "scale", "omega",
 ))
-_OF_A_MARKER = frozenset(("v", "a", "w", "d", "f", "m", "s", "std", "sd", "var", "err", "error"))
+_OF_A_MARKER = frozenset(("v", "std", "sd", "var", "err", "error"))  # and no other marker
 _DECORATION = frozenset((
     "pos", "position", "positions", "coord", "coords", "coordinate", "coordinates", "loc",
     "location", "trans", "translation", "translate", "t", "p", "tr", "point", "xyz",
