@@ -152,7 +152,7 @@ def find_header(sheet: Sheet) -> Header:
             width = _width_below(sheet, line)
             said = _RATE.search(sheet.lines[line])
             filled = sum(map(bool, cells))
-            marked = 2 * filled < width and (cells[0][:1] in _COMMENT or said)
+            marked = 2 * len(cells) < width and (cells[0][:1] in _COMMENT or said)
             if marked or (4 * filled < width and not _data_follow(sheet, line, width)):
                 rate_hz = float(said[1]) if said else rate_hz
                 continue  # a remark, not the names
