@@ -97,7 +97,7 @@ class Restance:
         if not _near(_apart(here, wanted.place)):
             arrives = self.way(wanted.place)
             if arrives is not None:
-                out.append(self._step(here, wanted.place, arrives, upper, back=False))
+                out.append(self._step(here, wanted.place, arrives, upper))
         return out
 
     def together(self, start: Reference, motion: Motion) -> list[Motion]:
@@ -128,41 +128,53 @@ class Restance:
         if start.lifted >= 0:  # it is lowered first
             out.append(_still(here, start.heel, upper))
         elif not _upright(start, upper, first.lean):
-            out.append(_still(here, first.heels, _leaning(upper, first.lean)))
+            out.append(_still(here, start.heel, _leaning(upper, first.lean)))
         if leaves is None:
             return out, here
-        out.append(self._step(here, self._beside, leaves, upper, back=True))
+        out.append(self._step_back(here, leaves, upper, start.heel))
         return out, self._beside
 
     def _works(self, place: FloatArray, way: Approach) -> bool:
         """Return whether the robot can step there from beside, and back."""
         upper = self._rest.target
-        plan, sound = self._plan(
-            self._rest, self._step(self._beside, place, way, upper, back=False)
-        )
+        plan, sound = self._plan(self._rest, self._step(self._beside, place, way, upper))
         if not sound:
             return False
-        back = self._step(place, self._beside, way, upper, back=True)
+        back = self._step_back(place, way, upper, plan.end.heel)
         return self._plan(plan.end, back)[1]
 
-    def _step(
-        self, here: FloatArray, there: FloatArray, way: Approach, upper: FloatArray, back: bool
+    def _step_back(
+        self, here: FloatArray, way: Approach, upper: FloatArray, heel: FloatArray
     ) -> Motion:
-        """Return one step, the trunk leaning and the heel raised where the foot is far."""
+        """Return the step out of a stance, heels raised as they are until the weight has gone."""
+        step = self._step(self._beside, here, way, upper)
+        frame = np.arange(_FRAMES)
+        passed = minimum_jerk(np.clip((frame - _LEAVES) / (_LANDS - _LEAVES), 0.0, 1.0))[:, None]
+        late = minimum_jerk(np.clip(4.0 * frame / _LEAVES - 3.0, 0.0, 1.0))[:, None]
+        rises = minimum_jerk(np.clip((frame - _LANDS) / _RISES, 0.0, 1.0))
+        frames = step.frames.copy()
+        frames[:, 2] = way.lean * (1.0 - rises)
+        raised = (heel + late * (way.heels - heel)) * (1.0 - passed)
+        assert step.footwork is not None
+        footwork = step.footwork._replace(left_from_right=here + (self._beside - here) * passed)
+        return step._replace(frames=frames, footwork=footwork, stance=Stance(here, raised))
+
+    def _step(
+        self, here: FloatArray, there: FloatArray, way: Approach, upper: FloatArray
+    ) -> Motion:
+        """Return one step, the trunk leaning and the heel raised where the foot lands."""
         frame = np.arange(_FRAMES)
         passed = minimum_jerk(np.clip((frame - _LEAVES) / (_LANDS - _LEAVES), 0.0, 1.0))
         leans = minimum_jerk(np.clip(frame / _LEAVES, 0.0, 1.0))
-        rises = minimum_jerk(np.clip((frame - _LANDS) / _RISES, 0.0, 1.0))
-        far = 1.0 - passed if back else passed
         frames = np.tile(upper, (_FRAMES, 1))
-        frames[:, 2] = way.lean * (1.0 - rises if back else leans)
+        frames[:, 2] = way.lean * leans
         place = here + (there - here) * passed[:, None]
         rise = np.zeros((_FRAMES, 2))
         rise[_LEAVES : _LANDS + 1, way.side] = _LIFT_M
         legs = np.tile(self._rest.swing[:-2], (_FRAMES, 1))
         lifts = (Lift(way.side, _LEAVES, _LANDS),)
         footwork = Footwork(legs, rise, place, lifts, free=False)
-        stance = Stance(here, far[:, None] * way.heels)
+        stance = Stance(here, passed[:, None] * way.heels)
         return Motion(frames, _RATE_HZ, footwork, stance=stance)
 
 
