@@ -101,13 +101,20 @@ class Restance:
         return out
 
     def together(self, start: Reference, motion: Motion) -> list[Motion]:
-        """Return the motions that bring the feet beside each other; none where they are not far.
+        """Return what helps where a motion cannot begin at once; none where nothing does.
+
+        For one of a foot that is up from the beginning, the feet are brought beside each other. For
+        one with a heel raised, the robot stands up first, that heel raised.
 
         Args:
             start: Where the reference robot is.
-            motion: What follows, of a foot that is up from the beginning.
+            motion: What follows.
         """
         begins_up = -1 if motion.footwork is None else motion.footwork.up_at(False)
+        if begins_up < 0 and start.lifted < 0 and motion.stance is not None:
+            heel = np.maximum(start.heel, motion.stance.heel[0])
+            here = left_from_right(start.ground)
+            return [_still(here, heel, self._upper(motion))] if heel.any() else []
         far = _apart(left_from_right(start.ground), self._beside)[0] > _FAR_M
         if begins_up < 0 or start.lifted == begins_up or not far:
             return []
