@@ -132,13 +132,15 @@ class Restance:
         leaves = self.way(here) if _apart(here, self._beside)[0] > _FAR_M else None
         first = leaves or Approach(0, 0.0, 0.0)
         out: list[Motion] = []
+        heel = start.heel
         if start.lifted >= 0:  # it is lowered first
             out.append(_still(here, start.heel, upper))
         elif not _upright(start, upper, first.lean):
-            out.append(_still(here, start.heel, _leaning(upper, first.lean)))
+            heel = first.heels
+            out.append(_still(here, heel, _leaning(upper, first.lean)))
         if leaves is None:
             return out, here
-        out.append(self._step_back(here, leaves, upper, start.heel))
+        out.append(self._step_back(here, leaves, upper, heel))
         return out, self._beside
 
     def _works(self, place: FloatArray, way: Approach) -> bool:
