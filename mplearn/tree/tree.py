@@ -533,6 +533,12 @@ class PrimitiveTree:
             floors["renewal.floor"] = state.renewal.floor
         for place, floor in floors.items():
             require(len(floor) == width, place, f"must have shape ({width},)")
+        most = self.config.max_exemplars
+        for k, node in enumerate(state.nodes[1:], start=1):
+            n_members = len(node.members)
+            require(
+                n_members <= most, f"nodes[{k}].members", f"must be at most {most}, not {n_members}"
+            )
         parts = {"sample": state.sample.frames}
         parts |= {f"nodes[{k}]": node.frames for k, node in enumerate(state.nodes)}
         for place, segments in parts.items():

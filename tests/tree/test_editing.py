@@ -9,7 +9,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from motions import RATE_HZ, Motions
 
-from mplearn.errors import InvalidValueError, UnknownPrimitiveError
+from mplearn.errors import InvalidValueError, StateError, UnknownPrimitiveError
 from mplearn.tree import ROOT, Merge, PrimitiveTree, Reparent, TreeConfig
 
 D = 6
@@ -79,6 +79,28 @@ def test_what_was_split_and_merged_again_leaves_no_empty_node():
     assert undone.removed == (home[0],) and undone.reparented == (Reparent(first, ROOT),)
     assert tree.node(first).parent == ROOT
     whole(tree)
+
+
+def test_what_was_split_and_learned_on_is_merged_again():
+    tree, motions, home = learned(max_exemplars=8)
+    halves = tree.split(home[0]).born
+    for _ in range(12):  # both fill: together they hold more than one may
+        tree.insert(motions.perform(0))
+    k = sum(len(tree.node(id).members) for id in halves)
+    assert k > 8
+    change = tree.merge(*halves)
+    assert change.merges == (Merge(*halves),) and change.removed == (home[0],)
+    assert len(tree.node(halves[0]).members) == 8
+    assert np.isfinite(tree.nearest_others()).all(axis=1)[tree.leaves.index(halves[0])]
+    whole(tree)
+
+
+def test_a_state_with_more_exemplars_than_the_rules_allow_is_refused():
+    tree, _, _ = learned(max_exemplars=8)
+    strict = PrimitiveTree(TreeConfig(max_exemplars=6), D, RATE_HZ)
+    with pytest.raises(StateError, match="at most 6, not"):
+        strict.load_state(tree.state())
+    assert strict.leaves == ()
 
 
 def test_a_removed_primitive_waits_or_is_forgotten():

@@ -161,8 +161,8 @@ class Structure:
         for node in self.nodes.values():
             if younger.id in node.apart:
                 node.apart = (node.apart - {younger.id}) | {older.id}
+        self._thin(older)  # before the search looks at it
         change = self._unhang(younger, when)
-        self._thin(older)
         self._note(older)
         merged = Change(merges=(Merge(older.id, younger.id),))
         return merged.then(change._replace(removed=change.removed[1:]))
