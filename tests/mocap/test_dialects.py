@@ -465,6 +465,7 @@ def test_c3d_of_more_than_255_points(tmp_path: Path) -> None:
         (["A", "B", "", "D", "E", "F"], "ABDEF"),
         (["Anna:A", "Anna:B", "Anna:C", "D", "E", "F"], "ABCDEF"),
         (["A", "B", "C", "Unlabeled 7", "*12", "uname*3"], "ABC"),
+        (["A", "B", "C", "unlabeled_7", "Unidentified8", "Unknown_9"], "ABC"),
         (["A", "B", "B", "B", "E", "F"], "ABEF"),
     ],
 )

@@ -150,6 +150,7 @@ TABLES: dict[str, Change] = {
     "names and values above": lambda s: "Subject,Anna\nRate,50\nDate,2024-03-01\n\n" + s,
     "a column without a name": lambda s: s.replace("\n", ",7\n").replace(",7", ",", 1),
     "quoted names": lambda s: re.sub(r"(\w+)_x,\1_y,\1_z", r"'\1'_x,'\1'_y,'\1'_z", s),
+    "bars in names": lambda s: re.sub(r"(\w+)_([xyz])\b", r"S1|\1|\2", s),
     "positions": lambda s: re.sub(r"_([xyz])\b", r"_pos_\1", s),
     "coordinates": lambda s: re.sub(r"_([xyz])\b", r".coord.\1", s),
     "axes in the middle": lambda s: re.sub(r"_([xyz])\b", r"_\1_coord", s),
@@ -187,6 +188,8 @@ def test_a_rate_above_the_table(
     [
         ("walk_50hz.csv", ""),
         ("walk-50fps-3.csv", ""),
+        ("cam2_1080p50fps.csv", ""),
+        ("lowpass_10hz_walk_50hz.csv", ""),
         ("a.csv", '{"SamplingFrequency": 50, "TaskName": "walk"}'),
         ("a.csv", '{"frame_rate": 50.0}'),
     ],
@@ -204,6 +207,26 @@ def test_a_rate_beside_the_table(
         else:
             with pytest.raises(RecordingError, match="no rate"):
                 open_recording(path)
+
+
+@pytest.mark.parametrize("name", ["butter10hz.csv", "from_100hz_to_50hz.csv", "take_60.csv"])
+def test_a_name_that_says_no_rate(
+    tmp_path: Path, standing: Recording, points: np.ndarray, name: str
+) -> None:
+    path = tmp_path / name
+    path.write_text(table(points, standing.marker_names, clock=str).replace("time", "frame", 1))
+    with pytest.raises(RecordingError, match="no rate"):
+        open_recording(path)
+
+
+@pytest.mark.parametrize("name", ["T_{}", "point {}", "P.{}"])
+def test_numbered_markers_keep_their_names(
+    tmp_path: Path, standing: Recording, points: np.ndarray, name: str
+) -> None:
+    names = tuple(name.format(k) for k in range(1, 1 + points.shape[1]))
+    path = tmp_path / "a.csv"
+    path.write_text(table(points, names))
+    assert open_recording(path).marker_names == names
 
 
 def test_a_medial_marker_beside_a_lateral_one_is_kept(

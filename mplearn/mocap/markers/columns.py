@@ -268,7 +268,8 @@ def _undecorated(names: list[str]) -> list[str]:
         words = {match[word].lower() for match in matches if match} if word else set()
         known = len(words) == 1 and words <= _DECORATION if word else True
         short = [match[rest] for match in matches if match]
-        if len(names) >= 3 and len(short) == len(set(short)) == len(names) and known:
+        differ = len(names) >= 3 and len(short) == len(set(short)) == len(names)
+        if known and differ and not all(name.isdigit() for name in short):  # T_1 is a vertebra
             names = short
     return names
 

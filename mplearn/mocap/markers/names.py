@@ -12,7 +12,8 @@ from ..findings import Findings
 
 # how systems call trajectories that they could not identify
 _UNIDENTIFIED = re.compile(
-    r"[-*~?.]+\d*|un(?:labell?ed|named|ident(?:ified)?|known)\b.*|uname\*?\d*|new[ _]\d+", re.I
+    r"[-*~?.]+\d*|un(?:labell?ed|named|ident(?:ified)?|known)(?![a-z]).*|uname\*?\d*|new[ _]\d+",
+    re.I,
 )
 _SEPARATORS = ":|"
 

@@ -55,6 +55,8 @@ class Sheet:
             separators = said[1] or "\t"
         some = [line for line in lines[:_LOOK] if line.strip()]
         bare = [re.sub(r'"[^"]*"', "", line) for line in some]  # a quoted name may hold any of them
+        if not any("|" in line for line in bare[1:][-2:]):  # only in names, subject|marker
+            separators = separators.replace("|", "")
         # the first line that has many tells: names hold no separators, numbers may hold commas
         most = [max(map(line.count, separators)) for line in bare]
         telling = next((t for t, n in zip(bare, most, strict=True) if 0 < max(most) <= 2 * n), "")
