@@ -152,7 +152,12 @@ class Planner:
 
     def _plan(self, start: Reference, motion: Motion, speed: float) -> Plan:
         """Return the plan of a motion, and of the steps into its stance before it."""
-        plan, sound = self._plan_after(self._restance.into(start, motion), start, motion, speed)
+        steps = self._restance.into(start, motion)
+        if steps and self._restance.alike(start, motion):
+            plan, sound = self._plan_one(start, motion, speed)
+            if sound:
+                return plan
+        plan, sound = self._plan_after(steps, start, motion, speed)
         if not sound and (steps := self._restance.together(start, motion)):
             again, better = self._plan_after(steps, start, motion, speed)
             plan = again if better else plan

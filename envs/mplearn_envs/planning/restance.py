@@ -27,6 +27,7 @@ _RATE_HZ, _FRAMES = 100.0, 211  # of a step
 _LEAVES, _LANDS = 45, 100  # frames at which its foot leaves the ground, and lands
 _RISES = 80  # frames in which the trunk is upright again
 _FAR_M = 0.3  # feet so far from side by side are brought there before they go elsewhere
+_ALIKE_M = 0.2  # stances so near to each other are tried for each other before one steps
 _LIFT_M = 0.05
 _SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)  # of the way to where a foot shall land
 _DECIMALS, _KNOWN = 3, 256
@@ -99,6 +100,23 @@ class Restance:
             if arrives is not None:
                 out.append(self._step(here, wanted.place, arrives, upper))
         return out
+
+    def alike(self, start: Reference, motion: Motion) -> bool:
+        """Return whether the robot stands apart nearly as a motion does.
+
+        One stance of a person is shown a little nearer or farther by the motion into it and by the
+        one out of it (`within_reach`); nobody steps together and out again between these.
+
+        Args:
+            start: Where the reference robot is.
+            motion: What follows.
+        """
+        if motion.stance is None:
+            return False
+        here, there = left_from_right(start.ground), motion.stance.place
+        far = min(_apart(place, self._beside)[0] for place in (here, there)) > _FAR_M
+        off_m, turned = _apart(here, there)
+        return far and off_m < _ALIKE_M and turned < OWN_RAD
 
     def together(self, start: Reference, motion: Motion) -> list[Motion]:
         """Return what helps where a motion cannot begin at once; none where nothing does.

@@ -120,6 +120,25 @@ def test_a_lunge_is_stepped_into_and_out_of_with_a_wrong_model(seed):
     assert not bow.end.heel.any()
 
 
+def test_between_stances_that_are_nearly_the_same_nobody_steps():
+    """The way into a lunge and the way out of it are shown 13 cm apart: the feet stay."""
+    down = PLANNER.plan(REST, lunge(), 0.5)
+    nearer = np.array([SPLIT[0] + 0.13, *SPLIT[1:]])
+    low, high = shown(nearer, (0.9, 0.0), (-0.3, 0, 0.1)), shown(nearer, (0.5, 0.0), (-0.1, 0, 0.1))
+    rises = PLANNER.motion(between(low, high), RATE_HZ)
+    np.testing.assert_allclose(rises.stance.place, nearer, atol=0.02)
+    up = PLANNER.plan(down.end, rises, 0.5)
+    assert (up.up == -1).all() and up.error.max() < 1e-3 and up.zmp_margin_m.min() > 0.014
+    np.testing.assert_allclose(up.end.ground, down.end.ground, atol=1e-6)
+    simulation = Simulation(HUMANOID)
+    simulation.reset()
+    assert not simulation.perform(down).fallen and not simulation.perform(up).fallen
+    # from beside each other the feet go where they are shown
+    np.testing.assert_allclose(
+        left_from_right(PLANNER.plan(REST, rises, 0.5).end.ground), nearer, atol=0.02
+    )
+
+
 def test_feet_stand_as_wide_as_shown_or_as_a_step_reaches():
     wide = np.array([*turn_in_plane(0.0, 0.45, 0.25), 0.5])
     frames = np.tile(shown(wide, (0.0, 0.0), (-0.1, 0.0, 0.1)), (50, 1))
