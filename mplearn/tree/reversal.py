@@ -286,7 +286,9 @@ class _Reversal:
             keeps = node.id == ROOT or len(places) < len(node.members)
             if node.id in self.leaves or node.frozen or not places or not keeps:
                 continue
-            self.memory.release(*node.remove(places))
+            gone = node.remove(places)
+            self.memory.release(*gone)
+            node.settled.difference_update(gone)
             self.structure.index.put(node, self.memory.bank)
 
     def _hang(self) -> None:

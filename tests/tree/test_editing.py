@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from motions import RATE_HZ, Motions
 
 from mplearn.errors import InvalidValueError, StateError, UnknownPrimitiveError
-from mplearn.tree import ROOT, Merge, PrimitiveTree, Reparent, TreeConfig
+from mplearn.tree import ROOT, Merge, NodesEdit, PrimitiveTree, Reparent, TreeConfig
 
 D = 6
 
@@ -92,6 +92,24 @@ def test_what_was_split_and_learned_on_is_merged_again():
     assert change.merges == (Merge(*halves),) and change.removed == (home[0],)
     assert len(tree.node(halves[0]).members) == 8
     assert np.isfinite(tree.nearest_others()).all(axis=1)[tree.leaves.index(halves[0])]
+    whole(tree)
+
+
+@pytest.mark.parametrize("then", ["merged", "removed"])
+def test_what_was_removed_and_learned_anew_comes_back_once(then):
+    tree, _, home = learned()
+    members, before = sorted(tree.node(home[0]).members), tree.state().nodes
+    tree.remove(home[0])
+    edit = NodesEdit.between(before, tree.state().nodes, tree.bank.floor.copy())
+    (anew,) = tree.place_waiting().born
+    tree.exchange(edit.reversed())  # now it is a primitive twice, of the same executions
+    if then == "merged":
+        tree.merge(home[0], anew)
+        assert sorted(tree.node(home[0]).members) == members
+    else:
+        tree.remove(home[0])
+        tree.remove(anew)
+        assert sorted(tree.node(ROOT).members) == members
     whole(tree)
 
 

@@ -82,9 +82,9 @@ class Structure:
     def add(self, node: Node, number: int) -> None:
         """Put a segment into a node; the least informative exemplars of a full one go.
 
-        A frozen one knows it, and stays as it is.
+        A frozen one knows it, and stays as it is; so does one that holds it already.
         """
-        if node.frozen:
+        if node.frozen or number in node.members:
             return
         bank = self.memory.bank
         node.add(number, bank.distances(bank[number], node.members))
@@ -154,6 +154,8 @@ class Structure:
         """Let one leaf absorb another, ``joint`` being the distances among their exemplars."""
         older.matrix = joint
         older.members += younger.members
+        twice = [i for i, n in enumerate(older.members) if n in older.members[:i]]
+        self.memory.release(*older.remove(twice))  # in both since something was undone
         older.n_placed += younger.n_placed
         older.n_frames += younger.n_frames
         older.history.append(("merged", when))
