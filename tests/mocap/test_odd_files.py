@@ -494,6 +494,34 @@ def test_poses_of_smpl_in_other_forms(tmp_path: Path, form: str) -> None:
     assert ("matrices" if "matrices" in form else "quaternions") in said
 
 
+@pytest.mark.parametrize("form", ["matrices", "quaternions"])
+def test_a_joint_of_smpl_that_was_not_seen(tmp_path: Path, form: str) -> None:
+    vectors = 0.3 * smpl_poses(n_joints=24).reshape(12, 24, 3)
+    turns = Rotation.from_rotvec(vectors.reshape(-1, 3))
+    poses = turns.as_matrix() if form == "matrices" else turns.as_quat(scalar_first=True)
+    poses = poses.reshape(12, 24, *poses.shape[1:])
+    vectors[3, 5] = poses[3, 5] = np.nan
+    plain = open_recording(write_smpl(tmp_path / "a.npz", poses=vectors), positions=True)
+    found = open_recording(write_smpl(tmp_path / "b.npz", poses=poses), positions=True)
+    assert np.isnan(found.frames).any()
+    assert found.frames == pytest.approx(plain.frames, abs=1e-6, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    "poses",
+    [
+        np.zeros((0, 24, 4)),
+        np.zeros((12, 24, 4)),
+        np.zeros((12, 24, 3, 3)),
+        np.tile(-np.eye(3), (12, 24, 1, 1)),
+        np.tile(-np.eye(3).ravel(), (12, 24)),
+    ],
+)
+def test_poses_of_smpl_that_are_no_rotations(tmp_path: Path, poses: np.ndarray) -> None:
+    with pytest.raises(RecordingError, match="poses"):
+        open_recording(write_smpl(tmp_path / "a.npz", poses=poses))
+
+
 def test_six_numbers_a_joint_are_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"shape \(12, 24, 6\)"):
         open_recording(write_smpl(tmp_path / "a.npz", poses=np.ones((12, 24, 6))))

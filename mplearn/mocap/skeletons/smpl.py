@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ...maths.rotations import matrix_to_quaternion, rotation_vector_to_matrix
-from ...recording import FloatArray, Recording
+from ...recording import BoolArray, FloatArray, Recording
 from ..files import bad_file
 from ..findings import Findings
 from ..options import option
@@ -152,37 +152,57 @@ def _vectors(archive: NPZFile, findings: Findings) -> FloatArray:
 def _as_vectors(archive: NPZFile, name: str, findings: Findings) -> FloatArray:
     """Return an array of rotations as rotation vectors, whatever it holds; others as they are.
 
+    Missing ones, NaN, stay missing.
+
     Raises:
-        RecordingError: It holds so many numbers a joint as no rotation has that is known here.
+        RecordingError: It holds matrices that are no rotations, or so many numbers a joint as no
+            rotation has that is known here.
     """
     values = _numbers(archive, name)
-    per_joint = values.shape[-1] if values.ndim == 3 else 3
     width = int(np.prod(values.shape[1:]))
-    if width and width % 9 == 0 and len(values):
+    if width and width % 9 == 0:
         matrices = values.reshape(len(values), -1, 3, 3)
-        square = np.einsum("tjik,tjil->tjkl", matrices, matrices)
-        if np.abs(square - np.eye(3)).max() < _SQUARE:
+        seen = np.asarray(~np.isnan(matrices).any(axis=(2, 3)))
+        known = matrices[seen]
+        off = np.abs(np.einsum("nik,nil->nkl", known, known) - np.eye(3)).max(initial=0.0)
+        square = len(known) > 0 and off < _SQUARE
+        if square and (np.linalg.det(known) > 0).all():
             findings.note(f"{name} holds matrices")
-            return _rotation_vectors(matrix_to_quaternion(matrices))
-    if per_joint == 4 and np.abs(np.linalg.norm(values, axis=2) - 1.0).max() < _SQUARE:
-        share = np.abs(values).mean(axis=(0, 1))  # joints are turned little: w is large
-        order, places = ("w, x, y, z", [0, 1, 2, 3]), ("x, y, z, w", [3, 0, 1, 2])
-        said, columns = order if share[0] > share[3] else places
-        findings.warn(f"{name} holds quaternions, taken as {said}")
-        return _rotation_vectors(values[..., columns])
-    if values.ndim == 3 and per_joint != 3:
+            return _rotation_vectors(matrix_to_quaternion(known), seen)
+        if square or values.shape[2:] == (3, 3):
+            raise bad_file(archive.path, f"{name} with matrices that are no rotations", "rotations")
+    per_joint = values.shape[-1] if values.ndim == 3 else 3
+    if per_joint == 4:
+        seen = np.asarray(~np.isnan(values).any(axis=2))
+        known = values[seen]
+        if len(known) and np.abs(np.linalg.norm(known, axis=1) - 1.0).max() < _SQUARE:
+            share = np.abs(known).mean(axis=0)  # joints are turned little: w is large
+            order, places = ("w, x, y, z", [0, 1, 2, 3]), ("x, y, z, w", [3, 0, 1, 2])
+            said, columns = order if share[0] > share[3] else places
+            findings.warn(f"{name} holds quaternions, taken as {said}")
+            return _rotation_vectors(known[:, columns], seen)
+    if per_joint != 3:
         raise bad_file(
             archive.path, f"{name} of shape {values.shape}", "rotation vectors, three numbers each"
         )
     return values
 
 
-def _rotation_vectors(quaternions: FloatArray) -> FloatArray:
-    """Return rotation vectors [rad] of quaternions (w, x, y, z), (T, J, 4) to (T, J, 3)."""
+def _rotation_vectors(quaternions: FloatArray, seen: BoolArray) -> FloatArray:
+    """Return rotation vectors [rad] of quaternions (w, x, y, z) where they were seen, else NaN.
+
+    Args:
+        quaternions: Shape (n, 4).
+        seen: Where they belong, n times true, shape (T, J).
+
+    Returns:
+        Shape (T, J, 3).
+    """
     from scipy.spatial.transform import Rotation
 
-    turns = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True)
-    return np.asarray(turns.as_rotvec().reshape(*quaternions.shape[:2], 3))
+    vectors = np.full((*seen.shape, 3), np.nan)
+    vectors[seen] = Rotation.from_quat(quaternions, scalar_first=True).as_rotvec()
+    return vectors
 
 
 def _places(archive: NPZFile, n_frames: int, findings: Findings) -> FloatArray:
