@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from numbers import Real
 from typing import Literal, TypeAlias
 
 import numpy as np
 
+from mplearn.errors import InvalidValueError
 from mplearn_envs.mechanics.inverse_dynamics import InverseDynamics
 from mplearn_envs.mechanics.reference import (
     Reference,
@@ -38,6 +40,10 @@ class FeasibilityConfig:
         zmp_margin_m: How near the zero-moment point may come to the edge of the soles [m].
         transitions: Whether it is also judged, of each two primitives, if one can follow the other
             (`Skills.follows`), and what cannot is masked. Each is planned when it is first asked.
+
+    Raises:
+        InvalidValueError: A limit is no number from 0 on, ``slowest`` is 0, or ``transitions`` is
+            neither true nor false.
     """
 
     flight_m: float = 0.06
@@ -47,6 +53,20 @@ class FeasibilityConfig:
     torque_share: float = 0.9
     zmp_margin_m: float = 0.015
     transitions: bool = False
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            value = getattr(self, each.name)
+            told = isinstance(value, (bool, np.bool_))
+            if each.name == "transitions":
+                if not told:
+                    raise InvalidValueError(f"transitions must be True or False, not {value!r:.80}")
+            elif told or not isinstance(value, (Real, np.number)) or not float(value) >= 0.0:
+                raise InvalidValueError(
+                    f"{each.name} must be a number from 0 on, not {value!r:.80}"
+                )
+        if not self.slowest > 0.0:
+            raise InvalidValueError("slowest must be above 0")
 
 
 @dataclass(frozen=True)

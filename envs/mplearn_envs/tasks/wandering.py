@@ -80,7 +80,7 @@ def wandering(task: Task, memory: int, scene: Scene) -> Wandering:
         plan = repertoire.skills.plan(scene.reference, id)
         choice = Choice(id, True, float(scene.choices.prior[repertoire.slots[id]]), ())
         paid = sum(task.bonuses(choice).values()) + _earned(task, plan, clock)
-        rest = graph.values[graph.place[(id,)]]
+        rest = float(graph.values[graph.place[(id,)]])
         best = max(best, paid + clock.worth(plan.duration_s) * rest)
     hold = repertoire.skills.hold(scene.reference, scene.hold_s)
     idle = _earned(task, hold, clock) / (1.0 - clock.worth(hold.duration_s))

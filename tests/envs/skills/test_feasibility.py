@@ -14,6 +14,8 @@ from standing_library import (
     sweep,
 )
 
+from mplearn.errors import InvalidValueError
+from mplearn_envs.environment.options import MotionOptions
 from mplearn_envs.mechanics.reference import tracked_columns
 from mplearn_envs.planning import Motion, Planner
 from mplearn_envs.robot import humanoid
@@ -98,6 +100,25 @@ def test_torque_and_balance_limits_are_kept():
     assert "torque" in kinds(judged(weak, motion, RATE_HZ, 0.5))
     timid = FeasibilityCheck(CHECK.planner, FeasibilityConfig(zmp_margin_m=0.2))
     assert "balance" in kinds(judged(timid, motion, RATE_HZ, 0.5))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"transitions": "no"},
+        {"transitions": 1},
+        {"flight_m": "x"},
+        {"torque_share": -0.1},
+        {"reach_error": np.nan},
+        {"slowest": True},
+        {"slowest": 0.0},
+    ],
+)
+def test_limits_that_are_none_are_refused(wrong):
+    with pytest.raises(InvalidValueError, match=next(iter(wrong))):
+        FeasibilityConfig(**wrong)
+    with pytest.raises(InvalidValueError, match=next(iter(wrong))):
+        MotionOptions(feasibility=wrong)
 
 
 def test_a_jerky_motion_is_slowed_for_balance():
