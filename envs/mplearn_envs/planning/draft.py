@@ -17,6 +17,7 @@ from mplearn_envs.mechanics.servos import limit_velocity
 from mplearn_envs.mechanics.support import margins_along
 from mplearn_envs.robot import Robot
 
+from .clearance import NEAR_M, feet_touch
 from .leg_ik import balanced_path
 from .plan import Motion, PlannerConfig
 from .splines import fading
@@ -25,6 +26,7 @@ from .timeline import Stretch, Timeline, lay_out, stretches
 
 CLOSE_M = 0.035  # a zero-moment point so near the edge is planned again, for all masses
 _SOLE_M = 0.1  # by no more than this
+_GRAZES_M = 0.008  # feet that stand as the robot's own may overlap by so much: no robot fell
 
 
 class Pace(NamedTuple):
@@ -211,7 +213,7 @@ class Drafter:
         carried = smooth_step(np.clip(targets[:, -2:] / CARRY_M, 0.0, 1.0))
         if motion.footwork is not None and not motion.footwork.free:
             carried[:] = 0.0
-        path: tuple[FloatArray, FloatArray] = balanced_path(
+        what = (
             self._reference,
             targets[:, :width],
             targets[:, width:],
@@ -222,6 +224,10 @@ class Drafter:
             start.q,
             self.knot_s,
         )
+        path: tuple[FloatArray, FloatArray] = balanced_path(*what)
+        beside = np.array_equal(start.ground, self._reference.ground)
+        if carried.any() and feet_touch(self._reference, path[0], -_GRAZES_M if beside else NEAR_M):
+            path = balanced_path(*what, True)
         return path
 
     def _balance(

@@ -33,6 +33,7 @@ def balanced_path(
     cog: FloatArray,
     start: FloatArray,
     knot_s: float,
+    wide: bool = False,
 ) -> tuple[FloatArray, FloatArray]:
     """Balance the reference robot under every target.
 
@@ -50,6 +51,8 @@ def balanced_path(
         cog: Horizontal COG, shape (K, 2) [m].
         start: Posture before them, shape (7 + n,).
         knot_s: Time between targets [s].
+        wide: Whether a foot passes the other one as wide as it is turned, however far it follows
+            its leg's motion.
 
     Returns:
         The postures, shape (K + 1, 7 + n), start included, and the largest error that is left in
@@ -95,7 +98,7 @@ def balanced_path(
         for iteration in range(_MAX_ITERATIONS + 1):
             pose = forward(robot.tree, q)
             for side in range(2):
-                _aim(robot, stance, side, q, ground[k], swing[k], heel[k, side])
+                _aim(robot, stance, side, q, ground[k], swing[k], heel[k, side], wide)
             rows = errors(stance, pose, height, orientation)
             worst[k + 1] = np.max(np.abs(rows))
             if worst[k + 1] < TOLERANCE or iteration == _MAX_ITERATIONS:
@@ -116,6 +119,7 @@ def _aim(
     ground: FloatArray,
     swing: FloatArray,
     heel: float,
+    wide: bool,
 ) -> None:
     """Write where a foot shall be: on the ground, or as the leg's motion has it, or in between.
 
@@ -134,16 +138,22 @@ def _aim(
                 there[7 + stance.leg_joints[i]] = swing[i]
         pose = forward(robot.tree, there)
         foot = stance.feet[side]
-        lowest = _lowest(robot.corners[side], rotation)
+        flat_there, lowest = rotation, _lowest(robot.corners[side], rotation)
         turn = rotation_error(pose.rotation[foot], rotation)
         rotation = turn_by_vector(share * turn, rotation)
         z += lowest - _lowest(robot.corners[side], rotation)
         x += share * (pose.position[foot, 0] - x)
         y += share * (pose.position[foot, 1] - y)
         low = min(max(1.5 - rise / LOW_M, 0.0), 1.0)
-        aside = share * low * _too_near(robot, side, x, y, ground[1 - side])
-        x -= aside * np.sin(ground[1 - side, 2])
-        y += aside * np.cos(ground[1 - side, 2])
+        other = ground[1 - side]
+        if wide:
+            missing = _overlap(robot, side, x, y, rotation, other)
+            missing -= (1.0 - share) * _overlap(robot, side, place[0], place[1], flat_there, other)
+            aside = low * max(missing, 0.0) * (1.0 if side == 0 else -1.0)
+        else:
+            aside = share * low * _too_near(robot, side, x, y, other)
+        x -= aside * np.sin(other[2])
+        y += aside * np.cos(other[2])
         z += share * OFF_M * np.tanh((pose.position[foot, 2] - z) / OFF_M)
     stance.foot_position[side, 0] = x
     stance.foot_position[side, 1] = y
@@ -161,6 +171,26 @@ def _too_near(robot: ReferenceRobot, side: int, x: float, y: float, other: Float
     beside = min(max(2.0 - abs(ahead) / length, 0.0), 1.0)
     missing = (width + APART_M) * beside - (aside if side == 0 else -aside)
     return float(max(missing, 0.0) * (1.0 if side == 0 else -1.0))
+
+
+@njit(cache=True)
+def _overlap(
+    robot: ReferenceRobot, side: int, x: float, y: float, rotation: FloatArray, other: FloatArray
+) -> float:
+    """Return how far a foot, as it is turned, must go aside to clear the one that stands [m]."""
+    corners, stands = robot.corners[side], robot.corners[1 - side]
+    length = corners[:, 0].max() - corners[:, 0].min()
+    sign = 1.0 if side == 0 else -1.0
+    inner = np.inf  # how far aside of the foot's origin its innermost corner is
+    for corner in range(corners.shape[0]):
+        dx, dy = 0.0, 0.0
+        for i in range(3):
+            dx += rotation[0, i] * corners[corner, i]
+            dy += rotation[1, i] * corners[corner, i]
+        inner = min(inner, sign * turn_in_plane(dx, dy, -other[2])[1])
+    ahead, aside = turn_in_plane(x - other[0], y - other[1], -other[2])
+    beside = min(max(2.0 - abs(ahead) / length, 0.0), 1.0)
+    return float(beside * ((sign * stands[:, 1]).max() + APART_M - inner) - sign * aside)
 
 
 @njit(cache=True)

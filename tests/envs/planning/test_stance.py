@@ -1,5 +1,6 @@
 """Stances as they are shown: feet apart, a heel raised, and what balances where no chair is."""
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,6 +15,7 @@ from mplearn_envs.mechanics.heels import bearing_corners, foot_places, raised_fo
 from mplearn_envs.mechanics.kinematics import places
 from mplearn_envs.mechanics.reference import sole_middles, soles
 from mplearn_envs.planning import Planner
+from mplearn_envs.planning.clearance import outline_gap
 from mplearn_envs.planning.stance import stand
 from mplearn_envs.planning.stride import left_from_right
 from mplearn_envs.robot import humanoid
@@ -147,6 +149,65 @@ def test_feet_stand_as_wide_as_shown_or_as_a_step_reaches():
     frames = np.tile(shown(far, (0.9, 0.0), (-0.3, 0.0, 0.2)), (50, 1))
     place = PLANNER.motion(frames, RATE_HZ).stance.place
     assert 0.5 < -place[0] < 0.9
+
+
+def touching(plan):
+    """Return in how many postures of a plan MuJoCo finds that the feet touch each other."""
+    model = HUMANOID.model()
+    data = mujoco.MjData(model)
+    count = 0
+    for q in plan.q:
+        data.qpos[:] = q
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_collision(model, data)
+        count += any(0 not in pair for pair in data.contact.geom.tolist())
+    return count
+
+
+@pytest.mark.parametrize("pitch, roll", [(-1.6, 0.25), (-1.2, 0.35)])
+def test_out_of_a_wide_stance_a_turned_foot_does_not_meet_the_other(pitch, roll):
+    wide = np.array([*turn_in_plane(0.0, 0.41, 0.15), 0.29])
+    frames = np.tile(shown(wide, (0.0, 0.0), (-0.1, 0.0, 0.1)), (50, 1))
+    stands = PLANNER.plan(REST, PLANNER.motion(frames, RATE_HZ), 0.5).end
+    inwards = {"hip_pitch_r": pitch, "hip_roll_r": roll, "hip_yaw_r": -0.5}
+    knee_up = {"hip_pitch_l": -1.2, "knee_l": 1.4}
+    raises, exchanges = (
+        PLANNER.motion(sweep(*ends, 1.2), RATE_HZ)._replace(stance=None)
+        for ends in (({}, inwards), (knee_up, {}))
+    )
+    up = PLANNER.plan(stands, raises, 0.5)
+    down = PLANNER.plan(up.end, exchanges, 0.5)
+    for plan in (up, down):
+        assert plan.error.max() < 1e-3
+        assert touching(plan) == 0
+
+
+@settings(max_examples=100, deadline=None)
+@given(*[st.floats(-0.4, 0.4)] * 2, *[st.floats(-3.0, 3.0)] * 2)
+def test_the_gap_between_soles_is_that_of_their_boundaries(x, y, one_yaw, other_yaw):
+    """It is positive exactly where they are disjoint, and never more than their distance."""
+    around = np.linspace(-1.0, 1.0, 41)
+    side = np.ones(41)
+    outline = np.array([0.12, 0.055]) * np.concatenate(
+        [np.column_stack(each) for each in ((side, around), (-side, around), (around, side))]
+        + [np.column_stack((around, -side))]
+    )
+    corners = np.array([[0.12, 0.055], [0.12, -0.055], [-0.12, -0.055], [-0.12, 0.055]])
+
+    def placed(points, dx, dy, yaw):
+        return np.stack(turn_in_plane(*points.T, yaw), axis=-1) + np.array((dx, dy))
+
+    one, other = placed(corners, 0.0, 0.0, one_yaw), placed(corners, x, y, other_yaw)
+    first, second = placed(outline, 0.0, 0.0, one_yaw), placed(outline, x, y, other_yaw)
+    distance = np.linalg.norm(first[:, None] - second, axis=-1).min()
+    gap = outline_gap(one, other)
+    inside = np.abs(np.stack(turn_in_plane(*second.T, -one_yaw), axis=-1)) < (0.12, 0.055)
+    if inside.all(axis=1).any():
+        assert gap < 0.0
+    if gap > 0.0:
+        assert gap <= distance + 1e-9
+    elif gap < -1e-6:
+        assert distance < 0.01  # outlines cross, as neither sole has room in the other
 
 
 def test_who_sits_down_without_a_chair_leans_as_far_as_must_be():
