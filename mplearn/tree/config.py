@@ -93,8 +93,6 @@ class TreeConfig:
             while no larger cluster is below it.
         pair_extent: And below this share of how far each is from standing still, which is small
             only where they are like each other in shape; inf for no such bound.
-        pair_alike: Or, up to the scale itself, below this share of that: two that are so much like
-            each other are one motion, though large ones are far apart; 0 for never.
         confirmed: Members from which on a primitive is sure; with fewer it is provisional.
         patience: A provisional primitive that nothing has joined after so many further segments is
             forgotten; after four times as many as there are primitives, if that is more.
@@ -154,7 +152,6 @@ class TreeConfig:
     min_exemplars: int = 2
     pair_share: float = newer(0.6, absent=1.0)
     pair_extent: float = newer(1.1, absent=math.inf)
-    pair_alike: float = newer(0.5, absent=0.0)
     confirmed: int = newer(3, absent=1)
     patience: int = newer(64, absent=64)
     reach: float = 1.5
@@ -191,7 +188,6 @@ class TreeConfig:
             extent_share=math.inf,
             pair_share=1.0,
             pair_extent=math.inf,
-            pair_alike=0.0,
             confirmed=1,
             young_reach=0.0,
             least_reach=0.0,
@@ -229,7 +225,6 @@ class TreeConfig:
             "min_exemplars": 2,
             "confirmed": 1,
             "patience": 1,
-            "pair_alike": 0,
             "young_reach": 0,
             "least_reach": 0,
             "n_nearest": 1,

@@ -65,7 +65,7 @@ def _clusters(
 
     Executions of one motion are nearer to each other than they are to no motion at all. Two that
     are near each other say less than three that are: pairs count only where there is no larger
-    cluster, and must be the nearer, or alike in shape: large motions differ more.
+    cluster, and must be the nearer.
 
     Args:
         structure: The tree.
@@ -77,15 +77,14 @@ def _clusters(
     extents = np.minimum(structure.memory.bank.extents(members), _FAR)
     sizes = np.sqrt(np.multiply.outer(extents, extents))
 
-    def below(share: float, limit: float) -> FloatArray:
-        return np.clip(np.minimum(share * sizes, limit), 1e-12, _FAR)
+    def found(limit: float, share: float, least: int) -> list[IntArray]:
+        most = np.clip(np.minimum(share * sizes, limit), 1e-12, _FAR)
+        return clusters_below(matrix / most, 1.0, least)
 
-    groups = clusters_below(matrix / below(config.extent_share, limit), 1.0, max(least, 3))
+    groups = found(limit, config.extent_share, max(least, 3))
     if groups or least > 2:
         return groups
-    near = below(config.pair_extent, config.pair_share * limit)
-    alike = below(config.pair_alike, limit)
-    return clusters_below(matrix / np.maximum(near, alike), 1.0, least)
+    return found(config.pair_share * limit, config.pair_extent, least)
 
 
 def _leaf_of(structure: Structure, members: Sequence[int], limit: float) -> Node | None:
