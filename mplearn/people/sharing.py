@@ -267,7 +267,7 @@ class Sharing:
         Returns:
             Its id, and how far out the segment lies: up to 1 it joins it.
         """
-        if not np.isfinite(self.unit):
+        if not self.leaves or not np.isfinite(self.unit):
             return None, float("inf")
         level = Shape(shape.posture - self.offset(person), shape.movement)
         slots = self.slots(self.leaves)

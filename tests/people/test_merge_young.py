@@ -69,3 +69,15 @@ def test_what_a_person_had_a_hand_in_and_who_is_alone_stay(shards):
     assert not alone.withdraw_young().removed
     alone.sharing()
     assert not alone.withdraw_young().removed
+
+
+def test_where_nothing_was_shown_often_all_waits_and_learning_goes_on(shards):
+    tree, shows = united(shards[0])
+    for id in tree.leaves:
+        tree.remove(id)
+    assert not tree.leaves
+    for person in (0, 1) * RULES.min_exemplars:
+        placement = tree.insert(shards[1](person, COMMON[0]), person)
+        shows[placement.number] = COMMON[0]
+    assert COMMON[0] in meanings(tree, shows)
+    sound(tree)

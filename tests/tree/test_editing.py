@@ -11,6 +11,7 @@ from motions import RATE_HZ, Motions
 
 from mplearn.errors import InvalidValueError, StateError, UnknownPrimitiveError
 from mplearn.tree import ROOT, Merge, NodesEdit, PrimitiveTree, Reparent, TreeConfig
+from mplearn.tree.exemplars.memory import SegmentMemory
 
 D = 6
 
@@ -111,6 +112,16 @@ def test_what_was_removed_and_learned_anew_comes_back_once(then):
         tree.remove(anew)
         assert sorted(tree.node(ROOT).members) == members
     whole(tree)
+
+
+def test_what_two_primitives_hold_is_let_go_by_both_at_once():
+    memory = SegmentMemory(TreeConfig(n_sampled=3), np.zeros(D, np.int64))
+    for number in range(4):
+        memory.remember(number, Motions(1, D).perform(0))
+        memory.hold(number)
+    (free,) = set(range(4)) - set(memory.sample().numbers.tolist())
+    memory.release(free, free)
+    assert free not in memory.frames and free not in memory.bank
 
 
 def test_a_state_with_more_exemplars_than_the_rules_allow_is_refused():

@@ -80,7 +80,7 @@ class SegmentMemory:
     def release(self, *numbers: int) -> None:
         """Let segments go; what nothing holds is forgotten."""
         self._holds.subtract(numbers)
-        for number in numbers:
+        for number in dict.fromkeys(numbers):
             if self._holds[number] == 0:
                 del self._holds[number], self.frames[number]
                 self._blobs.pop(number, None)
