@@ -11,6 +11,7 @@ import numpy as np
 
 from mplearn import LearnerConfig, MotionLearner
 from mplearn.state import checkpoint
+from mplearn_agents.learning.pauses import short_pauses
 
 from .live import _resident_mb
 from .states import _CHANNELS, _RATE_HZ, Teacher, teach
@@ -24,13 +25,17 @@ def rows() -> list[tuple[str, str, str, str]]:
     """Return what it costs to learn on, and to keep what is known, at some numbers of motions.
 
     Processor time; a frame in which a segment ends costs the segment, every other one its part of
-    what is done a little at a time.
+    what is done a little at a time. Garbage is collected as in a process that follows a stream.
     """
     teacher = Teacher(_STAGES[-1])
     channels = tuple(f"joint_{i}" for i in range(_CHANNELS))
     learner = MotionLearner(LearnerConfig(channels, _RATE_HZ))
     _show(learner, Teacher(_AT_ONCE), 0, _AT_ONCE)  # compiles
-    learner = MotionLearner(LearnerConfig(channels, _RATE_HZ))
+    with short_pauses():
+        return _stages(teacher, MotionLearner(LearnerConfig(channels, _RATE_HZ)))
+
+
+def _stages(teacher: Teacher, learner: MotionLearner) -> list[tuple[str, str, str, str]]:
     table = []
     for before, stage in zip((0, *_STAGES[:-1]), _STAGES, strict=True):
         segments, frames = [], []

@@ -41,6 +41,7 @@ class Snapshots:
         self._rate_hz = rate_hz
         self._body = body
         self._made: dict[int, tuple[LeftRightHMM, Primitive]] = {}
+        self._nodes: dict[int, TreeNode] = {}
         self._left: list[int] | None = None  # what `prepare` has still to look at
         self.frozen: dict[int, FrozenState] = {}
 
@@ -83,6 +84,7 @@ class Snapshots:
         """
         nodes = {node.id: node for node in tree.nodes}
         self._made = {id: self._primitive(tree, nodes[id]) for id in tree.leaves}
+        self._nodes = {id: self._node(node) for id, node in nodes.items()}
         primitives = [
             replace(self.frozen[id].primitive, parent=made.parent) if id in self.frozen else made
             for id, (_, made) in self._made.items()
@@ -93,9 +95,15 @@ class Snapshots:
             channels=self._channels,
             rate_hz=self._rate_hz,
             body=self._body,
-            tree=tuple(TreeNode(node.id, node.parent, node.n_placed) for node in nodes.values()),
+            tree=tuple(self._nodes.values()),
             recogniser=tree.recogniser(),
         )
+
+    def _node(self, node: Node) -> TreeNode:
+        """Return a node; the same object as in the library before, if it has not changed."""
+        now = node.id, node.parent, node.n_placed
+        known = self._nodes.get(node.id)
+        return known if known is not None and known == now else TreeNode(*now)
 
     def _primitive(self, tree: PeopleTree, node: Node) -> tuple[LeftRightHMM, Primitive]:
         """Return a primitive, with the model in the tree that it was made of."""

@@ -85,7 +85,7 @@ class PrimitiveLibrary:
     def __post_init__(self) -> None:
         object.__setattr__(self, "primitives", tuple(self.primitives))
         object.__setattr__(self, "channels", tuple(self.channels))
-        object.__setattr__(self, "tree", tuple(TreeNode(*node) for node in self.tree))
+        object.__setattr__(self, "tree", tuple(map(_tree_node, self.tree)))
         ids = [primitive.id for primitive in self.primitives]
         names = [primitive.name for primitive in self.primitives]
         for what, values in (("ids", ids), ("names", names), ("channels", self.channels)):
@@ -421,6 +421,10 @@ class PrimitiveLibrary:
 
     def _known(self, sequence: Sequence[Key | None]) -> History:
         return [None if key is None else self[key].id for key in sequence]
+
+
+def _tree_node(node: tuple[int, int | None, int]) -> TreeNode:
+    return node if isinstance(node, TreeNode) else TreeNode(*node)
 
 
 def _is_store(path: Path) -> bool:

@@ -41,7 +41,7 @@ class GroupModels:
         self._config = config
         self._structure = structure
         self._kept: dict[int, tuple[tuple[_Members, _Members], Model]] = {}
-        self._variances = self._floor()
+        self._floor_of_bank = self._variances = np.zeros(0)
 
     def of(self, id: int) -> Model:
         """Return a node's model: of one chain, or of as many as it needs to be told apart.
@@ -52,9 +52,7 @@ class GroupModels:
         trajectory is nearest, both get another one, fitted to what the others leave unexplained
         [Kulic2008b].
         """
-        floor = self._floor()
-        if not np.array_equal(floor, self._variances):
-            self._kept, self._variances = {}, floor
+        self._floor()
         node = self._structure.nodes[id]
         neighbour = self._neighbour(node) if self._config.max_chains > 1 else None
         key = tuple(node.members), tuple(neighbour.members) if neighbour else ()
@@ -118,9 +116,15 @@ class GroupModels:
         return min(self._config.n_states, *(len(each) for each in frames))
 
     def _floor(self) -> FloatArray:
-        """Return the smallest variances: they change with the bank's, so that looking never does.
+        """Return the smallest variances; where they are others than before, forget all models.
 
-        What all motion varies by at the moment would make a model depend on when it was asked for.
+        They change with the bank's, so that looking never changes them: what all motion varies by
+        at the moment would make a model depend on when it was asked for.
         """
-        share = _FLOOR / self._config.variance_floor
-        return np.asarray(share**2 * self._structure.memory.bank.floor)
+        of_bank = self._structure.memory.bank.floor
+        if of_bank is not self._floor_of_bank:
+            floor = (_FLOOR / self._config.variance_floor) ** 2 * of_bank
+            if not np.array_equal(floor, self._variances):
+                self._kept, self._variances = {}, floor
+            self._floor_of_bank = of_bank
+        return self._variances

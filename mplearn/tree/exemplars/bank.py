@@ -55,6 +55,7 @@ class ExemplarBank:
 
     Attributes:
         distance: How far exemplars are apart.
+        floor: Those variances; another array takes their place, they are not written to.
     """
 
     def __init__(self, config: TreeConfig, n_channels: int, floor: FloatArray) -> None:
