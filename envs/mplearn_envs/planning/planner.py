@@ -38,7 +38,7 @@ from .stride import SAME_PLACE_M, SAME_YAW_RAD, left_from_right, left_share, rec
 
 GRID_DECIMALS = 6
 OUT_OF_REACH = 1e-3  # [m, rad]: an error that slowing down does not mend
-_TRIES = 6
+_TRIES, _MORE_TRIES = 6, 3
 _SLOWEST = 0.6  # of the pace is tried next, at least
 _ENOUGH_M = 1e-3  # a margin that falls short by less is enough
 
@@ -218,6 +218,11 @@ class Planner:
             if slower == pace:
                 break
             pace = slower
+            draft = self._drafter.draft(start, motion, pace)
+        for _ in range(_MORE_TRIES):  # at its velocity limits little tells what balance asks for
+            if self._sound(draft) or draft.error.max() > 10.0 * OUT_OF_REACH:
+                break
+            pace = pace._replace(speed=_SLOWEST * pace.speed)
             draft = self._drafter.draft(start, motion, pace)
         return draft, pace
 

@@ -210,6 +210,16 @@ def test_the_gap_between_soles_is_that_of_their_boundaries(x, y, one_yaw, other_
         assert distance < 0.01  # outlines cross, as neither sole has room in the other
 
 
+@pytest.mark.parametrize("speed", [0.5, 1.0])
+def test_who_rises_too_fast_is_slowed_until_he_stands(speed):
+    """Out of a deep squat joints and base are at their velocity limits, and soon in the air."""
+    frames = sweep({"base_height": -0.42, "base_pitch": 0.5}, {"base_height": 0.0}, 0.9)
+    motion = PLANNER.motion(frames, RATE_HZ)
+    low = FeasibilityCheck(PLANNER).posture(motion)
+    plan = PLANNER.plan(low, motion, speed)
+    assert plan.error.max() < 0.01 and plan.zmp_margin_m.min() > 0.013
+
+
 def test_who_sits_down_without_a_chair_leans_as_far_as_must_be():
     """Upright, ankles would have to bend too far; the depth is kept."""
     frames = sweep({}, {"base_height": -0.42}, 1.5)
