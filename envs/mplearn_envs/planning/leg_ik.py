@@ -146,7 +146,7 @@ def _aim(
         y += share * (pose.position[foot, 1] - y)
         low = min(max(1.5 - rise / LOW_M, 0.0), 1.0)
         other = ground[1 - side]
-        if wide:
+        if wide:  # the way of the leg is cleared, then blended with its place on the ground
             missing = _overlap(robot, side, x, y, rotation, other)
             missing -= (1.0 - share) * _overlap(robot, side, place[0], place[1], flat_there, other)
             aside = low * max(missing, 0.0) * (1.0 if side == 0 else -1.0)
