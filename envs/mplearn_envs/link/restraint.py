@@ -24,9 +24,10 @@ _ZMP_SHARE = 0.3  # of the way to the soles' edge that the zero-moment point may
 _TWIST_SHARE = 0.15  # of the soles' size: moment about the vertical per weight that friction takes
 _LIFT_SHARE = 0.3  # of the weight that may be added or taken away
 _LEG_SHARE = 0.8  # of their velocity limits that the legs may need
-_LEAP = 0.2  # most that a leg's angle in the posture of rest may differ from one to the next [rad]
+_WAY = (1 / 3, 2 / 3, 1.0)  # where on the way to rest the posture must balance, too
+_LEAP = 0.2  # most that a leg's angle may differ from one of these to the next [rad]
 _KNEE_SHARE = 0.5  # of the guard against straight knees that must be left
-_MISS = 2e-3  # how far feet, COG and base may miss in a posture that balances [m, rad]
+_MISS = 3e-4  # how far feet, COG and base may miss in a posture that balances [m, rad]
 _NEAR = 1e-4  # how near one tries to come: at a straight knee 1 mm is 0.1 rad
 _ITERATIONS = 10
 _SHARE_A_SECOND = 2.0  # how fast what is followed of a posture may grow back
@@ -40,8 +41,9 @@ class Restraint:
     that this stays within bounds, all in the same proportion, and they are never so large that
     braking within the same bounds would take longer than `BRAKE_S`.
 
-    Both the next posture and the one in which it could come to rest from there must be some that
-    the legs balance. First it moves towards what is wanted; where that fails, with the base going
+    The next posture, the one in which it could come to rest from there, and what lies between must
+    be some that the legs balance, the knees bent, each found from the one before: legs that balance
+    the end alone can be others than those that get there. First it moves towards what is wanted; where that fails, with the base going
     back towards standing while the arms go on; where that fails, it brakes, towards the last
     posture of rest that was found.
 
@@ -64,7 +66,7 @@ class Restraint:
         self.strongest = self._robot.velocity / RISE_S
         self.bounds = _bounds(robot)
         self.share = 1.0
-        self._q = self._q_stop = self._robot.rest
+        self._q = self._robot.rest
         legs = robot.leg_joints
         self._leg_step = _LEG_SHARE * robot.per_joint("velocity")[legs] * period_s
         self._knees = np.array([7 + robot.joint_names.index(name) for name in robot.knees])
@@ -132,10 +134,9 @@ class Restraint:
         if (stop != np.clip(stop, *self._robot.limits.T)).any():
             return False
         q = self._balanced(here, self._q, self._leg_step)
-        q_stop = None if q is None else self._balanced(stop, self._q_stop, _LEAP)
-        if q is None or q_stop is None:
+        if q is None or not self._can_rest(q, here, stop):
             return False
-        self._q, self._q_stop = q, q_stop
+        self._q = q
         self._here, self._velocity, self._momentum = here, velocity, momentum
         self._stop, self._brake_s = stop, brake_s
         return True
@@ -187,6 +188,14 @@ class Restraint:
         out = wanted.copy()
         out[:N_BASE] = self._rest[:N_BASE] + share * (wanted - self._rest)[:N_BASE]
         return out
+
+    def _can_rest(self, q: FloatArray, here: FloatArray, stop: FloatArray) -> bool:
+        """Return whether legs that balance ``here`` do so on the whole way to ``stop``."""
+        on_way: FloatArray | None = q
+        for share in _WAY:
+            if on_way is not None:
+                on_way = self._balanced(here + share * (stop - here), on_way, _LEAP)
+        return on_way is not None
 
     def _balanced(
         self, target: FloatArray, near: FloatArray, step: FloatArray | float
