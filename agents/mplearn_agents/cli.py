@@ -20,6 +20,7 @@ from typing import Any, NoReturn
 from mplearn.errors import InvalidValueError, MPLearnError
 from mplearn_agents.terminal.exit_codes import BAD_INPUT, INTERRUPTED
 from mplearn_agents.terminal.inert import inert_output
+from mplearn_agents.terminal.interrupts import interrupted
 
 from . import commands
 
@@ -56,12 +57,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     Args:
         argv: The command line without the program's name; None takes ``sys.argv``.
     """
-    with inert_output():
+    with inert_output(), interrupted() as came:
         try:
-            return _run(argv)
-        except KeyboardInterrupt:
-            print("mplearn: interrupted", file=sys.stderr)
-            return INTERRUPTED
+            code = _run(argv)
+        except BaseException:  # a library that is interrupted on the way in raises what it likes
+            if not came.is_set():
+                raise
+        else:
+            if not came.is_set():
+                return code
+        print("mplearn: interrupted", file=sys.stderr)
+        return INTERRUPTED
 
 
 def _run(argv: Sequence[str] | None) -> int:

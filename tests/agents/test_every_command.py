@@ -1,5 +1,7 @@
 """What every command owes: an example that parses, one line for bad values, inert names."""
 
+import contextlib
+import ctypes
 import io
 import json
 import os
@@ -15,6 +17,7 @@ import pytest
 from rich.table import Table
 
 from mplearn.library import PrimitiveLibrary
+from mplearn_agents import cli
 from mplearn_agents.cli import build_parser, command_modules, main
 from mplearn_agents.terminal import console as consoles
 from mplearn_agents.terminal.console import InertConsole
@@ -279,6 +282,20 @@ def test_the_doctor_says_what_to_do(capsys):
 def test_completion_knows_every_command(shell, capsys):
     code, out, _ = said(capsys, "completion", shell)
     assert code == 0 and all(command in out for command in COMMANDS)
+
+
+@pytest.mark.parametrize("error", [ImportError, ctypes.ArgumentError, SystemError, None])
+def test_an_interrupt_that_a_library_renames_or_swallows_is_one(monkeypatch, capsys, error):
+    def run(argv):
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        if error is not None:
+            raise error("initialization failed")
+        return 0
+
+    monkeypatch.setattr(cli, "_run", run)
+    assert main([]) == 130
+    assert capsys.readouterr().err == "mplearn: interrupted\n"
 
 
 def test_interrupted_there_is_no_traceback(library_file):

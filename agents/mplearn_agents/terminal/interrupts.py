@@ -12,6 +12,29 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 @contextmanager
+def interrupted() -> Iterator[threading.Event]:
+    """While this lasts, Ctrl-C raises `KeyboardInterrupt` and sets the event that it yields.
+
+    Libraries make another error of it while they are imported, or none: the event says what it was.
+    Outside the main thread it is never set.
+    """
+    came = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield came
+        return
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        came.set()
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, handle)
+    try:
+        yield came
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
 def asked_to_stop() -> Iterator[threading.Event]:
     """While this lasts, Ctrl-C and SIGTERM set the event that it yields.
 

@@ -161,7 +161,7 @@ def _as_vectors(archive: NPZFile, name: str, findings: Findings) -> FloatArray:
     values = _numbers(archive, name)
     width = int(np.prod(values.shape[1:]))
     if width and width % 9 == 0:
-        matrices = values.reshape(len(values), -1, 3, 3)
+        matrices = values.reshape(len(values), width // 9, 3, 3)
         seen = np.asarray(~np.isnan(matrices).any(axis=(2, 3)))
         known = matrices[seen]
         off = np.abs(np.einsum("nik,nil->nkl", known, known) - np.eye(3)).max(initial=0.0)
