@@ -43,9 +43,9 @@ class Restraint:
 
     The next posture, the one in which it could come to rest from there, and what lies between must
     be some that the legs balance, the knees bent, each found from the one before: legs that balance
-    the end alone can be others than those that get there. First it moves towards what is wanted; where that fails, with the base going
-    back towards standing while the arms go on; where that fails, it brakes, towards the last
-    posture of rest that was found.
+    the end alone can be others than those that get there. First it moves towards what is wanted;
+    where that fails, with the base going back towards standing while the arms go on; where that
+    fails, it brakes, towards the last posture of rest that was found.
 
     Args:
         robot: The robot.
