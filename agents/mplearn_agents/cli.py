@@ -60,6 +60,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     with inert_output(), interrupted() as came:
         try:
             code = _run(argv)
+        except KeyboardInterrupt:
+            pass
         except BaseException:  # a library that is interrupted on the way in raises what it likes
             if not came.is_set():
                 raise
