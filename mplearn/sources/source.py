@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
@@ -165,7 +165,7 @@ class Tally:
         return {k: n for k, n in vars(self).items() if n and k != "frames"}
 
 
-class Source(Closing, ABC):
+class Source(Closing):
     """A stream of motion, live.
 
     Iterating yields `Block` and `Change` as they come, and waits in between; it ends with the

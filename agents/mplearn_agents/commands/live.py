@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import signal
-import threading
 from pathlib import Path
 
 from mplearn.extras import require
@@ -50,9 +48,6 @@ def run(args: argparse.Namespace) -> None:
     """Serve the page until it is interrupted."""
     for module in ("starlette", "uvicorn", "websockets"):
         require(module, "ui")
-    if threading.current_thread() is threading.main_thread():
-        # asyncio takes Ctrl-C over from Python's own handler only
-        signal.signal(signal.SIGINT, signal.default_int_handler)
     from mplearn_agents.page.serve import serve
     from mplearn_agents.page.watching import Watch
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from mplearn.errors import InvalidValueError
 from mplearn.extras import require
+from mplearn_agents.terminal.interrupts import python_interrupts
 
 from .hub import Hub
 from .server import LONGEST_REQUEST, is_loopback, make_app
@@ -45,7 +46,7 @@ def serve(
         token = secrets.token_urlsafe(24)
     listening = listen(host, port)
     url = _address(host, listening.getsockname()[1], token)
-    with listening, suppress(KeyboardInterrupt):
+    with listening, suppress(KeyboardInterrupt), python_interrupts():
         asyncio.run(_serve(settings, listening, token, robot, lambda: ready(url)))
 
 

@@ -35,6 +35,22 @@ def interrupted() -> Iterator[threading.Event]:
 
 
 @contextmanager
+def python_interrupts() -> Iterator[None]:
+    """While this lasts, Ctrl-C goes to Python's own handler: asyncio takes it over from no other.
+
+    Outside the main thread nothing changes.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
 def asked_to_stop() -> Iterator[threading.Event]:
     """While this lasts, Ctrl-C and SIGTERM set the event that it yields.
 

@@ -9,6 +9,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from rich.table import Table
+    from rich.text import Text
     from rich.tree import Tree
 
     from mplearn.library import Primitive, PrimitiveLibrary
@@ -54,11 +55,8 @@ def transition_table(library: PrimitiveLibrary) -> Table:
         out = sorted(
             graph.out_edges(primitive.id, data=True), key=lambda e: (-e[2]["probability"], e[1])
         )
-        following = "; ".join(
-            f"{library[after].name} {100 * edge['probability']:.0f} %" for _, after, edge in out
-        )
-        nothing = Text("nothing was seen to follow", "dim")
-        table.add_row(Text(primitive.name), Text(following) if following else nothing)
+        following = [(library[after].name, edge["probability"]) for _, after, edge in out]
+        table.add_row(Text(primitive.name), _following(following))
     return table
 
 
@@ -78,13 +76,18 @@ def chain_table(library: PrimitiveLibrary) -> Table:
     for head, chain in merged.chains.items():
         if len(chain) > 1:
             after = sorted(graph.out_edges(head, data=True), key=lambda e: -e[2]["probability"])
-            following = "; ".join(
-                f"{names[next_head]} {100 * edge['probability']:.0f} %"
-                for _, next_head, edge in after
-            )
-            nothing = Text("nothing was seen to follow", "dim")
-            table.add_row(Text(names[head]), Text(following) if following else nothing)
+            following = [(names[next_head], edge["probability"]) for _, next_head, edge in after]
+            table.add_row(Text(names[head]), _following(following))
     return table
+
+
+def _following(following: Sequence[tuple[str, float]]) -> Text:
+    """Return what follows, by name, and how likely each is, in [0, 1], as it stands in a table."""
+    from rich.text import Text
+
+    if not following:
+        return Text("nothing was seen to follow", "dim")
+    return Text("; ".join(f"{name} {100 * probability:.0f} %" for name, probability in following))
 
 
 def primitive_tree(library: PrimitiveLibrary) -> Tree:

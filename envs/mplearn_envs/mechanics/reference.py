@@ -190,8 +190,7 @@ def sole_middles(
         ground: Where the feet stand: x, y [m] and yaw [rad], shape (..., 2, 3).
         heel: By how much their heels are raised, shape (..., 2) [rad]; None is not at all.
     """
-    corners = robot.corners if heel is None else bearing_corners(robot.corners, heel)
-    middle = corners.mean(axis=-2)[..., :2]
+    middle = _bearing(robot, heel).mean(axis=-2)
     turned = turn_in_plane(middle[..., 0], middle[..., 1], ground[..., 2])
     return np.asarray(ground[..., :2] + np.stack(turned, axis=-1))
 
@@ -206,7 +205,12 @@ def sole_outlines(
         ground: Where the feet stand: x, y [m] and yaw [rad], shape (..., 2, 3).
         heel: By how much their heels are raised, shape (..., 2) [rad]; None is not at all.
     """
-    corners = robot.corners if heel is None else bearing_corners(robot.corners, heel)
-    corners = corners[..., :2]
+    corners = _bearing(robot, heel)
     turned = turn_in_plane(corners[..., 0], corners[..., 1], ground[..., 2, None])
     return np.asarray(ground[..., None, :2] + np.stack(turned, axis=-1))
+
+
+def _bearing(robot: ReferenceRobot, heel: FloatArray | None) -> FloatArray:
+    """Return the corners, in the feet's frames, of what both soles bear on, (..., 2, 4, 2) [m]."""
+    corners = robot.corners if heel is None else bearing_corners(robot.corners, heel)
+    return corners[..., :2]

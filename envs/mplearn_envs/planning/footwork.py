@@ -155,6 +155,19 @@ def _lifts(gap: FloatArray, sure: FloatArray, skims: BoolArray, longest: int) ->
 
 
 @njit(cache=True)
+def take_posture(q: FloatArray, frame: FloatArray) -> None:
+    """Write the posture of a frame into a configuration; where it is and its yaw stay nought.
+
+    Args:
+        q: Configuration, shape (7 + J,): position [m], quaternion, joints [rad]; changed.
+        frame: Height [m], roll and pitch of the base and joints, shape (3 + J,) [rad].
+    """
+    q[2] = frame[0]
+    q[3], q[4], q[5], q[6] = yaw_roll_pitch_quaternion(0.0, frame[1], frame[2])
+    q[7:] = frame[3:]
+
+
+@njit(cache=True)
 def _feet(
     tree: MassTree, feet: IntArray, corners: FloatArray, frames: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -162,9 +175,7 @@ def _feet(
     heights, relative = np.full((frames.shape[0], 2), np.inf), np.empty((frames.shape[0], 3))
     q = np.zeros(4 + frames.shape[1])
     for t in range(frames.shape[0]):
-        q[2] = frames[t, 0]
-        q[3], q[4], q[5], q[6] = yaw_roll_pitch_quaternion(0.0, frames[t, 1], frames[t, 2])
-        q[7:] = frames[t, 3:]
+        take_posture(q, frames[t])
         pose = forward(tree, q)
         for side in range(2):
             foot = feet[side]

@@ -16,7 +16,7 @@ from numba import njit
 
 from mplearn.maths.easing import smooth_step
 from mplearn.maths.plane import turn_in_plane, wrap_angle
-from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix, yaw_roll_pitch_quaternion
+from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.mechanics.heels import raised_foot
 from mplearn_envs.mechanics.kinematics import MassTree, forward
@@ -30,6 +30,7 @@ from mplearn_envs.mechanics.reference import (
 from mplearn_envs.mechanics.velocity_ik import settle
 from mplearn_envs.robot import Robot
 
+from .footwork import take_posture
 from .stride import left_from_right
 
 OWN_M, OWN_RAD = 0.12, 0.45  # feet so near to their places side by side stand there
@@ -298,9 +299,7 @@ def _sole_ends(
     front, back = np.zeros((frames.shape[0], 2, 3)), np.zeros((frames.shape[0], 2, 3))
     q = np.zeros(4 + frames.shape[1])
     for t in range(frames.shape[0]):
-        q[2] = frames[t, 0]
-        q[3], q[4], q[5], q[6] = yaw_roll_pitch_quaternion(0.0, frames[t, 1], frames[t, 2])
-        q[7:] = frames[t, 3:]
+        take_posture(q, frames[t])
         pose = forward(tree, q)
         for side in range(2):
             foot = feet[side]
