@@ -229,6 +229,8 @@ class _Run:
             for k, shard in enumerate(plan.shards)
         ]
         self._journals = [ShardJournal(task.store) for task in self._tasks]
+        for journal in self._journals:
+            journal.abandoned()
         self._reports = [journal.report() for journal in self._journals]
         self._n_takes = len(takes) + len(unreadable)
         done = [*here.keys() & {n for r in self._reports for n in (*r.learned, *r.refused)}]
@@ -253,11 +255,12 @@ class _Run:
             self._reports[k] = report
             self._done.add(k)
 
-        def trace(k: int) -> int:
+        def died(k: int) -> int:
+            self._journals[k].abandoned()
             path = self._journals[k].path
             return path.stat().st_size if path.exists() else 0
 
-        self._all(learn_shard, [(task,) for task in self._tasks], done, trace)
+        self._all(learn_shard, [(task,) for task in self._tasks], done, died)
         for k, journal in enumerate(self._journals):
             journal.refresh()
             self._reports[k] = journal.report()
@@ -299,9 +302,12 @@ class _Run:
         work: Callable[..., T],
         tasks: Sequence[tuple[Any, ...]],
         done: Callable[[int, T], None],
-        trace: Callable[[int], int],
+        died: Callable[[int], int],
     ) -> None:
-        """Have all tasks done, those again whose worker died, and say how far it is meanwhile."""
+        """Have all tasks done, those again whose worker died, and say how far it is meanwhile.
+
+        ``died`` is told of the death, and returns a number that differs where anything was done.
+        """
         tries: Counter[tuple[int, int]] = Counter()
         running: dict[Future[T], int] = {}
         waiting = list(reversed(range(len(tasks))))
@@ -323,8 +329,9 @@ class _Run:
                     continue
                 if isinstance(error, MPLearnError):
                     raise error
-                tries[k, trace(k)] += 1
-                if tries[k, trace(k)] >= _TRIES:
+                trace = died(k)
+                tries[k, trace] += 1
+                if tries[k, trace] >= _TRIES:
                     raise CorpusError(
                         f"a worker died {_TRIES} times before it did anything: "
                         f"{type(error).__name__}: {error}"

@@ -80,7 +80,8 @@ class ShardJournal:
     """What was done of a shard, a line for each take, beside its store: others read it meanwhile.
 
     A take stands in it once its motion is in the store, so a take that stands here needs not be
-    read again.
+    read again. The last that was begun is in a worker's hands, until it is known to be dead
+    (`abandoned`); of every other that was begun and not ended, one died.
 
     Args:
         store: The store that it lies beside.
@@ -92,6 +93,7 @@ class ShardJournal:
         self._begun: Counter[str] = Counter()
         self._why: dict[str, str] = {}
         self._done: dict[str, dict[str, Any]] = {}
+        self._in_hand = False
         self.refresh()
 
     def refresh(self) -> None:
@@ -109,7 +111,8 @@ class ShardJournal:
                 entry = json.loads(line)
             except ValueError:  # torn by a death in the middle of a line
                 continue
-            if entry["what"] == "begun":
+            self._in_hand = entry["what"] == "begun"
+            if self._in_hand:
                 self._begun[entry["take"]] += 1
             elif entry["what"] == "stopped":
                 self._begun[entry["take"]] -= 1
@@ -118,6 +121,11 @@ class ShardJournal:
             else:
                 self._done[entry["take"]] = entry
                 self._begun[entry["take"]] -= entry["what"] != "left out"
+
+    def abandoned(self) -> None:
+        """Take note that no worker has the shard in hand: whoever began a take last is dead."""
+        self.refresh()
+        self._in_hand = False
 
     def is_done(self, take: str) -> bool:
         """Whether a take was learned, or refused."""
@@ -153,7 +161,7 @@ class ShardJournal:
             take_s=tuple(each["took_s"] for each in learned.values()),
             primitives=latest.get("primitives", 0),
             memory_bytes=max((each["memory"] for each in learned.values()), default=0),
-            deaths=sum(self._begun.values()),
+            deaths=sum(self._begun.values()) - self._in_hand,
         )
 
 

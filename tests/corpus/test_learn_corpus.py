@@ -5,12 +5,15 @@ import os
 import random
 import shutil
 import signal
+import tempfile
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 from corpus_folder import write_take
 from hypothesis import given
@@ -142,11 +145,12 @@ def test_what_kills_a_process_is_named_and_nothing_else_is_lost(
     shutil.copytree(folder, takes)
     for name in ("fault", "kill"):
         (takes / "cleo" / f"{name}.poison").write_text("x", encoding="utf-8")
-    killed, seen = [], []
+    killed, seen, deaths = [], [], []
 
     def kill(progress: Progress) -> None:
         """End a worker in the middle of its work, too."""
         seen.append(progress.learned)
+        deaths.append(progress.deaths)
         if not killed and progress.learned >= 1:
             worker = _writer_of(tmp_path / "s")
             if worker:
@@ -164,9 +168,80 @@ def test_what_kills_a_process_is_named_and_nothing_else_is_lost(
     assert "2 times: the process ended" in corpus.refused["cleo/kill"]
     assert "ZeroDivisionError: a fault of a reader" in corpus.refused["cleo/fault"]
     assert corpus.progress.deaths >= 4
+    assert deaths == sorted(deaths)
     assert corpus.progress.learned == 8
     assert all(report.memory_bytes > 1e6 for report in corpus.reports if report.learned)
     assert saved(corpus, tmp_path) == alone
+
+
+def test_a_take_that_a_worker_has_in_hand_killed_nobody(folder: Path, tmp_path: Path) -> None:
+    stops, deaths = StopsAfter(1), []
+
+    def show(progress: Progress) -> None:
+        deaths.append(progress.deaths)
+        stops(progress)
+
+    learn_corpus(folder, tmp_path / "s", jobs=1, show=show, stop=stops.stop)
+    assert len(deaths) > 1
+    assert not any(deaths)
+
+
+def test_a_command_that_is_killed_takes_its_workers_with_it_and_blames_no_take(
+    folder: Path, tmp_path: Path
+) -> None:
+    into, parent = (
+        tmp_path / "s",
+        multiprocessing.get_context("spawn").Process(
+            target=learn_corpus, args=(folder, tmp_path / "s"), kwargs={"jobs": 1}
+        ),
+    )
+    parent.start()
+    while not any('"begun"' in path.read_text() for path in into.glob("*.jsonl")):
+        parent.join(0.02)
+        assert parent.exitcode is None
+    worker = _writer_of(into)
+    parent.kill()
+    parent.join()
+    while _runs(worker):
+        time.sleep(0.05)
+    corpus = learn_corpus(folder, into, jobs=0)
+    assert corpus.progress.deaths == 0
+    assert corpus.progress.learned == 8
+
+
+def _runs(process: int) -> bool:
+    """Return whether a process that is no child of this one goes on."""
+    try:
+        return "zombie" not in psutil.Process(process).status()
+    except psutil.NoSuchProcess:
+        return False
+
+
+_LIVES = st.lists(st.sampled_from(["learned", "died", "stopped"]), max_size=8)
+
+
+@given(_LIVES, st.booleans())
+def test_a_death_counts_once_the_worker_is_known_to_be_dead(lives: list[str], now: bool) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        writer, reader = (ShardJournal(Path(folder) / "0000.db") for _ in range(2))
+        died = 0
+        for k, end in enumerate(lives):
+            writer.write("begun", f"{k}")
+            reader.refresh()
+            assert reader.report().deaths == died
+            if end == "died":
+                died += 1
+                if now:
+                    reader.abandoned()
+                    assert reader.report().deaths == died
+            else:
+                rest = {"keys": [], "watched_s": 1.0, "took_s": 1.0, "primitives": 1, "memory": 1}
+                writer.write(end, f"{k}", **(rest if end == "learned" else {}))
+        again = ShardJournal(writer.path.with_suffix(".db"))
+        again.abandoned()
+        assert again.report().deaths == died
+        reader.abandoned()
+        assert reader.report() == again.report()
 
 
 def test_what_came_since_is_learned_in_shards_of_its_own(tmp_path: Path) -> None:
