@@ -178,9 +178,6 @@ def _metres(value: float) -> str:
 
 
 def _robot(name: str) -> Robot:
-    from mplearn_envs.export import described_robot
     from mplearn_envs.robot import make_robot
 
-    if name.lower().endswith((".toml", ".xml")):
-        return described_robot(Path(name))
     return make_robot({"g1": "unitree_g1"}.get(name, name))

@@ -52,7 +52,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="show only arms, head and the trunk's turn, standing: the default where the robot can "
         "perform none of the motions whole",
     )
-    parser.add_argument("--robot", default="humanoid", help="humanoid (default) or unitree_g1")
+    parser.add_argument(
+        "--robot",
+        default="humanoid",
+        metavar="ROBOT",
+        help="humanoid (default), unitree_g1, or FILE.toml that describes a robot",
+    )
     parser.add_argument("--video", type=Path, metavar="FILE.mp4", help="write a film of it")
     parser.add_argument(
         "--balance",

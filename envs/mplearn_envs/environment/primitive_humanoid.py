@@ -140,7 +140,8 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
     Args:
         library: A `PrimitiveLibrary` or its file; None is the built-in one. Or what is live: a
             `MotionLearner`, or a function that returns a library.
-        robot: The robot, or its name; None is the humanoid.
+        robot: The robot, its name, or a TOML file that describes it (`make_robot`); None is the
+            humanoid.
         task: A `Task` or its name: "free", "goal", "follow" or "recite".
         dynamics: "simulated" or "kinematic".
         discount: Discount per second.

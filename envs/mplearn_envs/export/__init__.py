@@ -18,6 +18,5 @@ from .performing import perform as perform
 from .registry import format_of as format_of
 from .registry import formats as formats
 from .registry import register_format as register_format
-from .robot_file import described_robot as described_robot
 from .robot_model import RobotModel as RobotModel
 from .robot_model import robot_model as robot_model

@@ -12,7 +12,7 @@ import numpy as np
 from mplearn.errors import RobotError
 from mplearn.maths.rotations import quaternion_to_matrix
 from mplearn.recording import FloatArray, IntArray
-from mplearn_envs.robot import ROBOTS, Robot, make_robot
+from mplearn_envs.robot import Robot, make_robot
 
 if TYPE_CHECKING:
     import mujoco
@@ -289,7 +289,7 @@ class RobotModel:
 
 
 def robot_model(robot: str | Path | Robot) -> RobotModel:
-    """Return the model of a robot: one of a name, a description, or an MJCF file.
+    """Return the model of a robot: one of `make_robot`, or an MJCF file.
 
     Raises:
         InvalidValueError: There is none of that name.
@@ -302,7 +302,7 @@ def robot_model(robot: str | Path | Robot) -> RobotModel:
     """
     if isinstance(robot, Robot):
         return RobotModel.of(robot)
-    if isinstance(robot, Path) or (robot not in ROBOTS and str(robot).lower().endswith(".xml")):
+    if str(robot).lower().endswith(".xml"):
         return RobotModel.from_mjcf(robot)
     return RobotModel.of(make_robot(robot))
 

@@ -6,6 +6,7 @@ from .humanoid import humanoid as humanoid
 from .named import ROBOTS as ROBOTS
 from .named import make_robot as make_robot
 from .retarget import Retargeting as Retargeting
+from .robot_file import described_robot as described_robot
 from .roles import BASE_CHANNELS as BASE_CHANNELS
 from .roles import NEEDED_ROLES as NEEDED_ROLES
 from .roles import ROLES as ROLES

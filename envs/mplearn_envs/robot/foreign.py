@@ -20,6 +20,7 @@ from .feet import SOLES, below
 
 _LEVEL = 0.995  # least cosine between the floor and the foot of a robot at attention
 _HALF_SOLE_M = 0.01
+_ROTOR_S2 = 5e-4  # rotor inertia by torque limit [kg m^2 / (N m)], about as the humanoid's
 _NEARLY_RAD = 0.1  # so far from zero a hinge may stand at attention without being told
 
 
@@ -112,6 +113,8 @@ def add_soles(spec: Any, feet: tuple[str, str], name: str) -> None:
     boxes = [_sole_box(model, foot, name) for foot in feet]
     for geom in spec.geoms:
         geom.contype = geom.conaffinity = 0
+        if geom.name in SOLES:  # those names are for the boxes that are added here
+            geom.name = ""
     for foot, sole, (middle, half) in zip(feet, SOLES, boxes, strict=True):
         spec.body(foot).add_geom(
             name=sole,
@@ -155,12 +158,18 @@ def _sole_box(model: mujoco.MjModel, foot: str, name: str) -> tuple[FloatArray, 
 
 
 def add_servos(spec: Any, groups: tuple[JointGroup, ...]) -> None:
-    """Give each hinge its position servo, in the hinges' order."""
+    """Give each hinge its position servo, in the hinges' order.
+
+    A drive whose torque limit is not the model's own gets a rotor that fits it: full torque on a
+    part as light as a toe would throw it past its target within one period, to and fro.
+    """
     drives = {hinge: group for group in groups for hinge in group.names}
     for joint in spec.joints:
         if joint.type == mujoco.mjtJoint.mjJNT_FREE:
             continue
         drive = drives[joint.name]
+        if joint.actfrcrange[0] >= joint.actfrcrange[1]:
+            joint.armature = max(joint.armature, _ROTOR_S2 * drive.torque)
         joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
         servo = spec.add_actuator(
             name=joint.name,
@@ -184,11 +193,15 @@ def on_our_floor(spec: Any, name: str) -> str:
     for element in list(world):
         if element.tag != "body":
             world.remove(element)
-    used = {"floor", "tiles"}
+    around = [each for each in _child(ours, "worldbody") if each.tag != "body"]
+    taken = {(each.tag, each.get("name")) for each in around}
+    for element in world.iter():
+        if (element.tag, element.get("name")) in taken:
+            del element.attrib["name"]
     for element in _child(ours, "asset"):
-        if element.get("name") in used or element.get("type") == "skybox":
-            assets.append(_classless(element))
-    world.extend(_classless(each) for each in _child(ours, "worldbody") if each.tag != "body")
+        if element.get("name") in ("floor", "tiles") or element.get("type") == "skybox":
+            assets.append(_classless(_owned(element, "name", "texture")))
+    world.extend(_classless(_owned(each, "material")) for each in around)
     return ET.tostring(robot, encoding="unicode")
 
 
@@ -207,6 +220,14 @@ def compiled(spec: Any, name: str) -> mujoco.MjModel:
 def _child(element: ET.Element, tag: str) -> ET.Element:
     found = element.find(tag)
     return ET.SubElement(element, tag) if found is None else found
+
+
+def _owned(element: ET.Element, *attributes: str) -> ET.Element:
+    """Mark the names of our assets, for the robot may have some of the same name."""
+    for attribute in attributes:
+        if attribute in element.attrib:
+            element.set(attribute, f"mplearn {element.attrib[attribute]}")
+    return element
 
 
 def _classless(element: ET.Element) -> ET.Element:

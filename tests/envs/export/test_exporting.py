@@ -24,7 +24,6 @@ from mplearn_envs.export import (
     RobotModel,
     RobotMotion,
     check,
-    described_robot,
     export,
     format_of,
     formats,
@@ -34,7 +33,7 @@ from mplearn_envs.export import (
 )
 from mplearn_envs.export import registry as registry_module
 from mplearn_envs.mechanics.reference import reference_robot, rest_reference, soles
-from mplearn_envs.robot import humanoid
+from mplearn_envs.robot import described_robot, humanoid, make_robot
 from mplearn_envs.skills.skills import Skills
 
 
@@ -302,7 +301,8 @@ def test_any_mjcf_is_a_robot_by_a_file_that_describes_it(tmp_path: Path) -> None
     rows = "\n".join(f'{role} = "{role}"' for role in ROLES)
     described = tmp_path / "person.toml"
     described.write_text(f'name = "person"\nmjcf = "person.xml"\n[segments]\n{rows}\n', "utf-8")
-    robot = described_robot(described)
+    robot = make_robot(str(described))
+    assert robot == described_robot(described) == make_robot(described)
     done = perform(None, robot, ("bow down",))
     model = RobotModel.of(robot)
     (path,) = export(done.motions, model, format_of("mjlab"), tmp_path / "bow.npz")
@@ -311,6 +311,10 @@ def test_any_mjcf_is_a_robot_by_a_file_that_describes_it(tmp_path: Path) -> None
         ("[", "no TOML"),
         ('mjcf = "a.xml"', "segments"),
         ('mjcf = "a.xml"\n[segments]\npelvis = 3', "must name bodies"),
+        ('mjcf = "a.xml"\nsegments = 3', "must be tables"),
+        ('mjcf = "a.xml"\nattention = 3\n[segments]', "must be tables"),
+        ("mjcf = 3\n[segments]", "must be the name of a file"),
+        ('mjcf = "a.xml"\nattention = {a = nan}\n[segments]', "must hold angles"),
     ):
         described.write_text(text, "utf-8")
         with pytest.raises(RobotError, match=problem):

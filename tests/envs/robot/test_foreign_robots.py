@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from mplearn.body import features_of, human_body, posture_of, robot_body
 from mplearn.errors import MissingDependencyError, RobotError
+from mplearn_envs.execution.bodies import make_body
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.mechanics import reference_robot, rest_reference
 from mplearn_envs.planning import Planner
@@ -150,6 +151,36 @@ def test_toes_are_described_held_and_stood_on():
     assert not simulation.perform(hold).fallen
     at = [7 + robot.joint_names.index(name) for name in robot.toes]
     assert np.abs(simulation.data.qpos[at]).max() < 1e-3
+
+
+def test_our_own_humanoid_comes_back_with_actuated_toes():
+    """Its names are ours (soles, floor, light), its toes light: thrown off, they come to rest."""
+    text = humanoid().xml
+    for s in "lr":
+        toe = f'<joint name="toe_{s}" axis="0 1 0" range="-.9 .5"/>'
+        text = re.sub(rf'(<body name="toes_{s}"[^>]*>)', rf"\1{toe}", text)
+        text = text.replace("</actuator>", f'<motor name="t{s}" joint="toe_{s}"/></actuator>')
+    robot = Robot.from_mjcf(text, "toed", SEGMENTS)
+    assert robot.toes == ("toe_l", "toe_r")
+    assert set(robot.joint_names) - set(robot.toes) == set(humanoid().joint_names)
+    np.testing.assert_allclose(sole_corners(robot.model()), sole_corners(humanoid().model()))
+    simulation = Simulation(robot, body=make_body({"start_rad": 0.05}))
+    simulation.embody(1)
+    simulation.reset()
+    at = [7 + robot.joint_names.index(name) for name in robot.toes]
+    assert np.abs(simulation.data.qpos[at]).max() > 0.01
+    assert not simulation.perform(Planner(robot).hold(rest_reference(robot), 1.0)).fallen
+    assert np.abs(simulation.data.qpos[at]).max() < 1e-3
+
+
+def test_rotors_of_drives_that_the_model_limits_are_its_own():
+    text = biped().replace('name="knee_l"', 'name="knee_l" armature=".3"')
+    text = text.replace('name="knee_r"', 'name="knee_r" actuatorfrcrange="-90 90"')
+    robot = Robot.from_mjcf(text, "biped", BIPED_SEGMENTS)
+    torque = dict(zip(robot.joint_names, robot.per_joint("torque"), strict=True))
+    rotor = {name: float(robot.model().joint(name).armature[0]) for name in robot.joint_names}
+    assert rotor["knee_l"] == 0.3 and rotor["knee_r"] == 0.0 and torque["knee_r"] == 90.0
+    assert rotor["ankle_l"] == pytest.approx(5e-4 * torque["ankle_l"], rel=1e-5)
 
 
 def test_hinges_within_the_feet_and_soles_must_be_described():

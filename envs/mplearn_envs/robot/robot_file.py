@@ -16,10 +16,13 @@
 from __future__ import annotations
 
 import tomllib
+from math import isfinite
 from pathlib import Path
 
 from mplearn.errors import RobotError
-from mplearn_envs.robot import NEEDED_ROLES, Robot
+
+from .description import Robot
+from .roles import NEEDED_ROLES
 
 _KEYS = ("name", "mjcf", "segments", "attention")
 
@@ -47,10 +50,14 @@ def described_robot(path: Path) -> Robot:
     missing = sorted({"mjcf", "segments"} - set(content))
     if unknown or missing:
         raise RobotError(f"{path}: missing {missing}, unknown {unknown}; it may hold {_KEYS}")
+    if not isinstance(content["mjcf"], str):
+        raise RobotError(f"{path}: mjcf must be the name of a file, not {content['mjcf']!r}")
     segments, attention = content["segments"], content.get("attention", {})
+    if not isinstance(segments, dict) or not isinstance(attention, dict):
+        raise RobotError(f"{path}: [segments] and [attention] must be tables")
     if not all(isinstance(body, str) for body in segments.values()):
         raise RobotError(f"{path}: [segments] must name bodies")
-    if not all(isinstance(angle, int | float) for angle in attention.values()):
+    if not all(isinstance(a, int | float) and isfinite(a) for a in attention.values()):
         raise RobotError(f"{path}: [attention] must hold angles [rad]")
     name = str(content.get("name", path.stem))
     return Robot.from_mjcf(path.parent / content["mjcf"], name, segments, attention=attention)
