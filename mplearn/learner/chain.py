@@ -193,6 +193,7 @@ class Chain:
     def exchange(
         self,
         segments: Mapping[int, tuple[int, int]],
+        nearest: Mapping[int, tuple[int, int]],
         heirs: Mapping[int, int | None],
         moved: Mapping[int, int],
     ) -> None:
@@ -201,6 +202,7 @@ class Chain:
         Args:
             segments: Segments that the edit had made something else: what they are, if nothing else
                 came since, and what they were; -1 stands for no primitive.
+            nearest: The same of what they were nearest to.
             heirs: Primitives that are gone, and what has what came to them since.
             moved: Other segments by number, and the primitive that they are now.
         """
@@ -211,7 +213,11 @@ class Chain:
                 seen.primitive = was
             else:
                 seen.primitive = moved.get(seen.number, gone.get(seen.primitive, seen.primitive))
-            seen.nearest = gone.get(seen.nearest, seen.nearest)
+            now, was = nearest.get(seen.number, (-2, -2))
+            if now == (-1 if seen.nearest is None else seen.nearest):
+                seen.nearest = None if was < 0 else was
+            else:
+                seen.nearest = gone.get(seen.nearest, seen.nearest)
             if seen.primitive not in self.graph:
                 seen.primitive = None
 

@@ -316,12 +316,12 @@ class MotionLearner:
         Args:
             edit: What to take back: its ``before`` is put in the place of its ``after``.
         """
-        found = self.tree.exchange(edit.people.reversed())
-        self.graph.exchange(edit.graph.reversed(), found.heirs, self.tree.leaves)
-        segments = edit.segments
-        pairs = zip(segments.after.tolist(), segments.before.tolist(), strict=True)
-        was = dict(zip(segments.number.tolist(), pairs, strict=True))
-        self.chain.exchange(was, found.heirs, dict(found.moved))
+        back = edit.reversed()
+        found = self.tree.exchange(back.people)
+        self.graph.exchange(back.graph, found.heirs, self.tree.leaves)
+        nearest = {} if back.nearest is None else back.nearest.by_number()
+        segments = back.segments.by_number()
+        self.chain.exchange(segments, nearest, found.heirs, dict(found.moved))
         self._looking = None
         frozen = self._snapshots.frozen
         for each in edit.frozen_after:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
@@ -26,12 +26,12 @@ class Known(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SegmentsEdit(State):
-    """Segments that an edit made something else, shape (n,) each; -1 stands for no primitive.
+    """Segments of which an edit changed something, shape (n,) each; -1 stands for no primitive.
 
     Attributes:
         number: The segments.
-        before: What they were.
-        after: What they were then.
+        before: What it was.
+        after: What it was then.
     """
 
     number: Annotated[IntArray, Array("n", low=0)]
@@ -39,14 +39,16 @@ class SegmentsEdit(State):
     after: Annotated[IntArray, Array("n", low=-1)]
 
     @classmethod
-    def between(cls, before: ChainState, after: ChainState) -> SegmentsEdit:
-        """Return what differs between a chain of one moment and another."""
+    def between(
+        cls, before: ChainState, after: ChainState, what: Literal["primitive", "nearest"]
+    ) -> SegmentsEdit:
+        """Return what differs between a chain of one moment and another, in one respect."""
         old, new = (
             {
                 number: primitive
                 for block in state.segments
                 for number, primitive in zip(
-                    block.number.tolist(), block.primitive.tolist(), strict=True
+                    block.number.tolist(), getattr(block, what).tolist(), strict=True
                 )
             }
             for state in (before, after)
@@ -59,12 +61,25 @@ class SegmentsEdit(State):
         """Return the edit that undoes this one."""
         return SegmentsEdit(self.number, self.after, self.before)
 
+    def by_number(self) -> dict[int, tuple[int, int]]:
+        """Return what was before and after, by the number of the segment."""
+        pairs = zip(self.before.tolist(), self.after.tolist(), strict=True)
+        return dict(zip(self.number.tolist(), pairs, strict=True))
+
 
 @dataclass(frozen=True, eq=False)
 class LearnerEdit(State):
     """What an edit changed: in the trees, in the graph, and in what segments are.
 
     `MotionLearner.exchange` undoes it; it can do so long after, when much was learned since.
+
+    Attributes:
+        people: In the trees.
+        graph: In the graph.
+        segments: In what segments are.
+        frozen_before: Frozen primitives that were others then, or none.
+        frozen_after: What they were then.
+        nearest: In what segments were nearest to; None where that was not noted.
     """
 
     people: PeopleEdit
@@ -72,6 +87,7 @@ class LearnerEdit(State):
     segments: SegmentsEdit
     frozen_before: tuple[FrozenState, ...]
     frozen_after: tuple[FrozenState, ...]
+    nearest: SegmentsEdit | None = None
 
     @classmethod
     def between(cls, before: Known, after: Known) -> LearnerEdit:
@@ -79,9 +95,10 @@ class LearnerEdit(State):
         return cls(
             PeopleEdit.between(before.people, after.people),
             GraphEdit.between(before.graph, after.graph),
-            SegmentsEdit.between(before.chain, after.chain),
+            SegmentsEdit.between(before.chain, after.chain, "primitive"),
             tuple(each for each in before.frozen if each not in after.frozen),
             tuple(each for each in after.frozen if each not in before.frozen),
+            SegmentsEdit.between(before.chain, after.chain, "nearest"),
         )
 
     def reversed(self) -> LearnerEdit:
@@ -92,6 +109,7 @@ class LearnerEdit(State):
             self.segments.reversed(),
             self.frozen_after,
             self.frozen_before,
+            None if self.nearest is None else self.nearest.reversed(),
         )
 
     @property

@@ -60,15 +60,19 @@ class Snapshots:
         """
         if self._left is None:
             self._left = list(reversed(tree.leaves))
-        part = set(self._left[-_LOOKED_AT:]) & set(tree.leaves)
+        with tree.still():
+            return self._prepare(tree, self._left)
+
+    def _prepare(self, tree: PeopleTree, left: list[int]) -> bool:
+        part = set(left[-_LOOKED_AT:]) & set(tree.leaves)
         nodes = {node.id: node for node in tree.nodes if node.id in part}
-        for _ in range(min(len(self._left), _LOOKED_AT)):
-            id = self._left.pop()
+        for _ in range(min(len(left), _LOOKED_AT)):
+            id = left.pop()
             made = self._primitive(tree, nodes[id]) if id in nodes else None
             if made and (id not in self._made or self._made[id][1] is not made[1]):
                 self._made[id] = made
                 return False
-        if self._left:
+        if left:
             return False
         self._left = None
         return True
@@ -82,8 +86,9 @@ class Snapshots:
             tree: Its leaves become primitives.
             graph: Their transitions.
         """
-        nodes = {node.id: node for node in tree.nodes}
-        self._made = {id: self._primitive(tree, nodes[id]) for id in tree.leaves}
+        with tree.still():
+            nodes = {node.id: node for node in tree.nodes}
+            self._made = {id: self._primitive(tree, nodes[id]) for id in tree.leaves}
         self._nodes = {id: self._node(node) for id, node in nodes.items()}
         primitives = [
             replace(self.frozen[id].primitive, parent=made.parent) if id in self.frozen else made

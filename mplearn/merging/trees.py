@@ -93,6 +93,7 @@ def _renumbered(node: NodeState, n_before: int, new_id: Mapping[int, int]) -> No
         parent=None if node.parent is None else new_id[node.parent],
         members=node.members + n_before,
         settled=tuple(number + n_before for number in node.settled),
+        stood_for=tuple(each._replace(number=each.number + n_before) for each in node.stood_for),
         children=tuple(new_id[child] for child in node.children),
         apart=tuple(new_id[id] for id in node.apart if id in new_id),
     )

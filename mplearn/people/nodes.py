@@ -44,6 +44,7 @@ def nodes_of(
         node.n_placed += own.n_placed
         node.n_frames += own.n_frames
         node.born_at = min(node.born_at, own.born_at)
+        node.frozen |= own.frozen
         if leaf.id != leaf.primitive:
             nodes[leaf.id] = Node(
                 leaf.id,
@@ -54,6 +55,7 @@ def nodes_of(
                 own.n_placed,
                 own.n_frames,
                 history=list(own.history),
+                frozen=own.frozen,
             )
     for node in nodes.values():
         if node.parent is not None:

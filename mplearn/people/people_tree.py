@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 
 import numpy as np
 
@@ -111,6 +112,10 @@ class PeopleTree:
     def nodes(self) -> tuple[Node, ...]:
         """All nodes, the root first: primitives, and below them a leaf for each person."""
         return self._primitives.nodes
+
+    def still(self) -> AbstractContextManager[None]:
+        """While this lasts nothing changes: much can be asked of many primitives at little cost."""
+        return self._primitives.still()
 
     def node(self, id: int) -> Node:
         """Return a node.

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from operator import is_not
 from typing import Protocol
 
@@ -42,6 +43,9 @@ class Primitives(Protocol):
     @property
     def joined(self) -> Collection[int]:
         """Numbers of the segments in no leaf of their person that are in others' primitives."""
+
+    def still(self) -> AbstractContextManager[None]:
+        """While this lasts nothing changes: what is asked of many primitives is looked up once."""
 
     def node(self, id: int) -> Node:
         """Return a node."""
@@ -120,6 +124,10 @@ class OnePersonsPrimitives:
     def joined(self) -> Collection[int]:
         """Nothing: there are no others."""
         return ()
+
+    def still(self) -> AbstractContextManager[None]:
+        """Return nothing to be done: the tree knows its nodes by id."""
+        return nullcontext()
 
     def node(self, id: int) -> Node:
         """Return a node of the tree."""
@@ -201,6 +209,7 @@ class SharedPrimitives:
         self.sharing = sharing
         self._common = CommonRecogniser(sharing.config)
         self._models: dict[int, tuple[tuple[LeftRightHMM, ...], LeftRightHMM]] = {}
+        self._still: tuple[dict[int, list[Key]], dict[int, Node]] | None = None
 
     @property
     def next_id(self) -> int:
@@ -215,7 +224,7 @@ class SharedPrimitives:
     @property
     def nodes(self) -> tuple[Node, ...]:
         """All nodes, the root first: primitives, and below them a leaf for each person."""
-        return self.sharing.nodes
+        return self.sharing.nodes if self._still is None else tuple(self._still[1].values())
 
     @property
     def numbers(self) -> Mapping[int, Mapping[int, int]]:
@@ -227,19 +236,29 @@ class SharedPrimitives:
         """Numbers of the segments that are in another person's primitive."""
         return self.sharing.provisional.homes()
 
+    @contextmanager
+    def still(self) -> Iterator[None]:
+        """While this lasts nothing changes: leaves and nodes are gone through once."""
+        leaves: dict[int, list[Key]] = {}
+        for leaf in self.sharing.leaves:
+            for id in {leaf.id, leaf.primitive}:
+                leaves.setdefault(id, []).append(leaf.key)
+        before, self._still = self._still, (leaves, {node.id: node for node in self.sharing.nodes})
+        try:
+            yield
+        finally:
+            self._still = before
+
     def node(self, id: int) -> Node:
         """Return a node.
 
         Raises:
             UnknownPrimitiveError: There is none of this id.
         """
-        nodes = self.sharing.nodes
-        for node in nodes:
-            if node.id == id:
-                return node
-        raise UnknownPrimitiveError(
-            f"no node {id} in the tree; it holds {[node.id for node in nodes]}"
-        )
+        nodes = self._still[1] if self._still else {node.id: node for node in self.sharing.nodes}
+        if id not in nodes:
+            raise UnknownPrimitiveError(f"no node {id} in the tree; it holds {list(nodes)}")
+        return nodes[id]
 
     def radius(self, id: int) -> float:
         """Return the radius of a primitive's widest leaf."""
@@ -323,7 +342,10 @@ class SharedPrimitives:
 
     def _leaves_of(self, id: int) -> list[Key]:
         """Return the leaves of a primitive, or that one leaf, as person and id in its tree."""
-        found = [leaf.key for leaf in self.sharing.leaves_of(id)]
+        if self._still is not None:
+            found = self._still[0].get(id, [])
+        else:
+            found = [leaf.key for leaf in self.sharing.leaves_of(id)]
         if not found:
             raise UnknownPrimitiveError(f"no primitive {id}; known are {list(self.leaves)}")
         return found

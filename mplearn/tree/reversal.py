@@ -14,7 +14,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from ..recording import FloatArray
+from ..recording import FloatArray, IntArray
 from ..state import Array, State
 from .nodes.node import Node, NodeState
 from .nodes.search import mean_nearest
@@ -98,6 +98,7 @@ class _Reversal:
     def __init__(self, structure: Structure, edit: NodesEdit, when: int) -> None:
         self.structure, self.memory, self.when = structure, structure.memory, when
         self.floor = edit.floor
+        self.stood_for: Mapping[int, tuple[int, int]] = {}
         self.old = {node.id: node for node in edit.before}
         self.new = {node.id: node for node in edit.after}
         nodes = structure.nodes
@@ -120,10 +121,12 @@ class _Reversal:
         gained = {id: [n for n in nodes[id].members if n not in known] for id in sources}
         placed = self._gains(sources)
         homes = self._homes(gained)
+        shares = {id: self._shared(id, gained[id], homes, placed[id]) for id in sources}
+        self.stood_for = self._stood_for_since(sources)
         moved = self._restore(gained, homes)
         heirs = {id: self._heir(id, gained, homes) for id in self.ended}
-        for id in sources:
-            for home, (n, n_frames) in self._shared(id, gained[id], homes, placed[id]).items():
+        for shared in shares.values():
+            for home, (n, n_frames) in shared.items():
                 nodes[home].n_placed += n
                 nodes[home].n_frames += n_frames
         self._hang()
@@ -208,18 +211,47 @@ class _Reversal:
     def _shared(
         self, id: int, gained: Sequence[int], homes: Mapping[int, int], gain: tuple[int, int]
     ) -> dict[int, tuple[int, int]]:
-        """Return which leaf how many of the segments go to that came to a leaf since."""
-        votes = Counter(homes[n] for n in gained if n in homes)
-        if not votes and self.leaves:
-            votes = Counter({each: self.new[each].n_placed for each in self.leaves})
-        shares, (n, frames), total = {}, gain, sum(votes.values())
-        for at, (home, votes_of) in enumerate(sorted(votes.items())):
-            last = at == len(votes) - 1
-            share = votes_of / max(total, 1)
-            mine = (n, frames) if last else (round(share * n), round(share * frames))
-            total, n, frames = total - votes_of, n - mine[0], frames - mine[1]
-            shares[home] = mine
-        return shares
+        """Return which leaf how many of the segments, and frames, go to that came to a leaf since.
+
+        Each goes where the exemplar goes that is it, or stands for it.
+        """
+        node, then = self.structure.nodes[id], self.old.get(id)
+        votes = {home: np.zeros(2) for home in self.leaves}
+        for number in gained:
+            if number in homes:
+                votes[homes[number]] += self._weight(number, node.stood_for)
+        for home in self.leaves:
+            if then is None:
+                break
+            of_home = set(self.new[home].members.tolist())
+            stood_for = {number: of for number, *of in then.stood_for}
+            for number in of_home.intersection(node.members):
+                votes[home] += self._weight(number, node.stood_for)
+            for number, blob in then.exemplars():
+                if number in of_home:
+                    votes[home] -= 1, len(blob.array)
+                    votes[home] -= stood_for.get(number, (0, 0))
+        table = np.array([votes[home] for home in self.leaves]).reshape(-1, 2).clip(min=0.0)
+        if not table.any():
+            new = (self.new[home] for home in self.leaves)
+            table = np.array([(each.n_placed, each.n_frames) for each in new]).reshape(-1, 2)
+        shares = zip(_parts(gain[0], table[:, 0]), _parts(gain[1], table[:, 1]), strict=True)
+        return dict(zip(self.leaves, shares, strict=True))
+
+    def _weight(self, number: int, stood_for: Mapping[int, tuple[int, int]]) -> IntArray:
+        """Return how many segments, and frames, an exemplar is and stands for."""
+        n, n_frames = stood_for.get(number, (0, 0))
+        return np.array([1 + n, self.structure.length_of(number) + n_frames])
+
+    def _stood_for_since(self, sources: Sequence[int]) -> dict[int, tuple[int, int]]:
+        """Return what exemplars stand for of what came since."""
+        since = {}
+        for id in sources:
+            then = {n: of for n, *of in self.old[id].stood_for} if id in self.old else {}
+            for number, (n, n_frames) in self.structure.nodes[id].stood_for.items():
+                n_then, n_frames_then = then.get(number, (0, 0))
+                since[number] = max(n - n_then, 0), max(n_frames - n_frames_then, 0)
+        return since
 
     # ---- the nodes
 
@@ -274,7 +306,9 @@ class _Reversal:
             node.matrix = bank.matrix(node.members)
         for number in own:
             node.add(number, bank.distances(bank[number], node.members))
-        gone = node.thin(self.structure.config.max_exemplars)
+        for number in self.stood_for.keys() & set(node.members) if node.is_leaf else ():
+            node.stand_for(number, *self.stood_for[number])
+        gone = node.thin(self.structure.config.max_exemplars, self.structure.length_of)
         self.memory.release(*gone)
         node.settled.difference_update(gone)
 
@@ -316,6 +350,13 @@ class _Reversal:
                 self.memory.release(*nodes.pop(id).members)
         structure.reindex()
         structure.tune()
+
+
+def _parts(total: int, weights: FloatArray) -> list[int]:
+    """Return a whole number parted by weights."""
+    ends = np.round(total * np.cumsum(weights) / max(weights.sum(), 1.0)).astype(np.int64)
+    parts: list[int] = np.diff(ends, prepend=0).tolist()
+    return parts
 
 
 def _content(node: NodeState) -> tuple[object, ...]:

@@ -4,8 +4,9 @@ import pytest
 from test_people_editing import count, lasts, shared, sound
 from test_people_tree import BLOCKS, QUICK, RULES, D, Teacher, learn, meaning
 
-from mplearn.errors import InvalidValueError
+from mplearn.errors import InvalidValueError, UnknownPrimitiveError
 from mplearn.people import PeopleEdit, PeopleTree
+from mplearn.people.sharing import Sharing
 from mplearn.tree import ROOT
 
 
@@ -113,10 +114,35 @@ def test_others_came_since(name):
     assert again.state() == tree.state()
 
 
+def test_what_is_asked_of_many_primitives_at_once_is_looked_up_once(tree, monkeypatch):
+    def asked():
+        plain = [(n.id, n.parent, n.members, n.n_placed, n.frozen) for n in tree.nodes]
+        of = [
+            (id, tree.model(id), tree.n_placed(id), tree.radius(id), len(tree.exemplars(id)))
+            for id in (*tree.leaves, *tree.node(tree.leaves[0]).children)
+        ]
+        return plain, of
+
+    expected = asked()
+    monkeypatch.setattr(Sharing, "leaves_of", None)  # goes through all leaves
+    with tree.still():
+        assert asked() == expected
+        with pytest.raises(UnknownPrimitiveError, match="no primitive 99"):
+            tree.model(99)
+        with pytest.raises(UnknownPrimitiveError, match="no node 99"):
+            tree.node(99)
+    monkeypatch.undo()
+    tree.freeze(tree.leaves[0])
+    assert tree.node(tree.leaves[0]).frozen
+
+
 def test_a_frozen_primitive_of_several_stays_what_it_is(tree, learned):
     teacher = learned[2]
     id = shared(tree)
+    assert not tree.node(id).frozen
     tree.freeze(id)
+    for each in (id, *tree.node(id).children):
+        assert tree.node(each).frozen
     before = look(tree)[0]
     own = {each.key for each in tree.sharing().leaves_of(id)}
     for i in range(60):

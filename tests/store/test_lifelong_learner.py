@@ -72,12 +72,14 @@ def test_undo_restores_the_library_to_the_bit_and_redo_does_it_again(
 ) -> None:
     life = life_of(taught)
     before, knew = life.snapshot().version, life.learner.graph.state()
+    saw = life.learner.chain.state()
     life.execute(command, by="Anna")
     after, knows = life.snapshot().version, life.learner.graph.state()
     assert (before == after) == isinstance(command, (Freeze, Note))
     life.undo(by="Ben")
     assert life.snapshot().version == before
     assert life.learner.graph.state() == knew
+    assert life.learner.chain.state() == saw
     resumed(life)
     life.redo(by="Ben")
     assert life.snapshot().version == after
@@ -108,7 +110,7 @@ def test_what_was_learned_since_stays_when_a_command_is_undone(
     }
     for id in life.learner.tree.leaves:  # the four motions are far apart: each got its own back
         mine, theirs = (each.learner.tree.node(id) for each in (life, untouched))
-        assert mine.n_placed == theirs.n_placed
+        assert (mine.n_placed, mine.n_frames) == (theirs.n_placed, theirs.n_frames)
         assert {motions[n] for n in mine.members} == {id}
         assert max(mine.members) >= n_before
     twin = resumed(life)

@@ -114,6 +114,33 @@ def test_what_was_removed_and_learned_anew_comes_back_once(then):
     whole(tree)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_what_came_to_a_merged_primitive_is_counted_where_it_belongs_when_that_is_undone(seed):
+    """However few exemplars it kept of all that came, and however uneven that was."""
+    tree, motions, home = learned(max_exemplars=8, seed=seed)
+    first, second = sorted((home[0], home[1]))
+    motion = {id: m for m, id in home.items()}
+    expected = {id: (tree.node(id).n_placed, tree.node(id).n_frames) for id in (first, second)}
+    before = tree.state().nodes
+    tree.merge(first, second)
+    edit = NodesEdit.between(before, tree.state().nodes, tree.bank.floor.copy())
+    for id in [first] * 40 + [second] * 3 + [first] * 20:
+        frames = motions.perform(motion[id])
+        placement = tree.insert(frames)
+        assert placement.node_id != second and not placement.splits
+        n_placed, n_frames = expected[id]
+        if placement.node_id == first:
+            expected[id] = n_placed + 1, n_frames + len(frames)
+    assert sum(n for n, _ in expected.values()) == tree.node(first).n_placed > 50
+    tree.exchange(edit.reversed())
+    for id, counts in expected.items():
+        assert (tree.node(id).n_placed, tree.node(id).n_frames) == counts
+    whole(tree)
+    tree.exchange(edit)
+    assert tree.node(first).n_placed == sum(n for n, _ in expected.values())
+    whole(tree)
+
+
 def test_what_two_primitives_hold_is_let_go_by_both_at_once():
     memory = SegmentMemory(TreeConfig(n_sampled=3), np.zeros(D, np.int64))
     for number in range(4):

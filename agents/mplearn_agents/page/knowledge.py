@@ -22,18 +22,19 @@ def knowledge(library: PrimitiveLibrary, tree: PeopleTree) -> Header:
     """
     confirmed = tree.config.confirmed
     primitives = []
-    for each in library.primitives:
-        shown = tree.n_placed(each.id)
-        primitives.append(
-            {
-                "id": each.id,
-                "name": each.name,
-                "n": shown,
-                "of": confirmed if shown < confirmed else 0,
-                "frozen": tree.node(each.id).frozen,
-                "duration_s": round(each.mean_duration_s, 3),
-            }
-        )
+    with tree.still():
+        for each in library.primitives:
+            node = tree.node(each.id)
+            primitives.append(
+                {
+                    "id": each.id,
+                    "name": each.name,
+                    "n": node.n_placed,
+                    "of": confirmed if node.n_placed < confirmed else 0,
+                    "frozen": node.frozen,
+                    "duration_s": round(each.mean_duration_s, 3),
+                }
+            )
     return {
         "kind": "knowledge",
         "primitives": primitives,

@@ -4,16 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from ...recording import FloatArray, IntArray
-from ...state import Array, Blob, Count, SharedState, require
+from ...state import Array, Blob, Count, SharedState, newer, require
 from ..exemplars.spread import without
 from .clustering import most_redundant
 
 Happening: TypeAlias = Literal["born", "split", "merged", "moved", "undone"]
+
+
+class StoodFor(NamedTuple):
+    """What one exemplar of a full node stands for, besides itself.
+
+    Attributes:
+        number: The exemplar.
+        n: Segments that went, and were nearest to it.
+        n_frames: Frames of those.
+    """
+
+    number: Count
+    n: Count
+    n_frames: Count
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +52,7 @@ class NodeState(SharedState):
     whole: bool
     apart: tuple[Count, ...]
     frozen: bool = False
+    stood_for: tuple[StoodFor, ...] = newer((), absent=())
 
     def exemplars(self) -> Iterator[tuple[int, Blob]]:
         """Go through the numbers and frames of the exemplars."""
@@ -49,7 +64,11 @@ class NodeState(SharedState):
         require(len(members) == len(self.members), "members", "must differ")
         require(len(set(self.children)) == len(self.children), "children", "must differ")
         require(len(self.frames) == len(members), "frames", f"must be {len(members)} segments")
-        require(members.issuperset(self.settled), "settled", f"must be among {sorted(members)}")
+        for name, numbers in (
+            ("settled", self.settled),
+            ("stood_for", [each.number for each in self.stood_for]),
+        ):
+            require(members.issuperset(numbers), name, f"must be among {sorted(members)}")
         require(np.array_equal(self.matrix, self.matrix.T), "matrix", "must be symmetric")
 
 
@@ -72,6 +91,7 @@ class Node:
         whole: Whether a person said that it is one motion: the rules never split it.
         apart: Ids of leaves that a person said are other motions: the rules never merge them.
         frozen: Whether a person said that it is to stay as it is: nothing changes its exemplars.
+        stood_for: Segments and frames that went for want of room, by the exemplar nearest to them.
     """
 
     id: int
@@ -87,6 +107,7 @@ class Node:
     whole: bool = False
     apart: set[int] = field(default_factory=set)
     frozen: bool = False
+    stood_for: dict[int, tuple[int, int]] = field(default_factory=dict)
     _kept: tuple[tuple[Any, ...], NodeState] | None = field(default=None, repr=False, compare=False)
 
     @property
@@ -118,14 +139,34 @@ class Node:
         gone = [self.members[i] for i in positions]
         self.members = [m for i, m in enumerate(self.members) if i not in set(positions)]
         self.matrix = without(self.matrix, positions)
+        for number in gone:
+            self.stood_for.pop(number, None)
         return gone
 
-    def thin(self, most: int) -> list[int]:
-        """Let the least informative exemplars go until ``most`` are left; return their numbers."""
+    def thin(self, most: int, length_of: Callable[[int], int]) -> list[int]:
+        """Let the least informative exemplars go until ``most`` are left; return their numbers.
+
+        Those that are nearest to them stand for them from then on.
+
+        Args:
+            most: How many may be left, at least one.
+            length_of: Returns the frames of an exemplar, by its number.
+        """
         gone: list[int] = []
         while len(self.members) > most:
-            gone += self.remove([most_redundant(self.matrix)])
+            at = most_redundant(self.matrix)
+            others = self.matrix[at].copy()
+            others[at] = np.inf
+            nearest = self.members[int(others.argmin())]
+            stood_for = self.stood_for.get(self.members[at], (0, 0))
+            gone += self.remove([at])
+            self.stand_for(nearest, 1 + stood_for[0], length_of(gone[-1]) + stood_for[1])
         return gone
+
+    def stand_for(self, number: int, n: int, n_frames: int) -> None:
+        """Let an exemplar stand for so many segments, and frames, more."""
+        known = self.stood_for.get(number, (0, 0))
+        self.stood_for[number] = known[0] + n, known[1] + n_frames
 
     def state(self, blob_of: Callable[[int], Blob]) -> NodeState:
         """Return everything, with the exemplars: the same object as long as nothing has changed.
@@ -150,6 +191,7 @@ class Node:
                 whole=self.whole,
                 apart=tuple(sorted(self.apart)),
                 frozen=self.frozen,
+                stood_for=tuple(StoodFor(n, *of) for n, of in sorted(self.stood_for.items())),
             )
             self._kept = now, state
         return self._kept[1]
@@ -171,6 +213,7 @@ class Node:
             whole=state.whole,
             apart=set(state.apart),
             frozen=state.frozen,
+            stood_for={number: (n, n_frames) for number, n, n_frames in state.stood_for},
         )
         node._kept = node._plain(), state
         return node
@@ -181,4 +224,5 @@ class Node:
             *(self.parent, self.born_at, self.n_placed, self.n_frames, self.whole, self.frozen),
             *(tuple(self.members), tuple(self.children), tuple(self.history)),
             *(tuple(sorted(self.settled)), tuple(sorted(self.apart))),
+            tuple(sorted(self.stood_for.items())),
         )

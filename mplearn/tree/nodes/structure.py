@@ -60,6 +60,10 @@ class Structure:
         """Let radii follow the scale of all motion."""
         self.index.limit = self.config.reach_limit * self.memory.scale()
 
+    def length_of(self, number: int) -> int:
+        """Return the frames of a segment that is held."""
+        return len(self.memory.frames[number])
+
     @property
     def groups(self) -> dict[int, Sequence[int]]:
         """Numbers of the segments in each node."""
@@ -89,7 +93,7 @@ class Structure:
         bank = self.memory.bank
         node.add(number, bank.distances(bank[number], node.members))
         node.n_placed += 1
-        node.n_frames += len(self.memory.frames[number])
+        node.n_frames += self.length_of(number)
         self.memory.hold(number)
         if node.id == ROOT:
             excess = len(node.members) - self.config.max_unplaced
@@ -106,7 +110,7 @@ class Structure:
         child.members = list(members)
         child.matrix = parent.matrix[np.ix_(places, places)]
         child.n_placed = len(members)
-        child.n_frames = sum(len(self.memory.frames[number]) for number in members)
+        child.n_frames = sum(map(self.length_of, members))
         self.memory.hold(*members)
         if parent.id == ROOT:
             self.memory.release(*parent.remove(places))
@@ -129,7 +133,7 @@ class Structure:
         """Move exemplars of a leaf to those that wait in the root."""
         leaf.remove([leaf.members.index(number) for number in numbers])
         leaf.n_placed -= len(numbers)
-        leaf.n_frames -= sum(len(self.memory.frames[number]) for number in numbers)
+        leaf.n_frames -= sum(map(self.length_of, numbers))
         for number in numbers:
             self.add(self.root, number)
         self.memory.release(*numbers)
@@ -146,6 +150,7 @@ class Structure:
             child = self.child(leaf, group, when)
             child.n_placed = max(len(group), round(len(group) / n_kept * leaf.n_placed))
             child.n_frames = round(leaf.n_frames / leaf.n_placed * child.n_placed)
+            child.stood_for = {n: of for n, of in leaf.stood_for.items() if n in child.members}
             born.append(child.id)
             moved += [(number, child.id) for number in group]
         return Change(tuple(born), (Split(leaf.id, tuple(born)),), moved=tuple(moved))
@@ -155,7 +160,9 @@ class Structure:
         older.matrix = joint
         older.members += younger.members
         twice = [i for i, n in enumerate(older.members) if n in older.members[:i]]
+        stood_for = younger.stood_for | older.stood_for
         self.memory.release(*older.remove(twice))  # in both since something was undone
+        older.stood_for = stood_for
         older.n_placed += younger.n_placed
         older.n_frames += younger.n_frames
         older.history.append(("merged", when))
@@ -236,6 +243,6 @@ class Structure:
         return change.then(self._tidy(above, when))
 
     def _thin(self, node: Node) -> None:
-        gone = node.thin(self.config.max_exemplars)
+        gone = node.thin(self.config.max_exemplars, self.length_of)
         node.settled.difference_update(gone)
         self.memory.release(*gone)
