@@ -9,8 +9,7 @@ from mplearn import LearnerConfig, MotionLearner, Segment
 from mplearn.demonstrator import demonstrate
 from mplearn.errors import FrameError
 from mplearn.recording import FloatArray
-from mplearn.segmentation import SEGMENTERS, Segmenter
-from mplearn.segmentation.base import SegmenterState
+from mplearn.segmentation import Segmenter, SegmenterState, register_segmenter
 
 
 class EverySecond(Segmenter):
@@ -43,7 +42,7 @@ class EverySecond(Segmenter):
         """A clock needs no hints."""
 
 
-SEGMENTERS["every second"] = EverySecond
+register_segmenter("every second", EverySecond)
 
 recording = demonstrate(["BAD", "BAU"] * 8, seed=1).recording
 for name in ("kohlmorgen-lemm", "every second"):

@@ -1,5 +1,8 @@
 """Recordings of human motion from files, and markers followed through their gaps."""
 
+from .files import bad_file as bad_file
+from .files import read_text as read_text
+from .findings import Findings as Findings
 from .gaps import GapConfig as GapConfig
 from .gaps import GapTracker as GapTracker
 from .joining import join_by_name as join_by_name
@@ -16,6 +19,8 @@ from .options import command_line as command_line
 from .people import each_person as each_person
 from .placing.size import UNITS_M as UNITS_M
 from .placing.size import named_unit as named_unit
+from .placing.space import Space as Space
+from .placing.space import placed as placed
 from .reader import DIRECTIONS as DIRECTIONS
 from .reader import Hints as Hints
 from .reader import Reader as Reader

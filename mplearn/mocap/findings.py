@@ -12,6 +12,13 @@ class Findings:
 
     Args:
         format: Name of the dialect.
+
+    Example:
+        >>> findings = Findings("shouts")
+        >>> findings.leave_out(["echo"])
+        >>> report = findings.report(25.0)
+        >>> report.format, report.left_out
+        ('shouts', ('echo',))
     """
 
     def __init__(self, format: str) -> None:

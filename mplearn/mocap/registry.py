@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from functools import cache
-from importlib.metadata import entry_points
 from pathlib import Path
 
 from ..errors import InvalidValueError, RecordingError
+from ..plugins import join_installed
 from .files import bad_file, is_file, suffix
 from .reader import Reader
 
@@ -76,10 +76,4 @@ def reader_for(path: Path) -> Reader:
 
 @cache
 def _load_entry_points() -> None:
-    for point in entry_points(group=ENTRY_POINTS):
-        try:
-            register_reader(point.load()())
-        except Exception as error:
-            raise RecordingError(
-                f"the reader {point.name!r} of an installed package cannot be loaded: {error!r}"
-            ) from error
+    join_installed(ENTRY_POINTS, lambda _, made: register_reader(made()), RecordingError)

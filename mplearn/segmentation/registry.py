@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 from ..errors import InvalidValueError
+from ..plugins import join_installed
 from .base import Segmenter
 from .kinematic_centroid import KinematicCentroid
 from .kohlmorgen_lemm import KohlmorgenLemm, KohlmorgenLemmConfig
 from .zero_velocity import ZeroVelocity
+
+ENTRY_POINTS = "mplearn.segmenters"
+"""Group of the entry points by which an installed package brings segmenters of its own."""
 
 SEGMENTERS: dict[str, Callable[[int, float], Segmenter]] = {
     "kinematic-centroid": KinematicCentroid,
@@ -20,11 +25,25 @@ SEGMENTERS: dict[str, Callable[[int, float], Segmenter]] = {
 }
 
 
+def register_segmenter(name: str, make: Callable[[int, float], Segmenter]) -> None:
+    """Let `LearnerConfig.segmenter` and ``--segmenter`` name a segmenter of one's own.
+
+    Args:
+        name: Its name.
+        make: Called with the width of a frame and the rate [1/s]; a class will do.
+
+    Raises:
+        InvalidValueError: The name is taken by another.
+    """
+    if SEGMENTERS.setdefault(name, make) is not make:
+        raise InvalidValueError(f"there is a segmenter {name!r} already")
+
+
 def make_segmenter(name: str, n_channels: int, rate_hz: float) -> Segmenter:
     """Build a segmenter with its default settings.
 
     Args:
-        name: One of `SEGMENTERS`.
+        name: One of `SEGMENTERS`, or of those that were registered.
         n_channels: Width D of a frame.
         rate_hz: Frames per second [1/s].
 
@@ -40,6 +59,15 @@ def make_segmenter(name: str, n_channels: int, rate_hz: float) -> Segmenter:
         >>> len(found) >= 5
         True
     """
+    _load_entry_points()
     if name not in SEGMENTERS:
-        raise InvalidValueError(f"segmenter must be one of {sorted(SEGMENTERS)}, not {name!r}")
+        raise InvalidValueError(
+            f"segmenter must be one of {sorted(SEGMENTERS)} (register_segmenter adds one), "
+            f"not {name!r}"
+        )
     return SEGMENTERS[name](n_channels, rate_hz)
+
+
+@cache
+def _load_entry_points() -> None:
+    join_installed(ENTRY_POINTS, register_segmenter)

@@ -7,11 +7,11 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.metadata import entry_points
 from typing import Any, Literal, TypeAlias, get_args
 
-from ..errors import InvalidValueError, MPLearnError
+from ..errors import InvalidValueError
 from ..mocap import Hints
+from ..plugins import join_installed
 from .source import Source
 
 ENTRY_POINTS = "mplearn.sources"
@@ -95,10 +95,4 @@ def connect(name: str, wanted: Wanted | None = None, **options: Any) -> Source:
 
 @cache
 def _load_entry_points() -> None:
-    for point in entry_points(group=ENTRY_POINTS):
-        try:
-            register_source(point.name, point.load())
-        except Exception as error:
-            raise MPLearnError(
-                f"the source {point.name!r} of an installed package cannot be loaded: {error!r}"
-            ) from error
+    join_installed(ENTRY_POINTS, register_source)

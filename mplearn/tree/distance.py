@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from numba import njit
 
 from ..errors import InvalidValueError
 from ..hmm.kernels import log_likelihood
+from ..plugins import join_installed
 from ..recording import FloatArray, IntArray
 from .config import TreeConfig
 
@@ -128,6 +130,9 @@ class MonteCarloDistance(Distance):
         return _monte_carlo(exemplar, others, rows, weights, self._moves, noise)
 
 
+ENTRY_POINTS = "mplearn.distances"
+"""Group of the entry points by which an installed package brings distances of its own."""
+
 #: Distances by the name that `TreeConfig.distance` gives; see `register_distance`.
 _KINDS: dict[str, Callable[[TreeConfig], Distance]] = {
     "likelihood": LikelihoodDistance,
@@ -138,7 +143,8 @@ _KINDS: dict[str, Callable[[TreeConfig], Distance]] = {
 def register_distance(name: str, kind: Callable[[TreeConfig], Distance]) -> None:
     """Let `TreeConfig.distance` name a distance of one's own.
 
-    A library that was learned by it needs it registered where the library is opened.
+    A library that was learned by it needs it registered where the library is opened: by this, or
+    by an entry point of the group ``mplearn.distances`` of an installed package.
 
     Raises:
         InvalidValueError: The name is taken by another.
@@ -153,12 +159,18 @@ def make_distance(config: TreeConfig) -> Distance:
     Raises:
         InvalidValueError: There is none of that name.
     """
+    _load_entry_points()
     if config.distance not in _KINDS:
         raise InvalidValueError(
             f"no distance {config.distance!r}; there are {', '.join(_KINDS)} "
             "(register_distance adds one)"
         )
     return _KINDS[config.distance](config)
+
+
+@cache
+def _load_entry_points() -> None:
+    join_installed(ENTRY_POINTS, register_distance)
 
 
 class _Chain(NamedTuple):

@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mocap_writers import WRITERS, write, zipped
 
+from mplearn import plugins
 from mplearn.errors import (
     InvalidValueError,
     MPLearnError,
@@ -123,7 +124,7 @@ def test_an_installed_package_brings_readers_of_its_own(
 
     point = Point()
     point.brings = QuietReader
-    monkeypatch.setattr(registry, "entry_points", lambda group: [point])
+    monkeypatch.setattr(plugins, "entry_points", lambda group: [point])
     registry._load_entry_points.cache_clear()
     (tmp_path / "a.quiet").write_text("1\n2\n")
     report = open_recording(tmp_path / "a.quiet").report

@@ -45,7 +45,7 @@ class ObservationBuilder:
             "support_margin": np.full(1, 10.0),
         }
         self._low = {key: -high for key, high in self._high.items()}
-        self._shows_task = task is not None
+        self._task = task
         parts: dict[str, spaces.Space[Any]] = {
             key: spaces.Box(self._low[key], high, dtype=np.float64)
             for key, high in self._high.items()
@@ -69,7 +69,7 @@ class ObservationBuilder:
             measured: How the robot stands.
             slot: Slot that was performed last.
             choices: What may be done next.
-            task: What the task shows.
+            task: What the task shows; it becomes of the kind of number that its bounds have.
         """
         seen: dict[str, Any] = {}
         for key, low in self._low.items():
@@ -77,8 +77,8 @@ class ObservationBuilder:
         seen["current_primitive"] = np.int64(slot)
         seen["action_mask"] = choices.mask_at(self._n_speeds)
         seen["transition_prior"] = choices.prior_at(self._n_speeds)
-        if self._shows_task:
-            seen["task"] = task
+        if self._task is not None:
+            seen["task"] = np.array(task, dtype=self._task.dtype)
         if not self._flat:
             return seen
         one_hot = np.zeros(self._capacity)

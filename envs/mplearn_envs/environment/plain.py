@@ -42,11 +42,13 @@ class PlainSpec:
         if spec is not None:
             spec = copy.copy(spec)
             spec.kwargs = to_plain(spec.kwargs)
-            library, task = spec.kwargs.get("library"), spec.kwargs.get("task")
+            library, task, robot = (spec.kwargs.get(key) for key in ("library", "task", "robot"))
             if isinstance(library, str):
                 spec.kwargs["library"] = str(Path(library).absolute())
             if isinstance(task, str) and ".py:" in task:
                 spec.kwargs["task"] = str(Path(task).absolute())
+            if isinstance(robot, str) and robot.lower().endswith(".toml"):
+                spec.kwargs["robot"] = str(Path(robot).absolute())
             spec.max_episode_steps = spec.kwargs.get("max_episode_steps", spec.max_episode_steps)
         self._spec = spec
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from functools import cache
-from importlib.metadata import entry_points
 from pathlib import Path
 
-from mplearn.errors import InvalidValueError, MPLearnError, RecordingError
+from mplearn.errors import InvalidValueError, RecordingError
+from mplearn.plugins import join_installed
 
 from .format import Format
 
@@ -70,10 +70,4 @@ def recognised(path: Path) -> Format:
 
 @cache
 def _load_entry_points() -> None:
-    for point in entry_points(group=ENTRY_POINTS):
-        try:
-            register_format(point.load()())
-        except Exception as error:
-            raise MPLearnError(
-                f"the format {point.name!r} of an installed package cannot be loaded: {error!r}"
-            ) from error
+    join_installed(ENTRY_POINTS, lambda _, made: register_format(made()))

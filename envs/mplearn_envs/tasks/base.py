@@ -96,7 +96,7 @@ class Task(ABC):
         return
 
     def observe(self) -> FloatArray:
-        """Return what must be known to solve the task, a fresh array within the bounds of `space`.
+        """Return what must be known to solve the task, an array within the bounds of `space`.
 
         It becomes the ``task`` of the observation.
         """

@@ -117,6 +117,14 @@ def placed(
 
     Raises:
         RecordingError: No person can be meant by the points.
+
+    Example:
+        >>> points = np.array([[[0.0, 1700.0, 30.0], [80.0, 960.0, 0.0], [90.0, 80.0, 20.0]]])
+        >>> names, findings = ("head", "hip", "ankle"), Findings("ours")
+        >>> space = Space(0.001, "y", "z")  # millimetres, y up, z ahead
+        >>> at = placed(Path("take.abc"), points, names, 100.0, space, Hints(), findings)
+        >>> at.points[0].tolist()
+        [[0.03, 0.0, 1.7], [0.0, 0.08, 0.96], [0.02, 0.09, 0.08]]
     """
     unit = hints.unit_m or _settled_unit(points, names, space, findings, sized)
     metres = checked_markers(path, points if unit == 1.0 else points * unit, names)

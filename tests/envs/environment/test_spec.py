@@ -17,7 +17,7 @@ from mplearn.learner import LearnerConfig
 from mplearn.recording import Recording
 from mplearn_envs.environment.options import ActionOptions, MotionOptions, PictureOptions
 from mplearn_envs.environment.plain import from_plain, to_plain
-from mplearn_envs.robot import humanoid
+from mplearn_envs.robot import ROLES, humanoid
 from mplearn_envs.skills.feasibility import FeasibilityConfig
 from mplearn_envs.tasks import FollowTask, FreeTask, GoalTask, ReciteTask, Task
 
@@ -95,12 +95,17 @@ def test_a_vector_environment_and_an_online_one_are_made_again():
 
 def test_relative_files_are_found_from_elsewhere(tmp_path, monkeypatch):
     standing_library().save(tmp_path / "mine.mplearn")
+    (tmp_path / "body.xml").write_text(humanoid().xml, "utf-8")
+    roles = "\n".join(f'{role} = "{role}"' for role in ROLES)
+    (tmp_path / "body.toml").write_text(f'mjcf = "body.xml"\n[segments]\n{roles}\n', "utf-8")
     monkeypatch.chdir(tmp_path)
-    text = gymnasium.make(ID, library="mine.mplearn").spec.to_json()
+    files = {"library": "mine.mplearn", "robot": "body.toml"}
+    text = gymnasium.make(ID, dynamics="kinematic", **files).spec.to_json()
     (tmp_path / "other").mkdir()
     monkeypatch.chdir(tmp_path / "other")
     twin = gymnasium.make(EnvSpec.from_json(text))
     assert len(twin.unwrapped.library) == len(MOTIONS)
+    assert twin.unwrapped.robot.name == "body"
 
 
 plain = st.recursive(

@@ -72,6 +72,23 @@ def test_a_task_may_show_nothing():
     assert "task" not in env.reset()[0]
 
 
+def test_what_a_task_shows_is_of_the_kind_of_its_bounds_and_a_copy():
+    class Bit(FreeTask):
+        shown = np.ones(1)
+
+        def space(self, repertoire):
+            return spaces.Box(0, 1, (1,), np.int8)
+
+        def observe(self):
+            return self.shown
+
+    env = make(Bit())
+    shown = env.reset()[0]["task"]
+    assert shown.dtype == np.int8 and env.observation_space["task"].contains(shown)
+    shown[:] = 0
+    assert Bit.shown == 1.0
+
+
 def test_tasks_can_end_an_episode_and_pay_at_the_end():
     class Twice(Task):
         def space(self, repertoire):
