@@ -149,60 +149,89 @@ def _covered(direct: FloatArray, own: BoolArray, firm: BoolArray) -> BoolArray:
 def _agglomerate(
     matrix: FloatArray, together: BoolArray, barred: BoolArray, link: float, reach: float
 ) -> IntArray:
+    """Join the pair of least doubt until all doubts exceed ``link``.
+
+    Each row remembers its best pair, and looks anew only where what its doubts follow from has
+    changed: the pairs of few rows do with each join.
+    """
     n = len(matrix)
     groups = np.arange(n)
     total, sizes, mean = matrix.copy(), np.ones(n), matrix.copy()
     barred = barred.copy()
     alive = np.arange(n)
     nearest, second = np.full(n, np.inf), np.full(n, np.inf)
-    stale = np.ones(n, dtype=np.bool_)
+    doubts, partners = np.full(n, np.inf), np.full(n, -1)
+    stale, changed = np.ones(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
     pinned = np.argwhere(together)
-    at = 0
+    for at in range(len(pinned)):
+        i, j = groups[pinned[at, 0]], groups[pinned[at, 1]]
+        if i != j:
+            alive = _joined(min(i, j), max(i, j), alive, groups, total, sizes, mean, barred)
+    far = np.sqrt(link * reach)
+    first = -1
     while True:
-        first, other = -1, -1
-        while at < len(pinned) and first < 0:
-            i, j = groups[pinned[at, 0]], groups[pinned[at, 1]]
-            at += 1
-            if i != j:
-                first, other = min(i, j), max(i, j)
-        if first < 0:
-            for i in alive:
-                if stale[i]:
-                    stale[i] = False
-                    nearest[i] = second[i] = np.inf
-                    for j in alive:
-                        if j != i:
-                            if mean[i, j] < nearest[i]:
-                                nearest[i], second[i] = mean[i, j], nearest[i]
-                            elif mean[i, j] < second[i]:
-                                second[i] = mean[i, j]
-            best, far = link, np.sqrt(link * reach)
-            for a in range(len(alive)):
-                i = alive[a]
-                for b in range(a + 1, len(alive)):
-                    j = alive[b]
-                    d = mean[i, j]
-                    if d > far or barred[i, j]:
-                        continue
+        for i in alive:
+            changed[i] = first < 0 or i == first
+            if stale[i]:
+                stale[i] = False
+                before = nearest[i], second[i]
+                nearest[i] = second[i] = np.inf
+                for j in alive:
+                    if j != i:
+                        if mean[i, j] < nearest[i]:
+                            nearest[i], second[i] = mean[i, j], nearest[i]
+                        elif mean[i, j] < second[i]:
+                            second[i] = mean[i, j]
+                changed[i] |= before != (nearest[i], second[i])
+        news = alive[changed[alive]]
+        first = -1
+        for i in alive:
+            others, partner = news, partners[i]
+            if changed[i] or (partner >= 0 and (groups[partner] != partner or changed[partner])):
+                others, doubts[i], partners[i] = alive, np.inf, -1
+            for j in others:
+                d = mean[i, j]
+                if j > i and d <= far and not barred[i, j]:
                     next_i = second[i] if d <= nearest[i] else nearest[i]
                     next_j = second[j] if d <= nearest[j] else nearest[j]
                     doubt = d * d / max(min(next_i, next_j, reach), 1e-12)
-                    if doubt < best or (doubt == best and first < 0):
-                        best, first, other = doubt, i, j
-            if first < 0:
-                return groups
-        sizes[first] += sizes[other]
-        alive = alive[alive != other]
-        for k in range(n):
-            if groups[k] == other:
-                groups[k] = first
+                    tied = doubt == doubts[i] and j < partners[i]
+                    if doubt <= link and (doubt < doubts[i] or tied):
+                        doubts[i], partners[i] = doubt, j
+            if partners[i] >= 0 and (first < 0 or doubts[i] < doubts[first]):
+                first = int(i)
+        if first < 0:
+            return groups
+        other = partners[first]
+        nearer = np.minimum(mean[first], mean[other])
+        alive = _joined(first, other, alive, groups, total, sizes, mean, barred)
         for k in alive:
-            old = min(mean[k, first], mean[k, other])
-            total[first, k] += total[other, k]
-            total[k, first] = total[first, k]
-            barred[first, k] |= barred[other, k]
-            barred[k, first] = barred[first, k]
-            if k != first:
-                mean[first, k] = mean[k, first] = total[first, k] / (sizes[first] * sizes[k])
-                stale[k] |= old <= second[k] or mean[k, first] <= second[k]
+            stale[k] = nearer[k] <= second[k] or mean[first, k] <= second[k]
         stale[first] = True
+
+
+@njit(cache=True)
+def _joined(
+    first: int,
+    other: int,
+    alive: IntArray,
+    groups: IntArray,
+    total: FloatArray,
+    sizes: FloatArray,
+    mean: FloatArray,
+    barred: BoolArray,
+) -> IntArray:
+    """Let one group take up another; return what is left."""
+    sizes[first] += sizes[other]
+    alive = alive[alive != other]
+    for k in range(len(groups)):
+        if groups[k] == other:
+            groups[k] = first
+    for k in alive:
+        total[first, k] += total[other, k]
+        total[k, first] = total[first, k]
+        barred[first, k] |= barred[other, k]
+        barred[k, first] = barred[first, k]
+        if k != first:
+            mean[first, k] = mean[k, first] = total[first, k] / (sizes[first] * sizes[k])
+    return alive

@@ -395,8 +395,8 @@ class Sharing:
         self.next_id, self.n_seen, self.unit = state.next_id, state.n_seen, state.unit
         self.table = ShapeTable(self.table.mirror)
         self.leaves = []
-        for leaf in state.leaves:
-            slot = self.table.add(Shape(leaf.shape.posture, leaf.shape.movement))
+        shapes = [Shape(leaf.shape.posture, leaf.shape.movement) for leaf in state.leaves]
+        for leaf, slot in zip(state.leaves, self.table.add_all(shapes), strict=True):
             ids = leaf.person, leaf.local, leaf.id, leaf.primitive, leaf.founded
             self.leaves.append(Leaf(*ids, slot))
         self.provisional = ProvisionalLeaves(self.table)

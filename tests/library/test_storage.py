@@ -197,6 +197,11 @@ def test_other_files_are_named(saved, tmp_path):
         PrimitiveLibrary.load(bomb)
 
 
+def test_a_large_file_may_hold_what_is_as_large(saved, monkeypatch):
+    monkeypatch.setattr(files, "_MAX_BYTES", saved.stat().st_size // 2)
+    assert PrimitiveLibrary.load(saved).version == LIBRARY.version
+
+
 plain = st.recursive(
     st.none() | st.booleans() | st.integers(-(2**60), 2**60) | st.floats() | st.text(max_size=8),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=4), inner),

@@ -117,9 +117,14 @@ def test_left_and_right_stay_apart():
     assert same_groups(groups, np.array([0, 1, 2, 3, 1, 2]))
 
 
-def brute_force(matrix, barred, link, reach):
+def brute_force(matrix, barred, link, reach, pinned=()):
     """Average link over all pairs of groups, with nothing kept from one step to the next."""
     groups = [[i] for i in range(len(matrix))]
+    for i, j in pinned:
+        one, other = (next(group for group in groups if k in group) for k in (i, j))
+        if one is not other:
+            groups.remove(other)
+            one += other
     while True:
         mean = np.array([[matrix[np.ix_(a, b)].mean() for b in groups] for a in groups])
         np.fill_diagonal(mean, np.inf)
@@ -136,16 +141,42 @@ def brute_force(matrix, barred, link, reach):
         groups[j] += groups.pop(i)
 
 
+@pytest.mark.parametrize(
+    "mirror", [None, MirrorMap((1, 0, 2, 4, 3, 5, 6, 7), (1, 1, -1, 1, 1) + 3 * (1,))]
+)
+def test_many_shapes_lie_as_far_apart_as_one_after_the_other(mirror):
+    shapes, _, _ = made(seed=4)
+    at_once, one_by_one = ShapeTable(mirror), ShapeTable(mirror)
+    each = [Shape(*parts) for parts in zip(*shapes, strict=True)] * 3
+    slots = [np.array(at_once.add_all(each)), np.array([one_by_one.add(shape) for shape in each])]
+    levels = np.array([shape.posture for shape in each])
+    found = [
+        table.distances(levels, own, 0.5)
+        for table, own in zip((at_once, one_by_one), slots, strict=True)
+    ]
+    assert len(set(slots[0].tolist())) == len(each)
+    for one, other in zip(*found, strict=True):
+        assert np.array_equal(one, other)
+    assert at_once.add_all(each[:2]) == [one_by_one.add(shape) for shape in each[:2]]
+
+
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10_000))
 def test_leaves_are_joined_as_by_brute_force(seed):
-    shapes, people, _ = made(seed=seed, n_motions=3, noise=0.6)
+    shapes, people, _ = made(2 + seed % 4, n_motions=3 + seed % 2, seed=seed, noise=0.6)
+    rng, n = np.random.default_rng(seed), len(people)
     matrix = distances(shapes, RULES.posture)
     matrix /= unit_of(matrix, people, RULES)
-    groups = agglomerate(matrix, np.full_like(matrix, np.inf), known_of(people), RULES)
-    barred = (people[:, None] == people) & (matrix > RULES.link_own)
+    pinned, apart = (
+        [(i, j) for i, j in rng.integers(n, size=(k, 2)).tolist() if i != j]
+        for k in (seed % 3, seed % 5)
+    )
+    known = known_of(people, pinned, apart)
+    groups = agglomerate(matrix, np.full_like(matrix, np.inf), known, RULES)
+    barred = (people[:, None] == people) & (matrix > RULES.link_own) | known.apart
     wanted = np.empty(len(people), dtype=int)
-    for k, group in enumerate(brute_force(matrix, barred, RULES.link, RULES.reach)):
+    found = brute_force(matrix, barred, RULES.link, RULES.reach, pinned)
+    for k, group in enumerate(found):
         wanted[group] = k
     assert same_groups(groups, wanted)
 

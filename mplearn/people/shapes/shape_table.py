@@ -24,6 +24,7 @@ class ShapeTable:
     def __init__(self, mirror: MirrorMap | None = None) -> None:
         self.mirror = mirror
         self._free: list[int] = []
+        self._used = 0  # slots from here on were never used
         self._states: dict[int, ShapeState] = {}  # as long as a shape does not change
         self._postures = self._movements = self._images = np.zeros((0, 0))
         self._direct = self._mirrored = np.zeros((0, 0))
@@ -36,16 +37,41 @@ class ShapeTable:
         self.put(slot, shape)
         return slot
 
+    def add_all(self, shapes: Sequence[Shape]) -> list[int]:
+        """Take many shapes; return their slots. Where there were none before, that is quicker."""
+        if self._used or not shapes:
+            return [self.add(shape) for shape in shapes]
+        while len(self._free) < len(shapes):
+            self._grow(shapes[0])
+        slots = [self._free.pop() for _ in shapes]
+        for slot, shape in zip(slots, shapes, strict=True):
+            self._note(slot, shape)
+        n = self._used
+        movements, images = self._movements[:n], self._images[:n]
+        self._direct[:n, :n] = _among(movements)
+        if self.mirror is not None:
+            across = _across(movements, images)
+            self._mirrored[:n, :n] = 0.5 * (across + across.T)
+        return slots
+
     def put(self, slot: int, shape: Shape) -> None:
         """Replace a shape."""
+        image = self._note(slot, shape)
+        n = self._used
+        movements, images = self._movements[:n], self._images[:n]
+        self._direct[slot, :n] = self._direct[:n, slot] = _row(movements, shape.movement)
+        if self.mirror is not None:
+            row = 0.5 * (_row(movements, image.movement) + _row(images, shape.movement))
+            self._mirrored[slot, :n] = self._mirrored[:n, slot] = row
+
+    def _note(self, slot: int, shape: Shape) -> Shape:
+        """Put a shape and its mirror image into their rows; return that."""
+        self._used = max(self._used, slot + 1)
         self._states.pop(slot, None)
         self._postures[slot], self._movements[slot] = shape
         image = shape if self.mirror is None else mirrored(shape, self.mirror)
         self._images[slot] = image.movement
-        self._direct[slot] = self._direct[:, slot] = _row(self._movements, shape.movement)
-        if self.mirror is not None:
-            row = 0.5 * (_row(self._movements, image.movement) + _row(self._images, shape.movement))
-            self._mirrored[slot] = self._mirrored[:, slot] = row
+        return image
 
     def drop(self, slot: int) -> None:
         """Forget a shape."""
@@ -90,7 +116,7 @@ class ShapeTable:
         def row(one: Shape) -> FloatArray:
             across = ((levels - one.posture) ** 2).sum(axis=1)
             return np.asarray(
-                np.sqrt(posture * across + _row(self._movements, one.movement)[slots])
+                np.sqrt(posture * across + _row(self._movements[: self._used], one.movement)[slots])
             )
 
         direct = row(shape)
@@ -111,7 +137,7 @@ class ShapeTable:
             old, new = getattr(self, name), np.zeros((n, width))
             new[:held, : old.shape[1]] = old
             setattr(self, name, new)
-        self._free = list(range(n - 1, held - 1, -1))
+        self._free = [*range(n - 1, held - 1, -1), *self._free]
 
 
 def stacked(shapes: Sequence[Shape]) -> ShapeTable:
@@ -120,6 +146,24 @@ def stacked(shapes: Sequence[Shape]) -> ShapeTable:
     for shape in shapes:
         table.add(shape)
     return table
+
+
+@njit(cache=True)
+def _among(rows: FloatArray) -> FloatArray:
+    """Return the squared distances of all rows from each other as `_row` does, shape (n, n)."""
+    out = np.zeros((len(rows), len(rows)))
+    for i in range(1, len(rows)):
+        out[i, :i] = out[:i, i] = _row(rows[:i], rows[i])
+    return out
+
+
+@njit(cache=True)
+def _across(rows: FloatArray, others: FloatArray) -> FloatArray:
+    """Return the squared distance of each row from each of others as `_row` does, (n, n)."""
+    out = np.empty((len(rows), len(others)))
+    for j in range(len(others)):
+        out[:, j] = _row(rows, others[j])
+    return out
 
 
 @njit(cache=True)
