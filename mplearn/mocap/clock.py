@@ -71,6 +71,10 @@ def even_clock(path: Path, times_s: FloatArray) -> Clock:
     if len(times_s) == 1:
         return Clock(np.nan, np.zeros(1), False)
     steps = np.diff(times_s)
+    if steps.min() == 0:  # coarse decimals repeat a time
+        rounded_s = _rounded_step(times_s)
+        if rounded_s is not None and rounded_s > 0:
+            return Clock(1.0 / rounded_s, np.arange(len(times_s), dtype=np.float64), False)
     if (steps <= 0).any():
         row = int(np.argmax(steps <= 0)) + 1
         raise bad_file(path, f"time goes back at frame {row}", "increasing times [s]")

@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import RecordingError, RecordingWarning
 from ..recording import ReadReport, Recording
 from .files import bad_file, is_file, is_folder, stem
-from .keypoints.tables import DeepLabCutReader, SLEAPReader
+from .keypoints.tables import DeepLabCutReader, KeyPointsReader, SLEAPReader
 from .labels import labels_beside
 from .markers.c3d import C3DReader
 from .markers.csv_table import CSVReader
@@ -51,6 +51,7 @@ for _reader in (
     C3DReader(),
     XDFReader(),
     UIPRMDReader(),
+    KeyPointsReader(),
     DeepLabCutReader(),
     SLEAPReader(),
 ):

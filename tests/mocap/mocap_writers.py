@@ -592,6 +592,14 @@ def write_sleap(path: Path) -> Path:
     return path
 
 
+def write_key_points(path: Path) -> Path:
+    parts = [f"{name}_{what}" for name in KEYPOINTS for what in ("x", "y", "likelihood")]
+    rows = [["frame", *parts]]
+    rows += [[str(k), *(f"{x:.6f}" for x in row)] for k, row in enumerate(keypoint_values())]
+    path.write_text("".join(",".join(row) + "\n" for row in rows))
+    return path
+
+
 KEYPOINTS = ("snout", "left_ear", "right_ear", "tail_base")
 
 
@@ -620,6 +628,7 @@ WRITERS: dict[str, tuple[str, Writer]] = {
     "XDF": ("take.xdf", write_xdf),
     "DeepLabCut": ("take.csv", write_deeplabcut),
     "SLEAP": ("take.csv", write_sleap),
+    "key points": ("take.csv", write_key_points),
 }
 """For each reader, by its format: a file name, and what writes a small valid file there."""
 

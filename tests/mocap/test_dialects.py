@@ -10,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mocap_writers import (
+    cells_of,
     person,
     write_c3d,
     write_csv,
@@ -246,6 +247,42 @@ def test_freemocap_by_trajectory(tmp_path: Path, standing: Recording) -> None:
     assert recording.report.left_out == ("timestamp_by_camera",)
 
 
+@pytest.mark.parametrize("form", ["pose_{i}_{a}", "kpt{i}.{a}", "landmark[{i}].{a}"])
+def test_mediapipe_by_number_under_any_name(tmp_path: Path, form: str) -> None:
+    names = [form.format(i=i, a=a) for i in range(len(MEDIAPIPE_POSE)) for a in "xyz"]
+    assert tuple(meaning_of(names).markers) == MEDIAPIPE_POSE
+
+
+@pytest.mark.parametrize(
+    "form",
+    ["markers.{m}.{a}", "{m}Pos{A}", "{m}_world_{a}", "Anna_{m}_{a}", "('{m}', '{a}')", "{m}->{a}"],
+)
+def test_words_that_all_names_share_fall_away(form: str, standing: Recording) -> None:
+    names = standing.marker_names
+    header = [form.format(m=m, a=a, A=a.upper()) for m in names for a in "xyz"]
+    assert tuple(meaning_of(header).markers) == names
+
+
+def test_words_that_tell_a_side_or_a_part_stay() -> None:
+    for word in ("left", "L", "hand", "Head"):
+        header = [f"{word}_{k:02d}m_{a}" for k in range(20) for a in "xyz"]
+        assert all(name.startswith(f"{word}_") for name in meaning_of(header).markers)
+
+
+def test_orientations_beside_places_leave_them_markers(tmp_path: Path, standing: Recording) -> None:
+    points = standing.markers
+    columns = ("x", "y", "z", "qx", "qy", "qz", "qw")
+    lines = [",".join(["time", *(f"{m}_{c}" for m in standing.marker_names for c in columns)])]
+    for i, frame in enumerate(points):
+        cells = [c for p in frame for c in (*cells_of(p), "0", "0", "0", "1")]
+        lines.append(",".join([f"{i / 50}", *cells]))
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n")
+    recording = open_recording(tmp_path / "a.csv")
+    assert recording.marker_names == standing.marker_names
+    np.testing.assert_allclose(recording.markers, points, atol=1e-6)
+    assert "LFHD_qx" in recording.report.left_out
+
+
 def test_pictures_are_not_taken_for_space(tmp_path: Path) -> None:
     points = landmarks()
     points = (points - points.min()) / (points.max() - points.min())
@@ -289,6 +326,14 @@ def test_motive(tmp_path: Path, version: str, units: str, scale: float) -> None:
     assert recording.report is not None
     assert recording.report.format == "Motive CSV"
     assert {"Wand", "Anna:M4"} <= set(recording.report.left_out)
+
+
+def test_motive_without_its_first_line(tmp_path: Path, standing: Recording) -> None:
+    path = write_motive(tmp_path / "a.csv", standing.markers, names=list(standing.marker_names))
+    path.write_text(path.read_text().split("\n", 2)[2])
+    recording = open_recording(path)
+    assert recording.marker_names == standing.marker_names
+    np.testing.assert_allclose(recording.markers, standing.markers, atol=1e-5)
 
 
 def test_motive_of_bones_alone_and_with_time_codes(tmp_path: Path) -> None:
@@ -556,3 +601,49 @@ def test_motive_whose_only_free_markers_are_not_identified(tmp_path: Path) -> No
     found = open_recording(path)
     assert found.channels == plain.channels
     assert np.allclose(found.frames, plain.frames, equal_nan=True)
+
+
+@pytest.mark.parametrize("reference", ["GLOBAL", "LOCAL"])
+def test_a_skeleton_of_qualisys(tmp_path: Path, standing: Recording, reference: str) -> None:
+    names, points = standing.marker_names, 1000.0 * standing.markers
+    columns = "\t".join(f"{m} {c}" for m in names for c in ("X", "Y", "Z", "QX", "QY", "QZ", "QW"))
+    lines = [f"NO_OF_FRAMES\t{len(points)}", "FREQUENCY\t50", f"REFERENCE\t{reference}"]
+    lines.append(f"Frame\tTime\t{columns}")
+    for i, frame in enumerate(points):
+        cells = "\t".join("\t".join([*cells_of(p), "0", "0", "0", "1"]) for p in frame)
+        lines.append(f"{i + 1}\t{i / 50:.5f}\t{cells}")
+    path = tmp_path / "a.tsv"
+    path.write_text("\n".join(lines) + "\n")
+    if reference == "LOCAL":
+        with pytest.raises(RecordingError, match="REFERENCE is LOCAL"):
+            open_recording(path)
+        return
+    recording = open_recording(path)
+    assert recording.marker_names == names
+    np.testing.assert_allclose(recording.markers, standing.markers, atol=1e-5)
+
+
+def test_bodies_of_qualisys_are_named_as_what_they_are(tmp_path: Path) -> None:
+    path = tmp_path / "a.tsv"
+    path.write_text(
+        "NO_OF_FRAMES\t1\nFREQUENCY\t50\nDATA_INCLUDED\t6D\nBODY_NAMES\tWand\n1\t2\t3\n"
+    )
+    with pytest.raises(RecordingError, match="DATA_INCLUDED is '6D'; expected '3D'"):
+        open_recording(path)
+
+
+def test_c3d_whose_points_are_all_said_to_be_unmeasured(
+    tmp_path: Path, standing: Recording
+) -> None:
+    path = write_c3d(tmp_path / "a.c3d", standing.markers, names=list(standing.marker_names))
+    plain = open_recording(path)
+    data = bytearray(path.read_bytes())
+    begin = 512 * (int.from_bytes(data[16:18], "little") - 1)
+    n_points = len(standing.marker_names)
+    floats = np.frombuffer(bytes(data[begin : begin + 16 * n_points * len(plain)]), "<f4").copy()
+    floats[3::4] = -1.0
+    data[begin : begin + floats.nbytes] = floats.tobytes()
+    path.write_bytes(bytes(data))
+    recording = open_recording(path)
+    np.testing.assert_array_equal(recording.frames, plain.frames)
+    assert "no point is said to be measured" in said(recording)

@@ -1,5 +1,6 @@
 """Key points of animals: the same wherever they are, however large, however they are turned."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import pandas
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mocap_writers import KEYPOINTS, keypoint_values
 
 from mplearn import LearnerConfig, MotionLearner, open_recording
 from mplearn.errors import RecordingError
@@ -136,3 +138,60 @@ def test_sleap_has_a_row_for_each_frame_and_track(tmp_path: Path) -> None:
     assert take.person == "track_0"
     np.testing.assert_allclose(np.delete(take.frames, 50, 0), np.delete(expected, 50, 0), atol=1e-6)
     assert np.isfinite(take.frames).all()  # one frame is bridged
+
+
+HEADS = [
+    ["scorer", *["net"] * 12],
+    ["bodyparts", *[name for name in KEYPOINTS for _ in range(3)]],
+    ["coords", *["x", "y", "likelihood"] * 4],
+]
+ROWS = [[str(k), *(f"{x:.6f}" for x in row)] for k, row in enumerate(keypoint_values())]
+SLEAP = ["track", "frame_idx", *[f"{n}.{c}" for n in KEYPOINTS for c in ("x", "y", "score")]]
+FLAT = ["frame", *[f"{n}_{c}" for n in KEYPOINTS for c in ("x", "y", "likelihood")]]
+
+
+def _points() -> list[list[str]]:
+    return [
+        [row[0], "mouse", name, *row[1 + 3 * k : 4 + 3 * k]]
+        for row in ROWS
+        for k, name in enumerate(KEYPOINTS)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("rows", "separator"),
+    [
+        ([*HEADS, *ROWS], ","),
+        ([*HEADS, *ROWS], "\t"),
+        ([*HEADS, *ROWS], ";"),
+        ([*HEADS, ["frame", *[""] * 12], *ROWS], ","),  # an index with a name
+        ([HEADS[0], ["individuals", *["mouse"] * 12], *HEADS[1:], *ROWS], ","),
+        ([*HEADS[1:], *ROWS], ","),
+        ([["", *row[1:]] for row in HEADS] + ROWS, ","),
+        ([[f'"{cell}"' for cell in row] for row in [*HEADS, *ROWS]], ","),
+        ([SLEAP, *(["mouse", *row] for row in ROWS)], ","),
+        ([SLEAP[1:], *ROWS], ","),
+        ([["", "video", *SLEAP], *(["0", "a.mp4", "mouse", *row] for row in ROWS)], ","),
+        ([[*SLEAP[1::-1], *SLEAP[2:]], *([row[0], "mouse", *row[1:]] for row in ROWS)], ";"),
+        ([["frame_idx", "track", "node", "x", "y", "score"], *_points()], ","),
+        ([FLAT, *ROWS], ","),
+        ([FLAT[1:], *(row[1:] for row in ROWS)], ","),
+    ],
+)
+def test_tables_spelled_otherwise(tmp_path: Path, rows: list[list[str]], separator: str) -> None:
+    if separator == ";":  # decimals have a comma there
+        rows = [[re.sub(r"^(-?\d+)\.", r"\1,", cell) for cell in row] for row in rows]
+    (tmp_path / "a_50fps.csv").write_text("".join(separator.join(row) + "\n" for row in rows))
+    take = open_recording(tmp_path / "a_50fps.csv")
+    seen = keypoint_values().reshape(len(ROWS), 4, 3)
+    expected, channels, _ = seen_from_the_body(seen[..., :2] * [1, -1], KEYPOINTS, 50.0)
+    assert (take.channels, take.rate_hz) == (channels, 50.0)
+    np.testing.assert_allclose(take.frames, expected, atol=1e-6)
+
+
+def test_pictures_that_are_left_out_are_a_gap(tmp_path: Path) -> None:
+    rows = [row for k, row in enumerate(ROWS) if not 4 <= k < 9]
+    (tmp_path / "a_10fps.csv").write_text("".join(",".join(row) + "\n" for row in HEADS + rows))
+    take = open_recording(tmp_path / "a_10fps.csv")
+    assert len(take) == len(ROWS)
+    assert np.flatnonzero(np.isnan(take.frames).all(axis=1)).tolist() == [4, 5, 6, 7, 8]

@@ -345,6 +345,10 @@ TRC: dict[str, Change] = {
     "old Macintosh": lambda s: s.replace("\n", "\r"),
     "byte order mark": lambda s: "\ufeff" + s,
     "no first number": lambda s: re.sub(r"(?m)^1(?=\t0\.)", "", s),
+    "no first line": lambda s: s.split("\n", 1)[1],
+    "names in quotes": lambda s: re.sub(r"(?<=\t)([A-Z]\w+)(?=[\t\n])", r'"\1"', s),
+    "numbers of frames as times": lambda s: re.sub(r"(?m)^(\d+)\t[\d.]+\t(?=-?\d)", r"\1\t\1\t", s),
+    "times that repeat": lambda s: re.sub(r"(?m)^(\d+\t\d+\.\d)\d+", r"\1", s),
 }  # fmt: skip
 
 
@@ -413,6 +417,8 @@ BVH: dict[str, tuple[Change, str]] = {
     "commas between channels": (lambda s: s.replace("Xrotation ", "Xrotation, "), ""),
     "short names of channels": (lambda s: re.sub("(pos|rot)(ition|ation)", r"\1", s), ""),
     "radians": (radians, "as radians"),
+    "ends without channels": (
+        lambda s: re.sub(r"(End Site\s*\{[^}]*)", r"\1 CHANNELS 0 ", s), ""),
 }  # fmt: skip
 
 

@@ -36,17 +36,23 @@ from mplearn.recording import Recording
 FORMATS = sorted(WRITERS)
 WITHOUT_ROWS = {"C3D", "MVNX", "SMPL", "XDF"}
 SKELETAL = {"AMC", "BVH", "G1 CSV", "MVNX", "SMPL"}
-FROM_THE_BODY = {"DeepLabCut", "SLEAP"}  # in body lengths, of anything: no person in metres
+# in body lengths, of anything: no person in metres
+FROM_THE_BODY = {"DeepLabCut", "SLEAP", "key points"}
 RATES_HZ = {
     "AMC": 120.0,
     "G1 CSV": 30.0,
     "DeepLabCut": 30.0,
     "SLEAP": 30.0,
+    "key points": 30.0,
 }  # which do not say theirs
 TEXT_FORMATS = [format for format in FORMATS if format not in WITHOUT_ROWS]
 SEPARATORS = {
     **dict.fromkeys(
-        ("CSV", "G1 CSV", "UI-PRMD", "Motive CSV", "Nexus CSV", "DeepLabCut", "SLEAP"), ","
+        (
+            *("CSV", "G1 CSV", "UI-PRMD", "Motive CSV", "Nexus CSV", "DeepLabCut", "SLEAP"),
+            "key points",
+        ),
+        ",",
     ),
     **dict.fromkeys(("TRC", "Qualisys TSV"), "\t"),
 }

@@ -35,6 +35,17 @@ def only(
     return points[:, kept], tuple(names[i] for i in kept)
 
 
+@pytest.mark.parametrize("up", ["y", "-y", "z"])
+def test_points_counted_from_the_hips_show_no_floor(
+    standing: tuple[np.ndarray, tuple[str, ...]], up: str
+) -> None:
+    points, names = standing
+    hips = [i for i, name in enumerate(names) if name[1:] in ("ASI", "PSI")]
+    own = (points - points[:, hips].mean(axis=1, keepdims=True)) @ upright(up)
+    found = find_vertical(own, names, RATE_HZ, "z")
+    assert (found.up, found.doubtful) == (up, False)
+
+
 @pytest.mark.parametrize("up", DIRECTIONS)
 @pytest.mark.parametrize("declared", DIRECTIONS)
 def test_the_vertical_of_a_standing_person(

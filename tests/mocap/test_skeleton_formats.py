@@ -148,6 +148,47 @@ def test_mvnx_takes_the_rate_from_the_times_where_it_must(tmp_path: Path) -> Non
     assert open_recording(path).rate_hz == pytest.approx(100.0)
 
 
+def spaced(name: str) -> str:
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name)
+
+
+@pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")
+@pytest.mark.parametrize(
+    "kind", ["names without joints", "w last", "an empty frame", "every second", "other times"]
+)
+def test_mvnx_spelled_otherwise(tmp_path: Path, kind: str) -> None:
+    positions, orientations = mvnx_motion(40)
+    expected, names, rate_hz, said = positions.copy(), list(MVNX_SEGMENTS), 100.0, ""
+    if kind == "w last":
+        orientations, said = orientations[..., [1, 2, 3, 0]], "x, y, z, w"
+    path = write_mvnx(tmp_path / "a.mvnx", (positions, orientations))
+    text = path.read_text()
+    if kind == "names without joints":
+        text = re.sub(r"<joints>.*?</joints>", "", text, flags=re.S)
+        text = re.sub(r'(segment label=)"(\w+)"', lambda m: f'{m[1]}"{spaced(m[2])}"', text)
+        names = [spaced(name) for name in names]
+    elif kind == "an empty frame":
+        text = re.sub(r'(index="7" type="normal">).*?(</frame>)', r"\1\2", text)
+        expected[7], said = np.nan, "1 of 40 frames have no position"
+    elif kind == "every second":
+        text = re.sub(
+            r'time="(\d+)" index="(\d+)"',
+            lambda m: f'time="{2 * int(m[1])}" index="{2 * int(m[2])}"',
+            text,
+        )
+        rate_hz, said = 50.0, "the times say 50 Hz"
+    elif kind == "other times":
+        text = re.sub(r'time="(\d+)" index', lambda m: f'time="{4 * int(m[1])}" index', text)
+        rate_hz, said = 25.0, "the times say 25 Hz"
+    path.write_text(text)
+    recording = open_recording(path, positions=True)
+    assert recording.rate_hz == rate_hz
+    assert any(said in warning for warning in (*recording.report.warnings, ""))
+    found = by_name(recording)
+    at = np.stack([found[name] for name in names], axis=1)
+    np.testing.assert_allclose(at, expected, atol=1e-6)
+
+
 BOMB = """<!DOCTYPE mvnx [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">
 <!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;&b;&b;"><!ENTITY d "&c;&c;&c;&c;&c;&c;&c;&c;&c;&c;">]>"""
 
@@ -251,6 +292,34 @@ def test_smpl_under_other_names(tmp_path: Path, arrays: dict[str, object]) -> No
     other = open_recording(write_smpl(tmp_path / "b.npz", **arrays), positions=True)
     assert other.markers == pytest.approx(usual.markers, abs=1e-6)
     assert other.rate_hz == usual.rate_hz
+
+
+@pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")
+@pytest.mark.parametrize("unit", [1.0, 100.0, 1000.0])
+@pytest.mark.parametrize("said", [False, True])
+def test_smpl_whose_places_are_in_another_unit(tmp_path: Path, unit: float, said: bool) -> None:
+    plain = open_recording(write_smpl(tmp_path / "a.npz"), positions=True)
+    places = np.tile([0.4, -0.1, 0.95], (12, 1))
+    path = write_smpl(tmp_path / "b.npz", trans=unit * places[:, None])  # an axis too many
+    hints = Hints(unit_m=1.0 / unit) if said else None
+    recording = open_recording(path, positions=True, hints=hints)
+    np.testing.assert_allclose(recording.frames, plain.frames, atol=1e-9)
+    assert recording.report.unit_m == pytest.approx(1.0 / unit)
+    assert any("by the height" in w for w in recording.report.warnings) == (unit > 1.0 and not said)
+
+
+@pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")
+def test_smpl_in_degrees_or_in_a_batch_of_one(tmp_path: Path) -> None:
+    poses = np.array(smpl_poses())
+    poses.reshape(12, -1, 3)[:, 18] = [0.0, 1.3, 0.4]
+    plain = open_recording(write_smpl(tmp_path / "a.npz", poses=poses), positions=True)
+    batch = open_recording(write_smpl(tmp_path / "b.npz", poses=poses[None]), positions=True)
+    assert np.array_equal(batch.frames, plain.frames)
+    degrees = open_recording(
+        write_smpl(tmp_path / "c.npz", poses=np.degrees(poses)), positions=True
+    )
+    np.testing.assert_allclose(degrees.frames, plain.frames, atol=1e-9)
+    assert any("degrees" in warning for warning in degrees.report.warnings)
 
 
 def test_smpl_in_a_world_that_is_y_up(tmp_path: Path) -> None:
@@ -474,6 +543,14 @@ def test_g1_without_some_joints_or_in_another_unit(tmp_path: Path) -> None:
     with pytest.warns(RecordingWarning, match="taken for degrees"):
         recording = open_recording(write_g1_csv(tmp_path / "c.csv", values, header))
     assert recording.frames[:, 6:] == pytest.approx(np.radians(values[:, 7:]))
+
+
+def test_g1_joints_spelled_otherwise(tmp_path: Path) -> None:
+    plain = open_recording(write_g1_csv(tmp_path / "a.csv"))
+    base = ["# x", "y", "z", "qx", "qy", "qz", "qw"]  # as numpy writes a header
+    camel = ["".join(map(str.title, name.split("_")[:-1])) for name in G1_JOINTS]
+    recording = open_recording(write_g1_csv(tmp_path / "b.csv", header=[*base, *camel]))
+    assert np.array_equal(recording.frames, plain.frames)
 
 
 def test_g1_with_quaternions_w_first(tmp_path: Path) -> None:

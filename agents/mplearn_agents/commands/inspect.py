@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from importlib.util import find_spec
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -92,10 +93,11 @@ def _say(console: Console, each: Inspection) -> None:
     for name, share in list(facts["gaps"].items())[:_MANY]:
         say(f"  missing: {name} in {100 * share:.1f} % of the frames")
     if each.body is not None:
-        say(
-            f"  a person of {each.stature_m:.2f} m, {1000 * each.fit_m:.0f} mm from the points, "
-            f"confidence {each.body.confidence:.2f}"
-        )
+        if isfinite(each.stature_m):  # else nobody fits, as is said below
+            say(
+                f"  a person of {each.stature_m:.2f} m, {1000 * each.fit_m:.0f} mm from the "
+                f"points, confidence {each.body.confidence:.2f}"
+            )
         say("  recognised: " + ", ".join(f"{p} = {' '.join(n)}" for p, n in each.body.parts))
     if facts["unseen"]:
         say(f"  unseen, held at rest: {', '.join(facts['unseen'])}")

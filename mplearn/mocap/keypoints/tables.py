@@ -1,7 +1,15 @@
-"""Tables of key points: those of DeepLabCut [Mathis2018] and of SLEAP [Pereira2022], as CSV."""
+"""Tables of key points: of DeepLabCut [Mathis2018], of SLEAP [Pereira2022], and their like, as CSV.
+
+Names stand in rows of heads above the columns, in one row (``nose.x, nose.y, nose.score``), or a
+row is one point (``frame_idx, track, node, x, y, score``). Of several animals that one is read that
+was seen most.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,119 +18,254 @@ from ...errors import RecordingError
 from ...recording import FloatArray, Recording
 from ..files import bad_file, head_text, read_text, stem
 from ..findings import Findings
+from ..markers.sheet import Sheet
 from ..numbers import numbers
 from ..options import option
+from ..rates import rate_beside
 from ..reader import Hints, Reader
 from .egocentric import seen_from_the_body
 
-_HEADS = frozenset(("scorer", "individuals", "bodyparts", "coords"))
 USUAL_HZ = 30.0
 """Pictures a second where nobody says how many [1/s]."""
 
+_HEADS = ("scorer", "individuals", "bodyparts", "coords")  # as they stand, the last two always
+_SURE = ("likelihood", "score", "confidence", "conf", "probability", "visibility")
+_COORDS = frozenset(("x", "y", "z", *_SURE))
+_FRAMES = ("frame_idx", "frame")
+_TRACKS = ("track", "instance", "individual", "animal")
+_NODES = ("node", "bodypart", "keypoint")
+_LOOK = 6  # rows in which heads are looked for
+_FEWEST = 3  # points that a table must name to be taken for one of key points
+
 
 class DeepLabCutReader(Reader):
-    """Reads DeepLabCut's tables: rows of heads, scorer, (individuals,) bodyparts and coords."""
+    """Reads DeepLabCut's tables: rows of heads, (scorer, individuals,) bodyparts and coords."""
 
     format = "DeepLabCut"
     suffixes = (".csv",)
 
     def accepts(self, path: Path) -> bool:
-        """Whether the first head is that of the scorer."""
-        return head_text(path).lower().startswith("scorer,")
+        """Whether there is a row of coords, with likelihoods or under the names of other heads."""
+        rows = _first_rows(path)
+        at = _coords_row(rows)
+        if at is None:
+            return False
+        named = {row[0].lower() for row in rows[: at + 1] if row}
+        return not named.isdisjoint(_HEADS) or "likelihood" in map(str.lower, rows[at])
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read the animal that was seen most; see `Reader.read`."""
-        rows = _cells(path)
-        heads = {}
-        while rows and rows[0][1][0].lower() in _HEADS:
-            name, *head = rows.pop(0)[1]
-            heads[name.lower()] = head
-        if not {"bodyparts", "coords"} <= heads.keys() or not rows:
+        rows = _rows(path)
+        at = _coords_row([row for _, row in rows[:_LOOK]])
+        if at is None or at == 0:
             raise bad_file(path, "no rows of key points", "heads scorer, bodyparts and coords")
-        parts, coords = heads["bodyparts"], heads["coords"]
-        animals = heads.get("individuals", [""] * len(parts))
-        values = numbers(path, [row for _, row in rows], 1 + len(parts), [n for n, _ in rows])[
-            :, 1:
-        ]
-        columns: dict[str, dict[str, dict[str, int]]] = {}
-        for k, (animal, part, coord) in enumerate(zip(animals, parts, coords, strict=False)):
-            columns.setdefault(animal, {}).setdefault(part, {})[coord.lower()] = k
-        tracks = {
-            animal: _points(path, values, points, ("x", "y", "z"), "likelihood")
-            for animal, points in columns.items()
+        heads = {
+            (row[0].lower() if row[0].lower() in _HEADS else _HEADS[k - at - 1]): row
+            for k, (_, row) in enumerate(rows[: at + 1])
         }
+        coords, parts = heads["coords"], heads.get("bodyparts", rows[at - 1][1])
+        width = len(coords)
+        animals = (*heads.get("individuals", ()), *[""] * width)[:width]
+        body = [(n, row) for n, row in rows[at + 1 :] if any(row[1:])]  # below the index' name
+        table = numbers(path, [row for _, row in body], width, [n for n, _ in body])
+        table = _by_frame(path, table[:, 0], table)
+        columns: dict[str, dict[str, dict[str, int]]] = {}
+        for k in range(1, width):
+            points = columns.setdefault(animals[k], {})
+            points.setdefault(parts[k] if k < len(parts) else "", {})[coords[k].lower()] = k
+        tracks = {animal: _points(path, table, points) for animal, points in columns.items()}
         return _recording(path, tracks, hints, Findings(self.format))
 
 
 class SLEAPReader(Reader):
-    """Reads SLEAP's analysis tables: a row for each frame and track."""
+    """Reads SLEAP's tables: a row for each frame and track, or for each point of them."""
 
     format = "SLEAP"
     suffixes = (".csv",)
 
     def accepts(self, path: Path) -> bool:
-        """Whether the first columns are track and frame_idx."""
-        return head_text(path).lower().replace(" ", "").startswith("track,frame_idx,")
+        """Whether the first row names ``frame_idx``, and points or nodes."""
+        rows = _first_rows(path)
+        if not rows or "z" in map(str.lower, rows[0]):
+            return False
+        head = _Head.of(rows[0])
+        return head.is_sleap and bool(head.points or head.node is not None)
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read the track that was seen most; see `Reader.read`."""
-        rows = _cells(path)
-        head, body = rows[0][1] if rows else [], rows[1:]
+        return _flat(path, hints, Findings(self.format))
+
+
+class KeyPointsReader(Reader):
+    """Reads other tables of points in a picture: ``nose_x, nose_y, nose_likelihood``, ..."""
+
+    format = "key points"
+    suffixes = (".csv",)
+
+    def accepts(self, path: Path) -> bool:
+        """Whether the first row names x, y and a likelihood, and no z, of three points or more."""
+        rows = _first_rows(path)
+        points = _Head.of(rows[0]).points if rows else {}
+        flat = [own for own in points.values() if {"x", "y"} <= own.keys()]
+        return (
+            len(flat) >= _FEWEST
+            and not any("z" in own for own in points.values())
+            and all(not own.keys().isdisjoint(_SURE) for own in flat)
+        )
+
+    def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
+        """Read the points; see `Reader.read`."""
+        return _flat(path, hints, Findings(self.format))
+
+
+@dataclass(frozen=True)
+class _Head:
+    """What the names in the first row of a table say.
+
+    Attributes:
+        points: Columns of each point, by its name and by ``x``, ``y``, ... in small letters.
+        frame: Column of the frames' numbers; None where there is none.
+        track: Column that tells animals apart; None where there is none.
+        node: Column of the points' names where a row is one point; None where it is not.
+        is_sleap: Whether it is SLEAP's.
+    """
+
+    points: dict[str, dict[str, int]]
+    frame: int | None
+    track: int | None
+    node: int | None
+    is_sleap: bool
+
+    @classmethod
+    def of(cls, row: Sequence[str]) -> _Head:
+        """Return what a row of names says."""
+        names = [name.lower() for name in row]
+
+        def column(wanted: tuple[str, ...]) -> int | None:
+            return next((names.index(name) for name in wanted if name in names), None)
+
+        node = column(_NODES) if {"x", "y"} <= set(names) else None
         points: dict[str, dict[str, int]] = {}
-        for k, name in enumerate(head):
-            part, dot, coord = name.rpartition(".")
-            if dot and part != "instance":
-                points.setdefault(part, {})[coord.lower()] = k - 1
-        lines = [line for line, _ in body]
-        table = numbers(path, [row[1:] for _, row in body], len(head) - 1, lines)
-        at = table[:, 0]
-        if not len(at) or np.isnan(at).any() or at.min() < 0 or np.ptp(at) > 100 * len(at) + 1000:
-            raise bad_file(path, "no frames, or numbers far apart", "frames one after the other")
-        frames = np.rint(at - at.min()).astype(np.int64)
-        names = np.array([row[0] for _, row in body])
-        tracks = {}
-        for track in dict.fromkeys(names.tolist()):
-            whole = np.full((int(frames.max()) + 1, table.shape[1]), np.nan)
-            whole[frames[names == track]] = table[names == track]
-            tracks[track] = _points(path, whole, points, ("x", "y", "z"), "score")
-        return _recording(path, tracks, hints, Findings(self.format))
+        for k, name in enumerate(row):
+            match = re.fullmatch(r"(.+)[._ ](\w+)", name)
+            if match and match[2].lower() in _COORDS and match[1].lower() not in _TRACKS:
+                points.setdefault(match[1], {})[match[2].lower()] = k
+        if node is not None:
+            points = {}
+        return cls(points, column(_FRAMES), column(_TRACKS), node, "frame_idx" in names)
 
 
-def _cells(path: Path) -> list[tuple[int, list[str]]]:
+def _flat(path: Path, hints: Hints, findings: Findings) -> Recording:
+    """Read a table with one row of names."""
+    rows = _rows(path)
+    head = _Head.of(rows[0][1]) if rows else None
+    if head is None or not (head.points or head.node is not None) or len(rows) < 2:
+        raise bad_file(path, "no rows of key points", "names of columns, then a row for each frame")
+    width = len(rows[0][1])
+    for n, row in rows[1:]:
+        if len(row) != width:
+            raise bad_file(path, f"line {n} has {len(row)} columns", f"{width}, as the names")
+    body, lines = [row for _, row in rows[1:]], [n for n, _ in rows[1:]]
+    if head.node is not None:
+        names = [name.lower() for name in rows[0][1]]
+        own = {each: names.index(each) for each in names if each in _COORDS}
+    else:
+        own = {f"{p} {c}": k for p, each in head.points.items() for c, k in each.items()}
+    used = [*([] if head.frame is None else [head.frame]), *own.values()]
+    table = numbers(path, [[row[k] for k in used] for row in body], len(used), lines)
+    at = table[:, 0] if head.frame is not None else np.arange(len(table), dtype=np.float64)
+    values = table[:, 1:] if head.frame is not None else table
+    place = dict(zip(own, range(len(own)), strict=True))
+    who = np.array([row[head.track] if head.track is not None else "" for row in body])
+    first, last = _span(path, at)
+    tracks = {}
+    for track in dict.fromkeys(who.tolist()):
+        rows_of = who == track
+        if head.node is None:
+            whole = np.full((last - first + 1, values.shape[1]), np.nan)
+            whole[at[rows_of].astype(np.int64) - first] = values[rows_of]
+            points = {p: {c: place[f"{p} {c}"] for c in each} for p, each in head.points.items()}
+        else:
+            nodes = np.array([row[head.node] for row in body])
+            known = list(dict.fromkeys(nodes[rows_of].tolist()))
+            whole = np.full((last - first + 1, len(known) * values.shape[1]), np.nan)
+            points = {}
+            for j, node in enumerate(known):
+                one, begin = rows_of & (nodes == node), j * values.shape[1]
+                whole[at[one].astype(np.int64) - first, begin : begin + values.shape[1]] = values[
+                    one
+                ]
+                points[node] = {c: begin + k for c, k in place.items()}
+        tracks[track] = _points(path, whole, points)
+    return _recording(path, tracks, hints, findings)
+
+
+def _first_rows(path: Path) -> list[list[str]]:
+    try:
+        return [row for _, row in _cells(path, head_text(path), _LOOK)]
+    except RecordingError:  # quotes that do not match: no table
+        return []
+
+
+def _rows(path: Path) -> list[tuple[int, list[str]]]:
+    return _cells(path, read_text(path))
+
+
+def _cells(path: Path, text: str, most: int | None = None) -> list[tuple[int, list[str]]]:
     """Return the cells of each line that holds any, and the line's number."""
-    lines = enumerate(read_text(path).splitlines(), start=1)
-    rows = ((n, [cell.strip().strip('"') for cell in line.split(",")]) for n, line in lines)
-    return [(n, row) for n, row in rows if any(row)]
+    sheet = Sheet.of(path, text, separators=",;\t")
+    rows = sheet.rows(0, None if most is None else min(most, len(sheet.lines)))
+    return [(n, [cell.strip() for cell in row]) for n, row in rows]
+
+
+def _coords_row(rows: list[list[str]]) -> int | None:
+    """Return which row names coordinates alone; its first cell is the head's own name."""
+    for k, row in enumerate(rows):
+        cells = [cell.lower() for cell in row[1:]]
+        if {"x", "y"} <= set(cells) <= _COORDS:
+            return k
+    return None
+
+
+def _span(path: Path, at: FloatArray) -> tuple[int, int]:
+    """Return the first and the last of some frames' numbers."""
+    whole = len(at) and np.isfinite(at).all() and (at == np.rint(at)).all()
+    if not whole or at.min() < 0 or at.max() > 1e15 or np.ptp(at) > 100 * len(at) + 1000:
+        raise bad_file(path, "no frames, or numbers far apart", "frames one after the other")
+    return int(at.min()), int(at.max())
+
+
+def _by_frame(path: Path, at: FloatArray, table: FloatArray) -> FloatArray:
+    """Return a table with a row for each frame by its number, where they are numbered."""
+    if len(at) < 2 or not (np.diff(at) >= 1.0).all() or (at != np.rint(at)).any():
+        return table
+    first, last = _span(path, at)
+    whole = np.full((last - first + 1, table.shape[1]), np.nan)
+    whole[at.astype(np.int64) - first] = table
+    return whole
 
 
 Track = tuple[FloatArray, tuple[str, ...], FloatArray | None]
 
 
-def _points(
-    path: Path,
-    values: FloatArray,
-    columns: dict[str, dict[str, int]],
-    axes: tuple[str, ...],
-    sure: str,
-) -> Track:
+def _points(path: Path, values: FloatArray, columns: dict[str, dict[str, int]]) -> Track:
     """Return points, shape (T, K, 2 or 3), their names, and how likely each is, shape (T, K)."""
-    n_axes = 3 if all("z" in own for own in columns.values()) else 2
-    whole = {name: own for name, own in columns.items() if set(axes[:n_axes]) <= own.keys()}
+    axes = "xyz" if all("z" in own for own in columns.values()) else "xy"
+    whole = {name: own for name, own in columns.items() if set(axes) <= own.keys()}
     if not whole:
         raise bad_file(path, "no key point with x and y", "columns x, y (and z) for each point")
-    points = np.stack(
-        [values[:, [own[axis] for axis in axes[:n_axes]]] for own in whole.values()], axis=1
-    )
-    if n_axes == 2:
+    points = np.stack([values[:, [own[axis] for axis in axes]] for own in whole.values()], axis=1)
+    if len(axes) == 2:
         points[..., 1] *= -1.0  # a picture's rows are counted downwards
     likely = None
-    if all(sure in own for own in whole.values()):
+    sure = next((s for s in _SURE if all(s in own for own in whole.values())), None)
+    if sure is not None:
         likely = np.nan_to_num(values[:, [own[sure] for own in whole.values()]])
     return points, tuple(whole), likely
 
 
 def _recording(path: Path, tracks: dict[str, Track], hints: Hints, findings: Findings) -> Recording:
-    rate_hz = hints.rate_hz
+    rate_hz = hints.rate_hz or rate_beside(path, findings)
     if rate_hz is None:
         rate_hz = USUAL_HZ
         findings.note(

@@ -44,6 +44,10 @@ class C3DReader(Reader):
             findings.warn(
                 f"the header tells of {content.said_frames} frames, {n_frames} are there and read"
             )
+        if content.unmeasured:
+            findings.warn(
+                "no point is said to be measured, in no frame: they are taken as they are"
+            )
         points, names = _measured(path, content, findings)
         rate_hz = hints.rate_hz or _rate(path, content, findings)
         at = placed(path, points, names, rate_hz, _space(path, hints, content), hints, findings)

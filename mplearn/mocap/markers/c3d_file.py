@@ -36,12 +36,14 @@ class C3DContent:
         parameters: Texts or numbers, by group and name, in upper case.
         rate_hz: Frames per second after the header [1/s].
         said_frames: How many frames the file says that it holds, if that is not what it holds.
+        unmeasured: Whether no point is said to be measured, and all are there nevertheless.
     """
 
     points: FloatArray
     parameters: Parameters
     rate_hz: float
     said_frames: int | None = None
+    unmeasured: bool = False
 
     def texts(self, group: str, name: str) -> list[str]:
         """Return a parameter's texts; none where it is missing or holds numbers."""
@@ -99,9 +101,13 @@ def parse_c3d(path: Path, data: bytes) -> C3DContent:
     values = _reals(raw, processor) if real else np.frombuffer(raw, order + "i2")
     table = values.reshape(n_frames, width)[:, : 4 * n_points].reshape(n_frames, n_points, 4)
     points = table[:, :, :3].astype(np.float64) * (1.0 if real else scale)
-    gone = (table[:, :, 3] < 0) | ~np.isfinite(table).all(axis=2) | (points == 0.0).all(axis=2)
-    points[gone] = np.nan
-    return C3DContent(points, content.parameters, rate_hz, None if said == n_frames else said)
+    nowhere = ~np.isfinite(table).all(axis=2) | (points == 0.0).all(axis=2)
+    gone = nowhere | (table[:, :, 3] < 0)
+    unmeasured = bool(gone.all() and not nowhere.all())
+    points[nowhere if unmeasured else gone] = np.nan
+    return C3DContent(
+        points, content.parameters, rate_hz, None if said == n_frames else said, unmeasured
+    )
 
 
 def _parameters(path: Path, data: bytes, at: int, stop: int, processor: int) -> Parameters:

@@ -10,7 +10,9 @@ import re
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 
+from ..placing.part_names import Place, place_of
 from ..placing.size import named_unit
 
 # fmt: off
@@ -30,7 +32,7 @@ OPENPOSE_BODY_25 = (
 # fmt: on
 _NUMBERED = {33: MEDIAPIPE_POSE, 25: OPENPOSE_BODY_25}
 
-_SEP = r"[\s,._:|/\-]"
+_SEP = r"[\s,._:|/>\-]"
 _UNIT_BEHIND = re.compile(r"(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]*?)\s*[\])]\s*$")
 _UNIT_JOINED = re.compile(rf"(?P<name>.*[^\s._]){_SEP}(?P<unit>mm|cm|deg|degrees|rad|m)$", re.I)
 _AXES = (
@@ -53,8 +55,12 @@ _NO_POSITION = frozenset((
 _OF_A_MARKER = frozenset(("v", "std", "sd", "var", "err", "error"))  # and no other marker
 _DECORATION = frozenset((
     "pos", "position", "positions", "coord", "coords", "coordinate", "coordinates", "loc",
-    "location", "trans", "translation", "translate", "t", "p", "tr", "point", "xyz",
+    "location", "trans", "translation", "translate", "t", "p", "tr", "point", "xyz", "marker",
+    "markers", "landmark", "landmarks", "keypoint", "keypoints", "joint", "joints", "world",
+    "global", "pose",
 ))
+_WHOLE = "body"  # as in FreeMoCap's tables, where others have hands and face: it tells where, too
+_MANY = 12  # markers: what so many names share is not where they sit
 # fmt: on
 _CONFIDENCE = re.compile(
     rf"(.*{_SEP})?(visibility|presence|likelihood|confidence|conf|score|prob|probability|residual|"
@@ -137,6 +143,16 @@ class Columns:
         """Columns that have no name, among others that have."""
         return [i for i, name in enumerate(self.names) if not name and i not in self.frames]
 
+    @property
+    def of_markers(self) -> set[int]:
+        """Columns whose names begin as those of a marker: where it is, how it is turned, ..."""
+        named = (
+            zip(*(self.names[i] for i in axes), strict=False) for axes in self.markers.values()
+        )
+        alike = (takewhile(lambda each: len(set(each)) == 1, letters) for letters in named)
+        known = tuple(stem for stem in ("".join(a for a, *_ in same) for same in alike) if stem)
+        return {i for i in self.measured if known and self.names[i].startswith(known)}
+
     def time_unit_s(self, column: int) -> float | None:
         """Return the unit of a column of times [s], if its header says it."""
         said = self.units[column].lower()
@@ -146,7 +162,7 @@ class Columns:
 
 def meaning_of(header: Sequence[str]) -> Columns:
     """Return what columns mean, by their names."""
-    split = [_without_unit(name.strip()) for name in header]
+    split = [_without_unit(_untupled(name.strip())) for name in header]
     names, units = tuple(name for name, _ in split), tuple(unit for _, unit in split)
     texts = {name.lower(): i for i, name in enumerate(names) if name.lower() in _TEXTS}
     special = set(texts.values())
@@ -210,6 +226,12 @@ def angle_factor(unit: str) -> float | None:
     return 1.0 if plain in ("rad", "radian", "radians") else None
 
 
+def _untupled(name: str) -> str:
+    """Return ``LFHD.x`` for ``('LFHD', 'x')``, as pandas joins the levels of a header."""
+    match = re.fullmatch(r"\(([^()]+,[^()]+)\)", name)
+    return ".".join(part.strip(" '\"") for part in match[1].split(",")) if match else name
+
+
 def _without_unit(name: str) -> tuple[str, str]:
     for pattern in (_UNIT_BEHIND, _UNIT_JOINED):
         match = pattern.fullmatch(name)
@@ -257,21 +279,31 @@ def _markers(
 
 
 def _undecorated(names: list[str]) -> list[str]:
-    """Return names without the words and quotes that all of them begin or end with."""
+    """Return names without the words and quotes that all of them begin or end with.
+
+    A word that tells where on a body, or on which side, stays; so does what few names share.
+    """
     ways = (
-        (rf"(\w+){_SEP}+(.+)", 1, 2),
-        (rf"(.+?){_SEP}+(\w+)", 2, 1),
+        (r"([^\W_]+)[\W_]+(.+)", 1, 2),
+        (r"(.+?)[\W_]+([^\W_]+)", 2, 1),
+        (r"(.*?[^\W_])(Pos|Position|Coord)", 2, 1),
         (r"(['\"])(.+)\1", 0, 2),
     )
     for pattern, word, rest in ways:
-        matches = [re.fullmatch(pattern, name) for name in names]
-        words = {match[word].lower() for match in matches if match} if word else set()
-        known = len(words) == 1 and words <= _DECORATION if word else True
-        short = [match[rest] for match in matches if match]
+        matches = [match for name in names if (match := re.fullmatch(pattern, name))]
+        words = {match[word].lower() for match in matches} if word else set()
+        short = [match[rest] for match in matches]
+        shared = not word or (len(words) == 1 and _may_go(words.pop(), len(names)))
         differ = len(names) >= 3 and len(short) == len(set(short)) == len(names)
-        if known and differ and not all(name.isdigit() for name in short):  # T_1 is a vertebra
+        if shared and differ and not all(name.isdigit() for name in short):  # T_1 is a vertebra
             names = short
     return names
+
+
+def _may_go(word: str, n_names: int) -> bool:
+    """Whether a word that so many names share tells neither a part of a body nor a side."""
+    tells = word == _WHOLE or place_of(word) != Place("", "")
+    return word in _DECORATION or (n_names >= _MANY and not tells)
 
 
 def _last_word(name: str) -> str:
@@ -283,11 +315,11 @@ def _last_word(name: str) -> str:
 def _by_number(markers: dict[str, tuple[int, int, int]]) -> dict[str, tuple[int, int, int]]:
     """Name the landmarks of a known number that are only numbered."""
     names = _NUMBERED.get(len(markers))
-    numbers = [re.fullmatch(r"(?:landmark|point|kp|p|joint|keypoint)?[\s._]*(\d{1,3})", name, re.I)
-               for name in markers]  # fmt: skip
-    if names is None or not all(numbers):
+    numbers = [re.fullmatch(r"(\D*)(\d{1,3})(\D*)", name) for name in markers]
+    around = {match.group(1, 3) for match in numbers if match}
+    if names is None or not all(numbers) or len(around) > 1:
         return markers
-    counted = [int(match[1]) for match in numbers if match]
+    counted = [int(match[2]) for match in numbers if match]
     first = min(counted)
     if first > 1 or sorted(counted) != list(range(first, first + len(names))):
         return markers

@@ -45,7 +45,7 @@ from .columns import MEDIAPIPE_POSE, Columns, angle_factor, meaning_of, numbered
 from .names import chosen_names
 from .sheet import Header, Sheet, find_header, is_number
 
-_MARKERS_SHARE = 0.5  # of the measured columns: from there on it is a table of markers
+_MARKERS_SHARE = 0.5  # of a table's columns, without what else a marker has: it is one of markers
 _LEAST_MARKERS = 3  # that a .txt file must name to be taken for a table
 _SAME_STEP = 0.01
 _TURN = 2 * np.pi
@@ -157,7 +157,8 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
     texts: dict[str, list[str]] = {name: [] for name in textual}
     markers = [i for axes in columns.markers.values() for i in axes]
     measured = [i for i in columns.measured if i not in textual.values()]
-    are_markers = bool(markers) and len(markers) >= _MARKERS_SHARE * len(measured)
+    others = set(measured) - columns.of_markers - set(markers)
+    are_markers = bool(markers) and len(markers) >= _MARKERS_SHARE * (len(markers) + len(others))
     if are_markers:
         wanted = markers
     elif columns.points is not None:

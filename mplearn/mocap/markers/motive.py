@@ -19,6 +19,10 @@ from .blocks import Block, marker_columns, read_block
 from .sheet import Sheet
 
 _HEADER_LINES = 12
+_KINDS = {
+    *("marker", "bone", "rigid body", "bone marker", "rigid body marker", "skeleton marker"),
+    "unlabeled marker",
+}
 _WANTED = (  # what to read, the best first
     ("marker",),
     ("rigid body marker", "bone marker", "skeleton marker"),
@@ -33,8 +37,11 @@ class MotiveReader(Reader):
     suffixes = (".csv",)
 
     def accepts(self, path: Path) -> bool:
-        """Whether the file begins with ``Format Version``."""
-        return head_text(path, 64).lstrip('\ufeff"').startswith("Format Version")
+        """Whether the file begins with ``Format Version``, or with the row of types below it."""
+        text = head_text(path).lstrip('\ufeff"\r\n')
+        cells = text.split("\n", 1)[0].replace('"', "").strip().split(",")
+        types = {cell.strip().lower() for cell in cells} - {"", "type"}
+        return text.startswith("Format Version") or bool(types and types <= _KINDS)
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read the markers; see `Reader.read`."""
@@ -94,9 +101,6 @@ def _block(sheet: Sheet, findings: Findings) -> Block:
     return Block(
         tuple(_plain(n) for n in names), columns, axes + 1, len(sheet.lines), width, time, 0
     )
-
-
-_KINDS = {"marker", "bone", "rigid body", "bone marker", "rigid body marker", "skeleton marker"}
 
 
 def _plain(name: str) -> str:

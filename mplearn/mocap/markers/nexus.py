@@ -33,7 +33,7 @@ class NexusReader(Reader):
 
     def accepts(self, path: Path) -> bool:
         """Whether the file begins with the title of a block, and its rate."""
-        lines = head_text(path).splitlines()[:2]
+        lines = head_text(path).lstrip("\ufeff\r\n \t,;").splitlines()[:2]
         return len(lines) == 2 and _title(lines[0]) in _TITLES and bool(_RATE.fullmatch(lines[1]))
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:

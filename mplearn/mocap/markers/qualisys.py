@@ -11,6 +11,7 @@ from ..numbers import number
 from ..placing.space import Space
 from ..reader import Hints, Reader
 from .blocks import Block, read_block
+from .columns import meaning_of
 from .sheet import Sheet, is_number
 
 _FIRST = "NO_OF_FRAMES"
@@ -42,10 +43,10 @@ class QualisysReader(Reader):
                 break
         if _FIRST not in said:
             raise bad_file(path, f"no {_FIRST}", "an export of QTM with its header")
-        block = _block(sheet, said, start)
         included = said.get("DATA_INCLUDED", ["3D"])[:1]
         if included != ["3D"]:
-            raise bad_file(path, f"DATA_INCLUDED is {included[0]!r}", "'3D': markers")
+            raise bad_file(path, f"DATA_INCLUDED is {' '.join(included)!r}", "'3D': markers")
+        block = _block(sheet, said, start)
         rate = next(iter(said.get("FREQUENCY", [])), "")
         said_hz = number(path, rate, "FREQUENCY") if rate else None
         n_frames = sum(bool(line.strip()) for line in sheet.lines[block.start :])
@@ -61,7 +62,7 @@ def _block(sheet: Sheet, said: dict[str, list[str]], start: int) -> Block:
     while names and not names[-1]:
         names.pop()
     if not names:
-        raise bad_file(sheet.path, f"no {_NAMES}", "an export of QTM with its header")
+        return _named_columns(sheet, said, start)
     before = 0
     time = frame = None
     headed = start < len(sheet.lines) and not sheet.is_data(start)
@@ -84,3 +85,22 @@ def _block(sheet: Sheet, said: dict[str, list[str]], start: int) -> Block:
     columns = tuple((at, at + 1, at + 2) for at in range(before, before + 3 * len(names), 3))
     width = before + 3 * len(names)
     return Block(tuple(names), columns, start, len(sheet.lines), width, time, frame)
+
+
+def _named_columns(sheet: Sheet, said: dict[str, list[str]], start: int) -> Block:
+    """Return the points that a row of names tells of, as in exports of skeletons."""
+    named = start < len(sheet.lines) and not sheet.is_data(start)
+    meaning = meaning_of(sheet.cells(start)) if named else None
+    if meaning is None or not meaning.markers:
+        raise bad_file(sheet.path, f"no {_NAMES}", "an export of QTM with its header")
+    if said.get("REFERENCE", [""])[:1] == ["LOCAL"]:
+        raise bad_file(sheet.path, "REFERENCE is LOCAL", "'GLOBAL': places in the world")
+    return Block(
+        tuple(meaning.markers),
+        tuple(meaning.markers.values()),
+        start + 1,
+        len(sheet.lines),
+        len(meaning.names),
+        next(iter(meaning.times), None),
+        next(iter(meaning.frames), None),
+    )

@@ -85,9 +85,10 @@ class _Header:
 
     @classmethod
     def parse(cls, path: Path, lines: list[str]) -> _Header:
-        if len(lines) < 6 or not lines[0].lower().startswith("pathfiletype"):
+        starts = ("pathfiletype", "datarate")  # the first line may be lost
+        if len(lines) < 5 or not lines[0].lower().startswith(starts):
             raise bad_file(path, f"starts with {lines[0][:40]!r}", _EXPECTED)
-        first = [line.split("\t")[0].strip().lower() for line in lines[:12]]
+        first = [line.split("\t")[0].strip('" ').lower() for line in lines[:12]]
         at = next((i for i, cell in enumerate(first) if cell.strip("# ") == "frame"), None)
         if at is None:
             raise bad_file(path, f"line 4 starts with {lines[3][:40]!r}", _EXPECTED)
@@ -118,11 +119,11 @@ def _table(
         findings: Where to tell what contradicts itself.
     """
     path, lines = sheet.path, sheet.lines
-    labels = _labels(lines[header.names_at].rstrip("\r\n").split("\t")[2:])
+    labels = _labels(sheet.cells(header.names_at)[2:])
     if not labels:
         raise bad_file(path, "no marker names", "at least one")
     start = header.names_at + 1
-    if start < len(lines) and _names_axes(lines[start]):
+    if start < len(lines) and _names_axes(lines[start].replace('"', "")):
         start += 1
     values = measured_rows(
         path, sheet.rows(start), 2 + 3 * len(labels), findings, group=group, cut_off=sheet.cut_off
@@ -168,7 +169,9 @@ def _in_time(
         else np.nan
     )
     clock = None
-    if np.isnan(times_s).all() or not np.ptp(times_s):
+    # frames' numbers, where times should be
+    counted = 2.0 < rate_hz < np.inf and bool((np.diff(times_s) == 1.0).all())
+    if np.isnan(times_s).all() or not np.ptp(times_s) or counted:
         if len(points) > 1:
             findings.note("there are no times; frames are taken as even")
     else:

@@ -4,8 +4,9 @@ Each of the six directions of the axes earns evidence [nat]; the names of the po
 it, and hints only:
 
 * names: the parts that sit higher on a body (`part_names.HEIGHTS`) lie farther along it;
-* floor: the lowest points stay at one level, and most laboratories put zero there; where the file
-  says which way is up, and most of the body lies on that floor, it is believed;
+* floor: the lowest points stay at one level, and most laboratories put zero there, unless it is in
+  the hips; where the file says which way is up, and most of the body lies on that floor, it is
+  believed;
 * contact: what is lowest stands still more often than what is highest;
 * stature: a person is mostly taller than wide.
 """
@@ -32,6 +33,7 @@ _STANDS = frozenset(("toe", "heel", "ankle"))
 _FLOOR = 3.0  # a wall through the origin looks like one as well
 _FLOOR_M = (-0.06, 0.13)  # height of the lowest points of a standing foot
 _FLAT_M, _STEADY_M = 0.3, 0.04  # how high who lies is, and how steady the level
+_AT_ZERO_M = 0.02  # so close to where all is counted from is there
 _FLOOR_LIFT_M = 0.25  # jumps are rare and low
 _STEADY, _CONTACT, _TALL = 2.0, 1.0, 1.5  # nat, at most
 _ROUGH_M = 0.01  # as level as the lowest points of a foot are
@@ -92,7 +94,7 @@ def find_vertical(
     parts = [part for part in (place_of(name).part for name in names) if part]
     # what is lowest of an arm tells nothing; among points whose names say nothing there may be feet
     if len(parts) < _MOST * len(names) or not _STANDS.isdisjoint(parts):
-        floor = _by_floor(first, seen)
+        floor = np.zeros(6) if _from_hips(first, names) else _by_floor(first, seen)
         evidence += floor + _by_motion(first, after, seen, rate_hz) + _by_stature(first, seen)
     best = int(np.argmax(evidence))
     if says_so and best != start and floor[start] > 0 and _rests_on(first, seen)[start]:
@@ -156,6 +158,14 @@ def _by_floor(points: FloatArray, seen: BoolArray) -> FloatArray:
     floor, lifted = np.percentile(lowest, [5, 90], axis=0)
     there = (floor >= _FLOOR_M[0]) & (floor <= _FLOOR_M[1]) & (lifted <= floor + _FLOOR_LIFT_M)
     return np.where(there, _FLOOR, 0.0)
+
+
+def _from_hips(points: FloatArray, names: tuple[str, ...]) -> bool:
+    """Whether points are counted from the middle of the hips, as MediaPipe's: no floor is there."""
+    hips = [i for i, name in enumerate(names) if place_of(name).part == "pelvis"]
+    away = np.linalg.norm(points[:, hips].mean(axis=1), axis=1) if hips else np.empty(0)
+    away = away[~np.isnan(away)]
+    return bool(len(away) and np.percentile(away, 95) < _AT_ZERO_M)
 
 
 def _rests_on(points: FloatArray, seen: BoolArray) -> BoolArray:

@@ -117,6 +117,8 @@ class _Parser:
                 top.offset = self._offset(top.name)
             elif key == "CHANNELS" and top is not None and not top.is_end:
                 self._channels(top)
+            elif key == "CHANNELS" and top is not None and self._peek() == "0":
+                self.place += 1
             elif key == "}" and top is not None:
                 self._close(top)
                 stack.pop()

@@ -21,12 +21,12 @@ from ..clock import even_clock
 from ..files import bad_file, head_text, read_text
 from ..findings import Findings
 from ..numbers import numbers
-from ..options import option
 from ..placing.space import Space
 from ..rates import rate_beside
 from ..reader import Hints, Reader
 from .g1 import BASE, G1_JOINTS, g1_joints
 from .skeletal import Column, SkeletalMotion, skeletal_recording
+from .stature import unit_of_places
 
 _WIDTH = 7 + len(G1_JOINTS)
 _HEADERLESS = ("x", "y", "z", "qx", "qy", "qz", "qw", *G1_JOINTS)
@@ -37,7 +37,6 @@ _ROTATION = re.compile(rf"{_ROOT}(?:rotate|rotation|euler)_?([xyz])")
 _TIMES = ("time", "time_s", "timestamp", "t")
 _RETARGETED_HZ, _SEED_HZ = 30.0, 120.0
 _MOST_BEFORE = 2  # columns before a pose: a frame's number, and its time
-_HEIGHT_M = (0.05, 3.0)  # of the pelvis, lying to leaping
 _EXPECTED = "the pelvis' place and orientation, and the G1's 29 joints"
 
 _COLUMNS = (
@@ -87,7 +86,7 @@ class G1CSVReader(Reader):
             header = [*map(_counts, before.T), *_HEADERLESS]
         at = _columns(path, header, findings)
         seed = "qw" not in at
-        unit_m = _unit(path, table[:, at["z"]], 0.01 if seed else 1.0, hints, findings)
+        unit_m = unit_of_places(path, table[:, at["z"]], 0.01 if seed else 1.0, hints, findings)
         values = np.zeros((len(table), len(BASE) + len(G1_JOINTS)))
         values[:, :3] = table[:, [at[axis] for axis in "xyz"]] * unit_m
         values[:, 3:6] = _root_angles(table, at, findings)
@@ -117,6 +116,7 @@ class G1CSVReader(Reader):
 
 
 def _cells(line: str) -> list[str]:
+    line = line.lstrip("# ")  # as numpy writes headers
     for separator in (";", "\t", ","):
         if separator in line:
             line = line if separator == "," else line.replace(",", ".")  # decimal commas
@@ -139,7 +139,8 @@ def _counts(column: FloatArray) -> str:
 
 def _joint(name: str) -> str | None:
     """Return the joint of the G1 that a column is named after: ``waist_yaw``, ``..._joint_dof``."""
-    plain = re.sub(r"(_joint|_dof|_pos|_angle|_rad|_deg)+$", "", name.strip().lower())
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])|[\s.\-]+", "_", name.strip()).lower()
+    plain = re.sub(r"(_joint|_dof|_pos|_angle|_rad|_deg)+$", "", words)
     return f"{plain}_joint" if f"{plain}_joint" in G1_JOINTS else None
 
 
@@ -148,7 +149,7 @@ def _columns(path: Path, header: list[str], findings: Findings) -> dict[str, int
     at: dict[str, int] = {}
     for index, name in enumerate(header):
         plain = name.lower()
-        found = _joint(plain)
+        found = _joint(name)
         for prefix, pattern in (("", _PLACE), ("q", _QUATERNION), ("r", _ROTATION)):
             match = pattern.fullmatch(plain)
             if found is None and match is not None:
@@ -192,25 +193,3 @@ def _upright(rotations: FloatArray) -> float:
     """Return the median height of the tip of the body's upward axis, 1 for who stands."""
     heights = rotations[:, 2, 2]
     return float(np.median(heights[~np.isnan(heights)])) if not np.isnan(heights).all() else 0.0
-
-
-def _unit(
-    path: Path, heights: FloatArray, usual_m: float, hints: Hints, findings: Findings
-) -> float:
-    """Return the unit of the pelvis' place [m], by its height; joints are as far apart anyway."""
-    height = float(np.nanmedian(np.abs(heights))) if not np.isnan(heights).all() else 0.0
-    low, high = _HEIGHT_M
-    if hints.unit_m is not None:
-        if height > 0 and not low / 10 <= height * hints.unit_m <= high * 10:
-            raise bad_file(
-                path,
-                f"the pelvis is {height * hints.unit_m:.3g} m up",
-                f"{low:g} to {high:g} m; is {option('unit_m')} right?",
-            )
-        return hints.unit_m
-    for unit_m in (usual_m, 1.0, 0.01, 0.001):
-        if low <= height * unit_m <= high:
-            if unit_m != usual_m:
-                findings.warn(f"a unit of {unit_m:g} m by the height of the pelvis")
-            return unit_m
-    return usual_m

@@ -10,6 +10,7 @@ chosen when it is exported:
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -67,9 +68,21 @@ class MVNXReader(Reader):
         return replace(recording, name=stem(path), person=file.subject)
 
 
+def _usual_parents(segments: list[str]) -> dict[str, str]:
+    """Return the parents that segments have in MVN's skeleton, however their names are spelled."""
+    named = {_letters(segment): segment for segment in segments}
+    usual = ((_letters(child), _letters(parent)) for child, parent in _USUAL_PARENTS.items())
+    return {named[child]: named[parent] for child, parent in usual if {child, parent} <= set(named)}
+
+
+def _letters(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
 def _tree(file: MVNXFile, findings: Findings) -> tuple[list[int], list[int]]:
     """Return the segments that hang on the first one, parents first, and each one's parent."""
-    parent_of = _USUAL_PARENTS | {child: parent for _, parent, _, child, _ in file.joints}
+    said = {child: parent for _, parent, _, child, _ in file.joints}
+    parent_of = _usual_parents(file.segments) | said
     order, place = [0], {file.segments[0]: 0}
     parents = [-1]
     waiting = list(range(1, len(file.segments)))
@@ -102,13 +115,10 @@ def _offsets(file: MVNXFile, order: list[int], parents: list[int]) -> FloatArray
 def _motion(file: MVNXFile, rate_hz: float, findings: Findings) -> SkeletalMotion:
     order, parents = _tree(file, findings)
     assert file.orientations is not None
-    quaternions = file.orientations[:, order]
-    sizes = np.linalg.norm(quaternions, axis=2)
-    quaternions = np.where(sizes[..., None] > 0.5, quaternions, np.nan)
-    world = quaternion_to_matrix(quaternions)
-    local = world.copy()
     moving = [i for i, parent in enumerate(parents) if parent >= 0]
     above = [parents[i] for i in moving]
+    world = _turns(file, order, moving, above, findings)
+    local = world.copy()
     local[:, moving] = world[:, above].swapaxes(-1, -2) @ world[:, moving]
     offsets = _offsets(file, order, parents)
     if file.positions is None:
@@ -118,12 +128,9 @@ def _motion(file: MVNXFile, rate_hz: float, findings: Findings) -> SkeletalMotio
     else:
         points = file.positions[:, order]
         places = points[:, 0]
-        bones = points[:, moving] - points[:, above]
-        in_parent = (world[:, above].swapaxes(-1, -2) @ bones[..., None])[..., 0]
-        seen = ~np.isnan(in_parent).any(axis=(1, 2))
-        if seen.any() and moving:
-            offsets[moving] = np.median(in_parent[seen], axis=0)
-            loose = np.linalg.norm(in_parent[seen] - offsets[moving], axis=2).max(axis=0)
+        bones, loose = _bones(points, world, moving, above)
+        if len(loose):
+            offsets[moving] = bones
             if loose.max() > _LOOSE_M:
                 name = file.segments[order[moving[int(loose.argmax())]]]
                 findings.warn(
@@ -141,6 +148,48 @@ def _motion(file: MVNXFile, rate_hz: float, findings: Findings) -> SkeletalMotio
             offsets = np.concatenate([offsets, end[None]])
     limbs = Limbs(tuple(names), tuple(parents), offsets, tuple(orders))
     return limbs.motion(local, places, rate_hz, _SPACE)
+
+
+def _turns(
+    file: MVNXFile, order: list[int], moving: list[int], above: list[int], findings: Findings
+) -> FloatArray:
+    """Return how the segments are turned, shape (T, S, 3, 3).
+
+    Quaternions begin with w; where bones are rigid only if they end with it, they do.
+    """
+    assert file.orientations is not None
+    quaternions = file.orientations[:, order]
+    sizes = np.linalg.norm(quaternions, axis=2)
+    quaternions = np.where(sizes[..., None] > 0.5, quaternions, np.nan)
+    world = quaternion_to_matrix(quaternions)
+    if file.positions is None:
+        return world
+    points = file.positions[:, order]
+    _, loose = _bones(points, world, moving, above)
+    if not len(loose) or np.median(loose) <= _LOOSE_M:
+        return world
+    ending = quaternion_to_matrix(quaternions[..., [3, 0, 1, 2]])
+    _, less = _bones(points, ending, moving, above)
+    if np.median(less) > _LOOSE_M:
+        return world
+    findings.warn("the quaternions are taken as x, y, z, w: else the bones are not rigid")
+    return ending
+
+
+def _bones(
+    points: FloatArray, world: FloatArray, moving: list[int], above: list[int]
+) -> tuple[FloatArray, FloatArray]:
+    """Return where segments are in their parents, shape (B, 3), and how far they move there (B,).
+
+    Both are empty where there are no bones, or they were never seen.
+    """
+    bones = points[:, moving] - points[:, above]
+    in_parent = (world[:, above].swapaxes(-1, -2) @ bones[..., None])[..., 0]
+    seen = ~np.isnan(in_parent).any(axis=(1, 2))
+    if not seen.any() or not moving:
+        return np.empty((0, 3)), np.empty(0)
+    middle: FloatArray = np.median(in_parent[seen], axis=0)
+    return middle, np.linalg.norm(in_parent[seen] - middle, axis=2).max(axis=0)
 
 
 def _lowest(offsets: FloatArray, parents: list[int]) -> float:

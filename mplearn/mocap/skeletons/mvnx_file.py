@@ -19,6 +19,8 @@ _TEXTS = (*_MEASURED, *_LISTED)
 _EXPECTED = "an MVNX file: mvnx, subject, segments, frames"
 _CUT_OFF = (3, 5)  # errors of expat: no element found, unclosed token
 _MOST_MISSING = 10  # times as many frames as there are
+_LARGEST = 1e12  # of a rate [1/s] and of times [ms]
+_SAME_RATE = 0.01  # how far the rates of subject and times may differ, as a share
 
 
 @dataclass
@@ -79,24 +81,41 @@ def read_mvnx(path: Path, text: str, findings: Findings) -> MVNXFile:
         ("orientation", len(file.segments)),
         ("jointAngle", len(file.joints)),
     ):
-        found = stream.measured[name]
-        if not found or not n_parts:
+        texts = stream.measured[name]
+        there = [frame for frame, text in enumerate(texts) if text]
+        if not there or not n_parts:
             continue
-        if len(found) != stream.numbers:
-            raise bad_file(path, f"{len(found)} of {stream.numbers} frames have {name}", "all")
+        if len(there) < len(texts):
+            findings.warn(f"{len(texts) - len(there)} of {len(texts)} frames have no {name}")
+        found = [texts[frame] for frame in there]
         table = np.full((rows[-1] + 1, n_parts, _MEASURED[name]), np.nan)
-        table[rows] = _table(path, found, name, n_parts * _MEASURED[name]).reshape(
-            len(rows), n_parts, -1
+        table[rows[there]] = _table(path, found, name, n_parts * _MEASURED[name]).reshape(
+            len(there), n_parts, -1
         )
         attribute = {"position": "positions", "orientation": "orientations"}.get(name)
         setattr(file, attribute or "joint_angles", table)
     if stream.t_pose:
         values = _table(path, [stream.t_pose], "position", 3 * len(file.segments))
         file.t_pose = values.reshape(-1, 3)
-    if file.rate_hz is None and len(stream.times_ms) > 1:
-        step_ms = float(np.median(np.diff(stream.times_ms)))
-        file.rate_hz = 1000.0 / step_ms if step_ms > 0 else None
+    file.rate_hz = _rate(file.rate_hz, stream.times_ms, rows, findings)
     return file
+
+
+def _rate(
+    said_hz: float | None, times_ms: list[float], rows: IntArray, findings: Findings
+) -> float | None:
+    """Return the rate [1/s]: what times say counts where the subject's rate is another."""
+    lasts_ms = times_ms[-1] - times_ms[0]
+    if not 0.0 < lasts_ms < _LARGEST:
+        return said_hz
+    measured_hz = 1000.0 * float(rows[-1]) / lasts_ms
+    if said_hz is None:
+        return measured_hz
+    slack = _SAME_RATE + measured_hz / 1000.0 / float(rows[-1])  # times are in whole milliseconds
+    if abs(measured_hz / said_hz - 1.0) <= slack:
+        return said_hz
+    findings.warn(f"frameRate is {said_hz:g}, the times say {measured_hz:.6g} Hz, which is used")
+    return measured_hz
 
 
 def _rows(indices: list[int], findings: Findings) -> IntArray:
@@ -108,6 +127,9 @@ def _rows(indices: list[int], findings: Findings) -> IntArray:
             findings.warn("the frames' indices do not increase: taken one by one")
         return np.arange(len(rows), dtype=np.int64)
     rows -= rows[0]
+    usual = int(np.median(steps)) if len(steps) else 1
+    if usual > 1 and not (rows % usual).any():  # every so many frames were exported
+        rows //= usual
     if len(rows) <= rows[-1]:
         findings.warn(f"{rows[-1] + 1 - len(rows)} frames are missing by their index")
     return rows
@@ -170,7 +192,8 @@ class _Stream:
             return
         if name == "subject":
             self.file.subject = attributes.get("label", "").strip()
-            self.file.rate_hz = _positive(attributes.get("frameRate", ""))
+            said_hz = _number(attributes.get("frameRate", ""))
+            self.file.rate_hz = said_hz if 0 < said_hz < _LARGEST else None
         elif name in ("segments", "joints"):
             self._list = name
         elif name == "segment" and self._list == "segments":
@@ -186,10 +209,11 @@ class _Stream:
             self._frame = attributes.get("type", "normal").strip().lower() or "normal"
             if self._frame == "normal":
                 self.numbers += 1
+                for texts in self.measured.values():
+                    texts.append("")
                 index = attributes.get("index", "")
                 self.indices.append(int(index[:12]) if index.isdecimal() else 0)
-                time_ms = _positive(attributes.get("time", ""))
-                self.times_ms += [] if time_ms is None else [time_ms]
+                self.times_ms.append(_number(attributes.get("time", "")))
         elif name in _MEASURED or _LISTED.get(name) == self._list:
             self._parts = []
 
@@ -207,8 +231,8 @@ class _Stream:
             return
         text, self._parts = "".join(self._parts).strip(), None
         if name in _MEASURED:
-            if self._frame == "normal" and text:
-                self.measured[name].append(text)
+            if self._frame == "normal":
+                self.measured[name][-1] = self.measured[name][-1] or text
             elif self._frame.startswith("tpose") and name == "position":
                 self.t_pose = self.t_pose or text
         elif name == "pos_b":
@@ -222,9 +246,9 @@ class _Stream:
                 self.file.joints.append((label, ends[0], ends[1], ends[2], ends[3]))
 
 
-def _positive(text: str) -> float | None:
+def _number(text: str) -> float:
+    """Return a number, NaN for none."""
     try:
-        value = float(text.replace(",", "."))
+        return float(text.replace(",", "."))
     except ValueError:
-        return None
-    return value if 0 < value < 1e12 else None
+        return float("nan")

@@ -8,6 +8,7 @@ Fingers, jaw and eyes are left out.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from ..rates import rate_beside
 from ..reader import Hints, Reader
 from .npz_file import NPZFile
 from .skeletal import Limbs, limb_order, skeletal_recording
+from .stature import unit_of_places
 
 STATURE_M = 1.70
 """How tall the person is whose bones turn [m]."""
@@ -66,6 +68,7 @@ _MODELS = {24: "SMPL", 52: "SMPL-H", 55: "SMPL-X", 22: "the body alone", 23: "SM
 _POSES = ("poses", "smpl_poses", "fullpose", "full_pose", "pose")
 _ROOTS = ("root_orient", "global_orient")
 _BODIES = ("pose_body", "body_pose")
+_FAR_M = 20.0  # from where all begins: hardly a place in metres
 _SQUARE = 0.01  # by which matrices and quaternions are off rotations, at most
 _PLACES = ("trans", "transl", "smpl_trans", "root_trans")
 _RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
@@ -96,12 +99,16 @@ class SMPLReader(Reader):
         local[:, :_N_BODY] = _TO_OURS @ turns @ _TO_OURS.T
         local[:, 0] = turns[:, 0] @ _TO_OURS.T  # the root's parent is the world
         places = _places(archive, len(vectors), findings)
+        unit_m = _unit(path, places, turns[:, 0, :, 1], hints, findings)
         findings.note(
             f"the bones are those of a person of mean proportions and {STATURE_M:.2f} m: "
             "the file holds none"
         )
-        motion = limbs.motion(local, places, rate_hz, Space(1.0, "z", "x"))
-        return skeletal_recording(path, motion, hints, findings, positions=positions)
+        motion = limbs.motion(local, places * unit_m, rate_hz, Space(1.0, "z", "x"))
+        metres = replace(hints, unit_m=1.0)  # the bones are ours, whatever the unit of places
+        recording = skeletal_recording(path, motion, metres, findings, positions=positions)
+        assert recording.report is not None
+        return replace(recording, report=replace(recording.report, unit_m=unit_m))
 
 
 def mean_person() -> Limbs:
@@ -146,7 +153,12 @@ def _vectors(archive: NPZFile, findings: Findings) -> FloatArray:
     if n_joints > _N_BODY:
         findings.leave_out([f"rotations of {n_joints - _N_BODY} joints of hands and face"])
     findings.note(f"the poses are those of {model}")
-    return poses.reshape(len(poses), n_joints, 3)[:, :_N_BODY]
+    vectors = poses.reshape(len(poses), n_joints, 3)[:, :_N_BODY]
+    turns = np.linalg.norm(np.nan_to_num(vectors[:, 1:]), axis=2).max(axis=1)
+    if np.median(turns) > 2.0 * np.pi:  # no joint but the root turns so far
+        findings.warn("joints turn by more than a full turn: the rotations are taken for degrees")
+        vectors = np.radians(vectors)
+    return vectors
 
 
 def _as_vectors(archive: NPZFile, name: str, findings: Findings) -> FloatArray:
@@ -159,6 +171,8 @@ def _as_vectors(archive: NPZFile, name: str, findings: Findings) -> FloatArray:
             rotation has that is known here.
     """
     values = _numbers(archive, name)
+    if values.ndim == 3 and len(values) == 1 and values.shape[2] >= 3 * _N_BODY:
+        values = values[0]  # a batch of one, as networks have it
     width = int(np.prod(values.shape[1:]))
     if width and width % 9 == 0:
         matrices = values.reshape(len(values), width // 9, 3, 3)
@@ -212,9 +226,29 @@ def _places(archive: NPZFile, n_frames: int, findings: Findings) -> FloatArray:
         height = -float(mean_person().offsets[[1, 4, 7, 10], 2].sum())
         return np.tile([0.0, 0.0, height], (n_frames, 1))
     places = _numbers(archive, name)
-    if places.shape != (n_frames, 3):
+    if places.size != 3 * n_frames or places.shape[-1:] != (3,):
         raise bad_file(archive.path, f"{name} of shape {places.shape}", f"({n_frames}, 3)")
-    return places
+    return places.reshape(n_frames, 3)
+
+
+def _unit(
+    path: Path, places: FloatArray, upward: FloatArray, hints: Hints, findings: Findings
+) -> float:
+    """Return the unit of the pelvis' places [m]: metres, or by its height where they are far off.
+
+    Args:
+        path: The file, for messages.
+        places: Shape (T, 3).
+        upward: Where the trunk points to, shape (T, 3).
+        hints: What the caller says.
+        findings: Where to tell what was found.
+    """
+    known = ~np.isnan(places).any(axis=1) & ~np.isnan(upward).any(axis=1)
+    far = known.any() and np.median(np.abs(places[known]).max(axis=1)) >= _FAR_M
+    if hints.unit_m is None and not far:
+        return 1.0
+    axis = int(np.abs(upward[known].sum(axis=0)).argmax())
+    return unit_of_places(path, places[known, axis], 1.0, hints, findings)
 
 
 def _rate(archive: NPZFile) -> float | None:

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from ...recording import FloatArray
+from ..files import bad_file
+from ..findings import Findings
+from ..options import option
 from ..placing.size import Unit, likeliest_unit
+from ..reader import Hints
 
 _USUAL_M = 1.6  # between the joints of a person that are farthest apart: crown to toe, or hands
 _PEOPLE = (0.45, 1.44)  # against that: from a child who sits to a giant who reaches up
 _LOOK = 100  # frames
 _RIGID = 0.1  # of its length, by which a bone may vary
+_HEIGHT_M = (0.05, 3.0)  # of the pelvis, lying to leaping
 _LONG = 0.2  # of the longest chain, from which on one is a limb or a trunk
 
 
@@ -90,3 +96,36 @@ def _has_trunk_and_limbs(parents: list[int], bones: FloatArray) -> bool:
     for joint in range(1, n_joints):
         along[joint] = along[parents[joint]] + bones[joint]
     return len(meets) > 1 and bool(np.ptp(along[meets]) > 0.25 * long)
+
+
+def unit_of_places(
+    path: Path, heights: FloatArray, usual_m: float, hints: Hints, findings: Findings
+) -> float:
+    """Return the unit of where the pelvis is [m], by its height, where bones have lengths anyway.
+
+    Args:
+        path: The file, for messages.
+        heights: Of the pelvis in the file's unit, shape (T,).
+        usual_m: The unit in such files [m].
+        hints: What the caller says.
+        findings: Where to tell what was found.
+
+    Raises:
+        RecordingError: The caller says a unit by which the pelvis is nowhere near.
+    """
+    height = float(np.nanmedian(np.abs(heights))) if not np.isnan(heights).all() else 0.0
+    low, high = _HEIGHT_M
+    if hints.unit_m is not None:
+        if height > 0 and not low / 10 <= height * hints.unit_m <= high * 10:
+            raise bad_file(
+                path,
+                f"the pelvis is {height * hints.unit_m:.3g} m up",
+                f"{low:g} to {high:g} m; is {option('unit_m')} right?",
+            )
+        return hints.unit_m
+    for unit_m in (usual_m, 1.0, 0.01, 0.001):
+        if low <= height * unit_m <= high:
+            if unit_m != usual_m:
+                findings.warn(f"a unit of {unit_m:g} m by the height of the pelvis")
+            return unit_m
+    return usual_m
