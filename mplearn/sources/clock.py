@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..recording import FloatArray
+from .source import RATES_HZ
 
 USUAL_HZ = (
     *(15.0, 20.0, 24.0, 25.0, 30.0, 40.0, 48.0, 50.0, 60.0, 72.0, 75.0, 80.0, 90.0, 100.0, 120.0),
@@ -64,6 +65,8 @@ def measured_pace(numbers: Sequence[int | None], times_s: Sequence[float]) -> Pa
     usual = min(USUAL_HZ, key=lambda hz: abs(hz / rate_hz - 1.0))
     if abs(usual / rate_hz - 1.0) < NEAR:
         rate_hz = usual
+    if not RATES_HZ[0] <= rate_hz <= RATES_HZ[1]:
+        return None
     return Pace(rate_hz, stride, bool(np.ptp(off) <= 2.0 * EVEN))
 
 

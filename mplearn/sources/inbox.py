@@ -12,6 +12,7 @@ from ..recording import FloatArray
 from .source import ChangeKind, Stream
 
 CAPACITY = 2048  # samples that wait at most: about 20 s of a stream
+_LARGEST = 2**63  # number of a frame, or time [s]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -89,8 +90,12 @@ class Inbox:
         Args:
             sample: The frame.
             wait: Whether to wait for room where there is none; otherwise it is dropped, and counted
-                on the next one that is not.
+                on the next one that is not. One whose number or time no sender means is damaged.
         """
+        for what, value in (("number", sample.number), ("time", sample.time_s)):
+            if value is not None and not abs(value) < _LARGEST:  # NaN is not either
+                self.damaged(f"a frame with {what} {value!r:.40}")
+                return
         with self._arrived:
             while wait and len(self._items) >= self._capacity and not self._closed:
                 self._room.wait(0.1)

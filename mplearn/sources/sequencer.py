@@ -10,7 +10,7 @@ import numpy as np
 
 from ..recording import FloatArray
 from .clock import EvenClock, Interpolation, Pace, measured_pace
-from .inbox import Sample
+from .inbox import CAPACITY, Sample
 from .source import Block, Change, ChangeKind, Stream, Tally
 
 FILLED_S = 2.0  # a longer gap is not filled with NaN: another stretch begins
@@ -142,7 +142,7 @@ class Sequencer:
             if len(times) < len(held):
                 times = [s.arrived_s for s in held]
             enough = len(held) >= MEASURED_FRAMES and times[-1] - times[0] >= MEASURED_S
-            if not enough and not at_last:
+            if not (enough or at_last or len(held) >= CAPACITY):
                 return
             pace = measured_pace([s.number for s in held], times)
         self._unpaced = []
@@ -235,10 +235,6 @@ class Sequencer:
 
     def _put_timed(self, sample: Sample, time_s: float) -> None:
         assert self._pace is not None
-        if not math.isfinite(time_s):
-            self._tally.damaged += 1
-            self._say("damaged", f"a frame with time {time_s}", 1)
-            return
         rate_hz = self._pace.rate_hz
         ours, theirs = self._passed(sample)
         if theirs is not None and (

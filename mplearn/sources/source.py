@@ -10,6 +10,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from ..closing import Closing
+from ..errors import InvalidValueError
 from ..recording import BoolArray, FloatArray, Recording, Skeleton, are_markers
 
 ChangeKind: TypeAlias = Literal[
@@ -24,7 +25,17 @@ ChangeKind: TypeAlias = Literal[
     "overrun",
     "body",
 ]
+RATES_HZ = 1.0, 100_000.0  # of a stream of motion, at least and at most
 WAIT_S = 0.2  # a read without a limit wakes up so often, so that it can be interrupted
+
+
+def known_rate(said_hz: float) -> float:
+    """Return the rate that a sender says, if it is one of motion; 0 otherwise [1/s].
+
+    >>> known_rate(120.0), known_rate(1e-300), known_rate(float("nan"))
+    (120.0, 0.0, 0.0)
+    """
+    return said_hz if RATES_HZ[0] <= said_hz <= RATES_HZ[1] else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +45,15 @@ class Stream:
     Attributes:
         channels: Name of each column, length D; markers and joints as ``"LSHO.x", "LSHO.y",
             "LSHO.z", ...``.
-        rate_hz: Frames per second [1/s].
+        rate_hz: Frames per second, 1 to 100,000; 0 where it does not say [1/s].
         skeleton: The joints whose positions it holds; None for markers and plain channels.
         unit_m: Length of the stream's unit [m]; None where it does not say.
         up: The stream's axis that points up, as ``"y"``; empty where it does not say.
         subject: Who moves; empty where it does not say.
         recording: All of it, where that is known before (a file): metres, z up.
+
+    Raises:
+        InvalidValueError: Two channels have one name, or the rate is none of motion.
     """
 
     channels: tuple[str, ...]
@@ -49,6 +63,20 @@ class Stream:
     up: str = ""
     subject: str = ""
     recording: Recording | None = None
+
+    def __post_init__(self) -> None:
+        """Check the names and the rate."""
+        seen: set[str] = set()
+        for name in self.channels:
+            if name in seen:
+                raise InvalidValueError(f"channels must differ, not two be {name!r:.60}")
+            seen.add(name)
+        least, most = RATES_HZ
+        if self.rate_hz and not least <= self.rate_hz <= most:
+            raise InvalidValueError(
+                f"rate_hz must lie in [{least:g}, {most:g}], or be 0 where it is not known, "
+                f"not {self.rate_hz:g}"
+            )
 
     @property
     def is_markers(self) -> bool:

@@ -127,6 +127,8 @@ def test_an_equal_header_is_the_same_stream() -> None:
         b'{"mplearn": 1, "channels": [1]}',
         b'{"mplearn": 1, "channels": ["a"], "rate_hz": -1}',
         b'{"mplearn": 1, "channels": ["a"], "rate_hz": NaN}',
+        b'{"mplearn": 1, "channels": ["a"], "rate_hz": 1e-300}',
+        b'{"mplearn": 1, "channels": ["a", "b", "a"], "rate_hz": 100}',
         b'{"mplearn": 1, "channels": ["a"], "rate_hz": "100"}',
         b'{"mplearn": 1, "channels": ["a"], "unit": "parsec"}',
         b'{"mplearn": 1, "channels": ["a"], "unit_m": -1}',
@@ -143,6 +145,11 @@ def test_an_equal_header_is_the_same_stream() -> None:
         b'{"stream": 1, "v": [1], "n": 1.5}',
         b'{"stream": 1, "v": [1], "t": "now"}',
         b'{"stream": 1, "v": [1], "t": Infinity}',
+        b'{"stream": 1, "v": [1], "t": 1' + b"0" * 400 + b"}",
+        b'{"stream": 1, "v": [1], "n": 1' + b"0" * 400 + b"}",
+        b'{"stream": 1, "v": [1], "n": -1' + b"0" * 30 + b"}",
+        b'{"mplearn": 1, "joints": ["a"], "parents": [1e400], "offsets": [[0, 0, 0]]}',
+        b'{"mplearn": 1, "joints": ["a"], "parents": [0], "offsets": [[1' + b"0" * 400 + b",0,0]]}",
     ],
 )
 def test_a_line_that_cannot_be_read_costs_nothing_else(line: bytes) -> None:

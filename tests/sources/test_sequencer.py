@@ -282,3 +282,15 @@ def test_measured_pace_knows_no_rate_from_nothing() -> None:
     assert measured_pace([None] * 3, [0.0, 0.0, 0.0]) is None
     assert measured_pace([5, 5, 5, 5], [0.0, 0.1, 0.2, 0.3]) is None
     assert FILLED_S > 0
+    assert measured_pace([None] * 20, list(1e-12 * np.arange(20))) is None
+    assert measured_pace([None] * 20, list(1e6 * np.arange(20))) is None
+
+
+def test_a_clock_that_stands_holds_nothing_for_ever() -> None:
+    silent = Stream(("a",), 0.0)
+    samples = [sample(None, 1.0, 0.01 * i, 5.0, stream=silent) for i in range(5000)]
+    sequencer = Sequencer(Tally(), ordered=False)
+    items = [item for each in samples for item in sequencer.take([each], each.arrived_s)]
+    assert sequencer.n_waiting < 2048
+    assert all("show no rate" in text for text in texts_of(items, "damaged"))
+    assert len(texts_of(items, "damaged")) == 2

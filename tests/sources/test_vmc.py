@@ -2,6 +2,7 @@
 
 import socket
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -169,6 +170,16 @@ def test_what_cannot_be_read_is_counted(data: bytes) -> None:
     assert len(frames_of(items)) == 100
     assert source.tally.damaged == (1 if data != b"#bundle\0" else source.tally.damaged)
     assert len(texts_of(items, "damaged")) == source.tally.damaged
+
+
+def test_nothing_that_comes_in_is_logged(caplog: pytest.LogCaptureFixture) -> None:
+    for junk in (b"\x1b[2J", b"/a\0\0,?\0\0"):
+        nested = b"#bundle\0" + bytes(8) + len(junk).to_bytes(4, "big") + junk
+        receiver, inbox = VMCReceiver(("127.0.0.1", 0)), Inbox()
+        with suppress(ValueError):
+            receiver.take(nested, HERE, 0.0, inbox)
+        receiver.close()
+    assert caplog.records == []
 
 
 def test_too_few_bones_are_no_body() -> None:

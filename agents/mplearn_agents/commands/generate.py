@@ -69,7 +69,10 @@ def run(args: argparse.Namespace) -> None:
 
     suffix = args.to.suffix.lower()
     if suffix not in (".csv", ".npz"):
-        raise InvalidValueError(f"--to must be FILE.csv or FILE.npz, not {args.to.name!r}")
+        raise InvalidValueError(
+            f"--to must be FILE.csv or FILE.npz, not {str(args.to)!r}"
+            + ("; `mplearn export --to bvh` writes what a robot performs" * (suffix == ".bvh"))
+        )
     library = PrimitiveLibrary.load(args.library)
     path = chosen_path(args, library)
     motion = library.generate(
@@ -97,8 +100,9 @@ def run(args: argparse.Namespace) -> None:
             writer.writerow(("time_s", *motion.channels))
             for k, row in enumerate(motion.frames.tolist()):
                 writer.writerow((round(k / motion.rate_hz, 9), *row))
+    noun = "primitive" if len(path) == 1 else "primitives"
     print(
-        f"{len(path)} primitives, {len(motion.frames)} frames at {motion.rate_hz:g} Hz, "
+        f"{len(path)} {noun}, {len(motion.frames)} frames at {motion.rate_hz:g} Hz, "
         f"{len(motion.frames) / motion.rate_hz:.1f} s, written to {args.to}"
     )
 

@@ -69,7 +69,7 @@ def _draw(args: argparse.Namespace, found: list[Inspection], console: Console) -
     require("matplotlib", "report")
     from mplearn_agents.recordings.stick_figures import draw
 
-    path = args.picture or Path(f"{args.data.name.split('.')[0]}.png")
+    path = args.picture or Path(f"{args.data.absolute().name.split('.')[0] or 'takes'}.png")
     path.parent.mkdir(parents=True, exist_ok=True)
     step = -(-len(found) // _MOST_ROWS)
     draw(found[::step], path)

@@ -249,20 +249,24 @@ def _entry(entry: Entry) -> dict[str, Any]:
 
 
 def _line(entry: Entry) -> str:
+    return printable(f"{entry.number:4d}  {_date(entry.when)}  {_asked(entry)}")
+
+
+def _asked(entry: Entry) -> str:
+    """Return what was asked, and by whom."""
     from mplearn.store.commands import to_record
 
     record = to_record(entry.command)
     what = " ".join([record.pop("kind"), *(f"{k}={v}" for k, v in record.items() if v is not None)])
     by = f" by {entry.by}" if entry.by else ""
-    return printable(
-        f"{entry.number:4d}  {_date(entry.when)}  {what}{by}{' (undone)' if entry.undone else ''}"
-    )
+    return f"{what}{by}{' (undone)' if entry.undone else ''}"
 
 
 def _told(happening: Happening, entries: dict[int, Entry]) -> str:
     """Return what happened to a primitive, in words."""
     if happening.entry is not None and happening.entry in entries:
-        return _line(entries[happening.entry])
+        entry = entries[happening.entry]
+        return printable(f"{happening.primitive} {_asked(entry)} (command {entry.number})")
     others = ", ".join(map(str, happening.others))
     shown = f" from {happening.exemplars} demonstrations" if happening.exemplars else ""
     words = {"merged": f"absorbed {others}", "split": f"split into {others}"}

@@ -29,10 +29,14 @@ class WholeNumber:
             value = None
         if value is None or not self.least <= value <= self.most:
             limits = f"from {self.least} to {self.most}"
-            if self.most == _LARGEST:
+            if self.most == _LARGEST and not _is_huge(text):
                 limits = f"at least {self.least}{self.noun}"
             raise argparse.ArgumentTypeError(f"must be {limits}, not {text[:40]}")
         return value
+
+
+def _is_huge(text: str) -> bool:
+    return text.strip().removeprefix("+").isdecimal() and len(text) >= _DIGITS
 
 
 count = whole(1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import socket
-import struct
 import time
 from abc import abstractmethod
 
@@ -46,7 +45,7 @@ class DatagramReceiver(Receiver):
                 continue
             try:
                 self.take(data, sender, time.monotonic(), inbox)
-            except (ValueError, KeyError, IndexError, TypeError, struct.error) as error:
+            except Exception as error:  # whatever it, or a package, meets in a datagram
                 inbox.damaged(f"a packet from {shown(sender)} cannot be read: {error}")
 
     @abstractmethod
@@ -54,7 +53,7 @@ class DatagramReceiver(Receiver):
         """Take a datagram.
 
         Raises:
-            ValueError: It is none of the protocol; others that parsing raises are caught as well.
+            ValueError: It is none of the protocol; whatever else parsing raises is caught as well.
         """
 
     def close(self) -> None:

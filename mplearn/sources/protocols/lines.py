@@ -132,7 +132,7 @@ def _stream(header: dict[str, Any]) -> Stream:
         )
     rate_hz = header.get("rate_hz", 0.0)
     if not (_is_number(rate_hz) and 0.0 <= rate_hz <= 10_000.0):
-        raise ValueError(f"rate_hz must lie in [0, 10000], not {rate_hz!r:.40}")
+        raise ValueError(f"rate_hz must lie in [1, 10000], not {rate_hz!r:.40}")
     unit = header.get("unit_m", header.get("unit"))
     unit_m: float | None = named_unit(unit) if isinstance(unit, str) else unit
     fine = unit_m is not None and _is_number(unit_m) and 0.0 < unit_m < 1e6
@@ -170,7 +170,7 @@ def _time(frame: dict[str, Any]) -> float | None:
     time_s = frame.get("t")
     if time_s is None:
         return None
-    if not (_is_number(time_s) and math.isfinite(time_s)):
+    if not (_is_number(time_s) and abs(time_s) < math.inf):
         raise ValueError(f"t must be seconds, not {time_s!r:.40}")
     return float(time_s)
 

@@ -18,7 +18,7 @@ from ..inbox import Inbox, Sample
 from ..received import ReceivedSource, Receiver
 from ..registry import Wanted
 from ..sender import Sender
-from ..source import Block, Source, Stream
+from ..source import Block, Source, Stream, known_rate
 
 EXTRA = "live"
 SEARCH_S, WAKE_S, BUFFER_S = 1.0, 0.1, 60
@@ -132,7 +132,7 @@ def described(xml: str) -> tuple[Stream, list[int]]:
     n_channels = int(info.findtext("channel_count", "0"))
     if info.findtext("channel_format") == "string":
         raise ValueError(f"the stream {info.findtext('name', '')!r} holds text")
-    rate_hz = float(info.findtext("nominal_srate", "0"))
+    rate_hz = known_rate(float(info.findtext("nominal_srate", "0")))
     markers = described_markers(info, n_channels)
     subject = info.findtext("desc/subject/id", "").strip()
     if markers:

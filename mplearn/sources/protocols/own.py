@@ -90,7 +90,7 @@ def _take_line(
         read = parser.parse(line, arrived_s)
     except UnnamedError as error:
         inbox.say("names", str(error), 1)
-    except (ValueError, KeyError, TypeError, MPLearnError) as error:
+    except (ValueError, KeyError, TypeError, OverflowError, MPLearnError) as error:
         inbox.damaged(f"a line cannot be read: {error}")
     else:
         if isinstance(read, Sample):

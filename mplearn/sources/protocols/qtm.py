@@ -17,7 +17,7 @@ from ...recording import marker_channels
 from ..inbox import Inbox, Sample
 from ..received import ReceivedSource, Receiver
 from ..registry import Wanted
-from ..source import Source, Stream
+from ..source import Source, Stream, known_rate
 from .addresses import host_and_port, shown
 
 EXTRA = "live"
@@ -133,7 +133,7 @@ def described(xml: bytes | str) -> Stream:
         rate_hz = 0.0
     return Stream(
         marker_channels(names),
-        rate_hz if 0.0 <= rate_hz < 1e5 else 0.0,
+        known_rate(rate_hz),
         unit_m=MILLIMETRES,
         up=up if up in DIRECTIONS else "",
     )

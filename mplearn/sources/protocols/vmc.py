@@ -5,6 +5,9 @@ Positions and rotations are local, in Unity's axes (x right, y up, z forward, le
 
 from __future__ import annotations
 
+import logging
+from typing import Any
+
 import numpy as np
 
 from ...extras import require
@@ -66,6 +69,11 @@ class VMCReceiver(DatagramReceiver):
 
     def __init__(self, address: tuple[str, int]) -> None:
         self._osc = require("pythonosc.osc_packet", EXTRA)
+        log = logging.getLogger("pythonosc")
+        log.disabled = True  # by the root's it would print whatever comes in
+        for name in ("osc_bundle", "osc_message"):
+            module: Any = require(f"pythonosc.{name}", EXTRA)
+            module.logging = log
         super().__init__(address)
         self._bones: dict[str, tuple[float, ...]] = {}
         self._time_s: float | None = None  # as was said last
