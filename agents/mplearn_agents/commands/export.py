@@ -47,8 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--robot",
         default="humanoid",
         metavar="ROBOT",
-        help="humanoid (default), unitree_g1 (or g1), FILE.toml that describes a robot; to check, "
-        "its MJCF will do: FILE.xml",
+        help="humanoid (default), unitree_g1 (or g1) or another by its name, FILE.toml that "
+        "describes a robot; to check, its MJCF will do: FILE.xml",
     )
     parser.add_argument("--rate", type=positive, metavar="HZ", help="(default: the format's)")
     parser.add_argument(

@@ -24,6 +24,7 @@ _CUT_OFF = {"overshoot": math.inf, "slowest": 0.05}  # what is shown where not a
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     from mplearn_agents.policies import POLICIES
+    from mplearn_envs.robot import ROBOTS
 
     parser.add_argument(
         "library", type=Path, nargs="?", help="library file (default: the built-in one)"
@@ -56,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--robot",
         default="humanoid",
         metavar="ROBOT",
-        help="humanoid (default), unitree_g1, or FILE.toml that describes a robot",
+        help=f"one of {', '.join(ROBOTS)} (default: humanoid), or FILE.toml that describes one",
     )
     parser.add_argument("--video", type=Path, metavar="FILE.mp4", help="write a film of it")
     parser.add_argument(

@@ -23,6 +23,7 @@ from mplearn_envs.skills.repertoire import Repertoire
 from mplearn_envs.skills.skills import Skills
 
 from .motion import RobotMotion, Span
+from .own_terms import in_own_terms
 
 _HOLD = "hold"
 _CUT_OFF = FeasibilityConfig(overshoot=np.inf, slowest=0.05)  # what is shown where not all can be
@@ -236,12 +237,13 @@ def _motion(
         spans.append(Span(-1 if id is None else id, label, now, end))
         here, now = plan.end, end
     whole = np.concatenate(parts)
+    own = in_own_terms(robot, whole)
     return RobotMotion(
         name=name,
-        joint_names=robot.joint_names,
+        joint_names=own.joint_names,
         rate_hz=1.0 / plan.knot_s,
-        root_pos=whole[:, :3],
-        root_quat=whole[:, 3:7] / np.linalg.norm(whole[:, 3:7], axis=1, keepdims=True),
-        joint_pos=whole[:, 7:] + robot.attention_angles,
+        root_pos=own.root_pos,
+        root_quat=own.root_quat,
+        joint_pos=own.joint_pos,
         spans=tuple(spans),
     )

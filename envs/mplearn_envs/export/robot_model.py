@@ -13,6 +13,7 @@ from mplearn.errors import RobotError
 from mplearn.maths.rotations import quaternion_to_matrix
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.robot import Robot, make_robot
+from mplearn_envs.robot.compiling import compile_once
 
 if TYPE_CHECKING:
     import mujoco
@@ -55,8 +56,8 @@ class RobotModel:
     Attributes:
         name: What the robot is called.
         model: The compiled MJCF; it is not changed.
-        shift: What is added to the model's angles to get those in the zero of the robot's own MJCF,
-            shape (n,) [rad].
+        shift: What is added to the model's angles, times their `signs`, to get those in the zero of
+            the robot's own MJCF, shape (n,) [rad].
         robot: The description that it comes from; None where only an MJCF is known.
     """
 
@@ -67,7 +68,10 @@ class RobotModel:
 
     @classmethod
     def of(cls, robot: Robot) -> RobotModel:
-        """Return the model of a described robot."""
+        """Return the model of a described robot, as it was before it was re-rooted."""
+        if robot.origin is not None:
+            model = compile_once(robot.origin.xml)
+            return cls(robot.name, model, np.zeros(len(robot.joint_names)), robot)
         return cls(robot.name, robot.model(), robot.attention_angles, robot)
 
     @classmethod
@@ -149,19 +153,30 @@ class RobotModel:
     @cached_property
     def axes(self) -> FloatArray:
         """The hinges' axes, each in the frame of the body that it turns, shape (n, 3)."""
-        return np.array(self.model.jnt_axis[self.joints])
+        return np.asarray(self.signs[:, None] * self.model.jnt_axis[self.joints])
+
+    @cached_property
+    def signs(self) -> FloatArray:
+        """-1 for a hinge that counts the other way in the robot's own MJCF, else 1, shape (n,)."""
+        if self.robot is None or self.robot.origin is not None:
+            return np.ones(len(self.joint_names))
+        return self.robot.signs
 
     @cached_property
     def limits(self) -> FloatArray:
         """Smallest and largest angle of each hinge, infinite where not limited, (n, 2) [rad]."""
-        limits = self.model.jnt_range[self.joints] + self.shift[:, None]
+        limits = self.signs[:, None] * self.model.jnt_range[self.joints]
+        limits = np.sort(limits, axis=1) + self.shift[:, None]
         limits[self.model.jnt_limited[self.joints] == 0] = (-np.inf, np.inf)
         return np.asarray(limits)
 
     @cached_property
     def velocity_limits(self) -> FloatArray | None:
         """Largest velocity of each hinge, shape (n,) [rad/s]; None where it is not known."""
-        return None if self.robot is None else self.robot.per_joint("velocity")
+        if self.robot is None:
+            return None
+        limits = dict(zip(self.robot.joint_names, self.robot.per_joint("velocity"), strict=True))
+        return np.array([limits[name] for name in self.joint_names])
 
     @cached_property
     def at_zero(self) -> Bodies:
@@ -212,7 +227,7 @@ class RobotModel:
         for t in range(len(qpos)):
             data.qpos[:] = qpos[t]
             data.qvel[address : address + 3], data.qvel[address + 3 : address + 6] = base[t], own[t]
-            data.qvel[hinges] = joint[t]
+            data.qvel[hinges] = self.signs * joint[t]
             mujoco.mj_kinematics(model, data)
             mujoco.mj_comPos(model, data)
             mujoco.mj_comVel(model, data)
@@ -284,7 +299,7 @@ class RobotModel:
         address = int(self.model.jnt_qposadr[self._free])
         qpos[:, address : address + 3] = root_pos
         qpos[:, address + 3 : address + 7] = root_quat
-        qpos[:, self.model.jnt_qposadr[self.joints]] = joint_pos - self.shift
+        qpos[:, self.model.jnt_qposadr[self.joints]] = self.signs * (joint_pos - self.shift)
         return qpos
 
 

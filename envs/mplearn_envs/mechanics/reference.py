@@ -133,8 +133,10 @@ def reference_robot(robot: Robot) -> ReferenceRobot:
     guess[[7 + k for k in knees]] = robot.stance_knee_rad
     rest, worst = settle(tree, stance, guess, stance_height, np.eye(3), 1e-10, 50)
     if worst > 1e-6:
+        few = min(len(leg) for leg in robot.legs)
         raise RobotError(
             f"robot {robot.name!r} cannot stand: its feet or COG miss by {worst:.3g} m"
+            + (f"; it takes 6 hinges to place a foot, its legs have {few}" if few < 6 else "")
         )
     limits[[names.index(name) for name in robot.toes]] = 0.0  # one flat sole a foot
     upper = robot.upper_joints

@@ -21,6 +21,8 @@ from .roles import BASE_CHANNELS
 if TYPE_CHECKING:
     import mujoco
 
+    from .reroot import Origin
+
 
 @dataclass(frozen=True)
 class Robot:
@@ -48,6 +50,9 @@ class Robot:
             one flat sole; motions that bend them are refused.
         attention: Hinges that stand upright at another angle than 0 in the zero of the MJCF that
             the robot came from, and that angle [rad]: there they are at ours plus this.
+        flipped: Hinges that count the other way in that MJCF: there they are at minus ours, plus
+            their angle at attention.
+        origin: That MJCF and how it floats, where more than zeros and signs differ; else None.
 
     Example:
         >>> from mplearn_envs.robot import humanoid
@@ -69,6 +74,8 @@ class Robot:
     segments: tuple[tuple[str, str], ...]
     toes: tuple[str, ...] = ()
     attention: tuple[tuple[str, float], ...] = ()
+    flipped: tuple[str, ...] = ()
+    origin: Origin | None = None
 
     @classmethod
     def from_mjcf(
@@ -81,8 +88,8 @@ class Robot:
     ) -> Robot:
         """Describe any humanoid of which there is an MJCF model.
 
-        The model gets this package's floor, one servo a hinge and one box a sole; only soles
-        collide. Its zero is moved to the upright posture.
+        The model is re-rooted at its pelvis, x ahead and z up, and zero where it stands upright. It
+        gets this package's floor, one servo a hinge and one box a sole; only soles collide.
 
         Args:
             source: A file, or the MJCF text itself.
@@ -94,6 +101,21 @@ class Robot:
 
         Raises:
             RobotError: The model does not compile or is no humanoid on two feet, with the reason.
+
+        Example:
+            >>> from pathlib import Path
+            >>> import dm_control
+            >>> sides = {"l": "left", "r": "right"}
+            >>> links = {"thigh": "thigh", "shank": "shin", "foot": "foot"}
+            >>> segments = {"pelvis": "pelvis"} | {
+            ...     f"{role}_{s}": f"{side}_{link}"
+            ...     for s, side in sides.items()
+            ...     for role, link in links.items()
+            ... }
+            >>> file = Path(dm_control.__file__).parent / "suite/humanoid.xml"
+            >>> robot = Robot.from_mjcf(file, "theirs", segments)
+            >>> robot.origin.base, robot.flipped
+            ('torso', ('right_knee', 'left_knee'))
         """
         from .from_mjcf import described
 
@@ -123,8 +145,10 @@ class Robot:
                 f"robot {self.name!r}: the hinges within its feet are {toes}, and its toes are "
                 f"said to be {self.toes}"
             )
-        if unknown := {hinge for hinge, _ in self.attention} - set(hinges):
-            raise RobotError(f"robot {self.name!r} has no hinge {sorted(unknown)} at attention")
+        if unknown := ({hinge for hinge, _ in self.attention} | set(self.flipped)) - set(hinges):
+            raise RobotError(
+                f"robot {self.name!r} has no hinge {sorted(unknown)} at attention, or to be flipped"
+            )
 
     def model(self) -> mujoco.MjModel:
         """Compile the simulation model."""
@@ -146,6 +170,11 @@ class Robot:
         """Where each hinge is upright in the zero of the robot's MJCF, shape (n,) [rad]."""
         angles = dict(self.attention)
         return np.array([angles.get(name, 0.0) for name in self.joint_names])
+
+    @cached_property
+    def signs(self) -> FloatArray:
+        """-1 for each hinge that counts the other way in the robot's MJCF, else 1, shape (n,)."""
+        return np.where(np.isin(self.joint_names, self.flipped), -1.0, 1.0)
 
     @cached_property
     def leg_joints(self) -> IntArray:

@@ -16,6 +16,7 @@ SOLES = ("sole_l", "sole_r")  # the boxes on which a robot stands, one a foot
 #: Lower corners of a box, front ones first, counter-clockwise as seen from below.
 CORNER_SIGNS = np.array([[1.0, 1, -1], [1, -1, -1], [-1, -1, -1], [-1, 1, -1]])
 
+LEVEL = 0.995  # least cosine between the floor and the foot of a robot at attention
 TOUCHES_M = 0.004  # the corner of a sole that is no higher above the floor carries
 # A demonstrator's feet are measured through markers and a body that is not quite his, so a foot
 # that stands seems to move by more than that; it is seen relative to the other.
@@ -44,6 +45,35 @@ def below(model: mujoco.MjModel, body: int) -> set[int]:
     for b in range(body + 1, model.nbody):  # parents come first
         if int(model.body_parentid[b]) in found:
             found.add(b)
+    return found
+
+
+def foot_points(model: mujoco.MjModel, data: mujoco.MjData, foot: int) -> FloatArray:
+    """Return points around a foot and its toes, those shapes that collide if any do, (P, 3) [m].
+
+    Corners of the shapes' boxes, or a mesh's vertices; world frame.
+    """
+    import mujoco
+
+    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
+    own = np.isin(model.geom_bodyid, list(below(model, foot)))
+    collide = own & ((model.geom_contype != 0) | (model.geom_conaffinity != 0))
+    points = [np.zeros((0, 3))]
+    for geom in np.flatnonzero(collide if collide.any() else own):
+        local = model.geom_aabb[geom, :3] + signs * model.geom_aabb[geom, 3:]
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
+            mesh = model.mesh(int(model.geom_dataid[geom]))
+            first = int(mesh.vertadr[0])
+            local = model.mesh_vert[first : first + int(mesh.vertnum[0])].astype(np.float64)
+        points.append(local @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])
+    return np.concatenate(points)
+
+
+def way_up(model: mujoco.MjModel, body: int) -> list[int]:
+    """Return a body and all that it hangs on, up to the one that hangs on nothing."""
+    found = [body]
+    while int(model.body_parentid[found[-1]]):
+        found.append(int(model.body_parentid[found[-1]]))
     return found
 
 

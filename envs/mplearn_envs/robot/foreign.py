@@ -1,27 +1,22 @@
-"""A foreign MJCF model brought to this package's conventions: its zero, its soles, its floor."""
+"""A foreign MJCF model brought to this package's conventions: its soles, servos, floor."""
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import mujoco
-import numpy as np
-from scipy.spatial.transform import Rotation
 
 from mplearn.errors import RobotError
 from mplearn.recording import FloatArray
 
 from .compiling import read_model
 from .drives import JointGroup
-from .feet import SOLES, below
+from .feet import LEVEL, SOLES, foot_points
 
-_LEVEL = 0.995  # least cosine between the floor and the foot of a robot at attention
 _HALF_SOLE_M = 0.01
 _ROTOR_S2 = 5e-4  # rotor inertia by torque limit [kg m^2 / (N m)], about as the humanoid's
-_NEARLY_RAD = 0.1  # so far from zero a hinge may stand at attention without being told
 
 
 def read_spec(source: str | Path, name: str) -> Any:
@@ -62,47 +57,6 @@ def take_out_drives(spec: Any) -> None:
             spec.delete(element)
 
 
-def move_zero(spec: Any, attention: Mapping[str, float], name: str) -> dict[str, float]:
-    """Shift the hinges' angles so that they are zero where they were ``attention`` [rad].
-
-    Returns:
-        By how much each hinge was shifted [rad], without those that were not.
-
-    Raises:
-        RobotError: An angle lies outside its limits, or cannot become zero.
-    """
-    shifted: dict[str, float] = {}
-    for body in spec.bodies[1:]:
-        later = Rotation.identity()  # by the hinges nearer to the body than the present one
-        for joint in reversed(body.joints):
-            if joint.type == mujoco.mjtJoint.mjJNT_FREE:
-                continue
-            low, high = joint.range if joint.range[0] < joint.range[1] else (-np.pi, np.pi)
-            nearest = float(np.clip(0.0, low, high))  # many a knee is never quite straight
-            angle = attention.get(joint.name, nearest if abs(nearest) < _NEARLY_RAD else 0.0)
-            if not low - 1e-9 <= angle <= high + 1e-9:
-                raise RobotError(
-                    f"robot {name!r} cannot stand at attention: {joint.name!r} at {angle:.3g} rad "
-                    f"is outside its limits [{low:.3g}, {high:.3g}]"
-                )
-            if angle and np.any(joint.pos):
-                raise RobotError(
-                    f"robot {name!r}: the zero of {joint.name!r} cannot be moved, for it does not "
-                    f"turn about its body's origin"
-                )
-            if angle:
-                shifted[joint.name] = float(angle)
-            joint.range = (low - angle, high - angle)
-            joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
-            joint.ref = joint.springref = 0.0
-            axis = np.array(joint.axis, dtype=np.float64)
-            joint.axis = later.inv().apply(axis)
-            later = Rotation.from_rotvec(angle * axis) * later
-        turned = Rotation.from_quat(body.quat, scalar_first=True) * later
-        body.quat = turned.as_quat(scalar_first=True)
-    return shifted
-
-
 def add_soles(spec: Any, feet: tuple[str, str], name: str) -> None:
     """Give each foot one box around its shapes, those that collide if any do; only soles collide.
 
@@ -127,6 +81,11 @@ def add_soles(spec: Any, feet: tuple[str, str], name: str) -> None:
             conaffinity=1,
             condim=3,
             friction=(1.0, 0.005, 0.0001),
+            solref=(0.02, 1.0),
+            solimp=(0.9, 0.95, 0.001, 0.5, 2.0),
+            priority=0,
+            margin=0.0,
+            gap=0.0,
         )
 
 
@@ -136,21 +95,15 @@ def _sole_box(model: mujoco.MjModel, foot: str, name: str) -> tuple[FloatArray, 
     mujoco.mj_kinematics(model, data)
     body = model.body(foot).id
     frame = data.xmat[body].reshape(3, 3)
-    if frame[2, 2] < _LEVEL:
+    if frame[2, 2] < LEVEL:
         raise RobotError(
             f"robot {name!r}: {foot!r} is not level at attention; give the angles of its ankle "
-            f"there, or a foot whose z axis points up when it stands"
+            "there"
         )
-    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
-    own = np.isin(model.geom_bodyid, list(below(model, body)))  # the toes at zero, too
-    collide = own & ((model.geom_contype != 0) | (model.geom_conaffinity != 0))
-    corners = []
-    for geom in np.flatnonzero(collide if collide.any() else own):
-        box, turn = model.geom_aabb[geom], data.geom_xmat[geom].reshape(3, 3)
-        corners.append((box[:3] + signs * box[3:]) @ turn.T + data.geom_xpos[geom])
-    if not corners:
+    points = foot_points(model, data, body)  # the toes at zero, too
+    if not len(points):
         raise RobotError(f"robot {name!r}: foot {foot!r} has no shape to stand on")
-    local = (np.concatenate(corners) - data.xpos[body]) @ frame
+    local = (points - data.xpos[body]) @ frame
     low, high = local.min(axis=0), local.max(axis=0)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     middle[2], half[2] = low[2] + _HALF_SOLE_M, _HALF_SOLE_M
@@ -177,6 +130,9 @@ def add_servos(spec: Any, groups: tuple[JointGroup, ...]) -> None:
             trntype=mujoco.mjtTrn.mjTRN_JOINT,
             forcerange=(-drive.torque, drive.torque),
             forcelimited=mujoco.mjtLimited.mjLIMITED_TRUE,
+            ctrllimited=mujoco.mjtLimited.mjLIMITED_FALSE,  # and not as the model's own drives
+            gear=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+            dyntype=mujoco.mjtDyn.mjDYN_NONE,
         )
         servo.set_to_position(kp=drive.stiffness, kv=drive.damping)
 
@@ -198,6 +154,9 @@ def on_our_floor(spec: Any, name: str) -> str:
     for element in world.iter():
         if (element.tag, element.get("name")) in taken:
             del element.attrib["name"]
+    for element in list(assets):
+        if element.get("type") == "skybox":
+            assets.remove(element)
     for element in _child(ours, "asset"):
         if element.get("name") in ("floor", "tiles") or element.get("type") == "skybox":
             assets.append(_classless(_owned(element, "name", "texture")))

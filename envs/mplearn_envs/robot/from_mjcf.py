@@ -20,19 +20,18 @@ from mplearn.errors import RobotError
 
 from .compiling import compile_once, read_model
 from .drives import HUMANOID_BASE_VELOCITY, HUMANOID_DRIVES, JointGroup
-from .feet import foot_hinges
+from .feet import below, foot_hinges, way_up
 from .foreign import (
     add_servos,
     add_soles,
     compiled,
-    move_zero,
     on_our_floor,
     read_spec,
     take_out_drives,
 )
+from .reroot import rerooted
 from .roles import NEEDED_ROLES, ROLES
 
-_UPRIGHT = 0.9999  # least real part of the base's quaternion
 _LOOSE = "hand_l"  # hinges that carry no segment (fingers) are driven like a hand's
 
 
@@ -57,7 +56,8 @@ def described(
             raise RobotError(f"robot {name!r} has no hinge {hinge!r}; it has {sorted(hinges)}")
     _require_humanoid(compiled(spec, name), segments, name)
     take_out_drives(spec)
-    shifted = move_zero(spec, attention, name)
+    rooted = rerooted(spec, segments, attention, name)
+    spec = rooted.spec
     feet = (segments["foot_l"], segments["foot_r"])
     add_soles(spec, feet, name)
     model = compiled(spec, name)
@@ -81,7 +81,9 @@ def described(
         "base_velocity": (float(size) * height, roll, pitch),
         "segments": tuple((role, segments[role]) for role in ROLES if role in segments),
         "toes": foot_hinges(model, feet),
-        "attention": tuple(shifted.items()),
+        "attention": tuple(rooted.shifted.items()),
+        "flipped": rooted.flipped,
+        "origin": rooted.origin,
     }
 
 
@@ -91,23 +93,18 @@ def _require_humanoid(model: mujoco.MjModel, segments: Mapping[str, str], name: 
     Raises:
         RobotError: They are not; it says all that is missing.
     """
-    pelvis, found = segments["pelvis"], []
+    pelvis, found = model.body(segments["pelvis"]).id, []
     kinds = {int(mujoco.mjtJoint.mjJNT_BALL): "ball", int(mujoco.mjtJoint.mjJNT_SLIDE): "slide"}
-    free = [
-        model.body(int(model.jnt_bodyid[j])).name
-        for j in range(model.njnt)
-        if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE
+    root = int(model.body_rootid[pelvis])
+    own = below(model, root)
+    for role, body in segments.items():
+        if model.body(body).id not in own:
+            found.append(f"{body!r} ({role}) is no part of {model.body(root).name!r}")
+    found += [
+        f"{thigh!r} does not hang on {segments['pelvis']!r}"
+        for thigh in (segments["thigh_l"], segments["thigh_r"])
+        if pelvis not in way_up(model, model.body(thigh).id)
     ]
-    if free != [pelvis]:
-        found.append(
-            f"its pelvis {pelvis!r} must float, by the only free joint; there float {free}"
-        )
-    elif abs(model.body(pelvis).quat[0]) < _UPRIGHT:
-        turned = model.body(pelvis).quat.round(3).tolist()
-        found.append(
-            f"{pelvis!r} must stand with its x axis ahead and its z axis up; it is turned by the "
-            f"quaternion {turned}"
-        )
     for j in range(model.njnt):
         if int(model.jnt_type[j]) in kinds:
             kind = kinds[int(model.jnt_type[j])]
@@ -115,7 +112,10 @@ def _require_humanoid(model: mujoco.MjModel, segments: Mapping[str, str], name: 
     for side in "lr":
         shank, foot = segments[f"shank_{side}"], segments[f"foot_{side}"]
         if foot != shank and not _hinges_above(model, foot, shank):
-            found.append(f"there is no ankle, a hinge from {shank!r} to {foot!r}")
+            found.append(
+                f"there is no ankle, a hinge from {shank!r} to {foot!r}: that foot is a part of "
+                "the shank, and cannot stay flat on the floor when the leg leans"
+            )
     if found:
         raise RobotError(f"robot {name!r} cannot be driven here: " + "; ".join(found))
 

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from mplearn.errors import InvalidValueError
 
 from .description import Robot
 from .humanoid import humanoid
+from .packaged import PACKAGED, packaged_robot
 from .robot_file import described_robot
-from .unitree import unitree_g1
 
-ROBOTS: dict[str, Callable[[], Robot]] = {"humanoid": humanoid, "unitree_g1": unitree_g1}
+ROBOTS: dict[str, Callable[[], Robot]] = {
+    "humanoid": humanoid,
+    **{name: partial(packaged_robot, name) for name in PACKAGED},
+}
 
 
 def make_robot(robot: str | Path | Robot) -> Robot:

@@ -17,10 +17,13 @@ from mplearn.body import features_of, human_body, posture_of, robot_body
 from mplearn.errors import MissingDependencyError, RobotError
 from mplearn_envs.execution.bodies import make_body
 from mplearn_envs.execution.simulation import Simulation
+from mplearn_envs.export import perform
+from mplearn_envs.export.own_terms import in_own_terms
 from mplearn_envs.mechanics import reference_robot, rest_reference
 from mplearn_envs.planning import Planner
-from mplearn_envs.robot import ROLES, Retargeting, Robot, humanoid, unitree_g1
+from mplearn_envs.robot import ROLES, Retargeting, Robot, humanoid, make_robot, unitree_g1
 from mplearn_envs.robot.feet import sole_corners
+from mplearn_envs.robot.packaged import packaged_robot
 from mplearn_envs.skills.feasibility import FeasibilityCheck
 
 HUMAN = human_body(1.7)
@@ -195,28 +198,137 @@ LIMBS = {"thigh": "{s}_thigh", "shank": "{s}_shin", "foot": "{s}_foot"}
 TORSO = {"pelvis": "pelvis", "chest": "torso"} | {
     f"{role}_{s[0]}": body.format(s=s) for s in ("left", "right") for role, body in LIMBS.items()
 }
-CMU = {"pelvis": "root"} | {
-    f"{role}_{s}": f"{s}{bone}"
-    for s in "lr"
-    for role, bone in (("thigh", "femur"), ("shank", "tibia"), ("foot", "foot"))
-}
 
 
-@pytest.mark.parametrize(
-    ("package", "file", "segments", "missing"),
-    [
-        ("gymnasium", "envs/mujoco/assets/humanoid.xml", TORSO,
-         r"'pelvis' must float.*\['torso'\].*no ankle, a hinge from 'right_shin'"),
-        ("dm_control", "suite/humanoid.xml", TORSO, r"'pelvis' must float.*\['torso'\]"),
-        ("dm_control", "suite/humanoid_CMU.xml", CMU, r"'root' must stand with its x axis ahead"),
-        ("dm_control", "locomotion/walkers/assets/humanoid_CMU_V2020.xml", CMU,
-         r"'root' must float.*there float \[\]"),
-    ],
-)  # fmt: skip
-def test_known_humanoids_are_refused_with_all_that_is_missing(package, file, segments, missing):
-    folder = Path(importlib.util.find_spec(package).origin).parent
-    with pytest.raises(RobotError, match=missing):
-        Robot.from_mjcf(folder / file, "theirs", segments)
+def test_gymnasiums_humanoid_is_refused_for_its_missing_ankles_alone():
+    folder = Path(importlib.util.find_spec("gymnasium").origin).parent
+    ankle = "there is no ankle, a hinge from '{s}_shin' to '{s}_foot': .*cannot stay flat[^;]*"
+    both = "; ".join(ankle.format(s=side) for side in ("left", "right"))
+    with pytest.raises(RobotError, match=f"^robot 'theirs' cannot be driven here: {both}$"):
+        Robot.from_mjcf(folder / "envs/mujoco/assets/humanoid.xml", "theirs", TORSO)
+
+
+def original(robot):
+    """The model that a re-rooted robot came from, as it was, floating."""
+    return mujoco.MjModel.from_xml_string(robot.origin.xml)
+
+
+def in_both(robot, seed):
+    """One posture and velocity, of the re-rooted robot and of the model that it came from."""
+    rng = np.random.default_rng(seed)
+    ours, theirs = mujoco.MjData(robot.model()), mujoco.MjData(original(robot))
+    low, high = robot.position_limits.T
+    q = rng.uniform(0.8 * low + 0.2 * high, 0.2 * low + 0.8 * high)
+    turn = Rotation.from_rotvec(rng.normal(size=3))
+    ours.qpos[:] = *rng.normal(size=3), *turn.as_quat(scalar_first=True), *q
+    own = in_own_terms(robot, ours.qpos[None].copy())
+    model, free = theirs.model, int(np.flatnonzero(theirs.model.jnt_type == 0)[0])
+    theirs.qpos[model.jnt_qposadr[free] :][:7] = *own.root_pos[0], *own.root_quat[0]
+    for name, angle in zip(own.joint_names, own.joint_pos[0], strict=True):
+        theirs.qpos[model.joint(name).qposadr[0]] = angle
+    return ours, theirs
+
+
+REROOTED = ("dm_humanoid", "cmu_humanoid", "cmu_humanoid_2020")
+
+
+@pytest.mark.parametrize("name", REROOTED)
+def test_a_rerooted_humanoid_is_the_same_body(name):
+    """Every shape is where MuJoCo has it in the original, in any posture, and masses stay."""
+    robot = make_robot(name)
+    assert robot.origin.base == ("torso" if name == "dm_humanoid" else "root")
+    assert robot.model().body(1).name == dict(robot.segments)["pelvis"]
+    for seed in range(3):
+        ours, theirs = in_both(robot, seed)
+        for data in (ours, theirs):
+            mujoco.mj_kinematics(data.model, data)
+            mujoco.mj_comPos(data.model, data)
+        for g in range(theirs.model.ngeom):
+            shape = theirs.model.geom(g).name
+            if shape and theirs.model.geom_bodyid[g]:
+                np.testing.assert_allclose(
+                    ours.geom(shape).xpos, theirs.geom(shape).xpos, atol=2e-5
+                )
+                turned = np.linalg.norm(ours.geom(shape).xmat - theirs.geom(shape).xmat)
+                assert turned < 1e-4
+        np.testing.assert_allclose(ours.subtree_com[1], theirs.subtree_com[1], atol=2e-5)
+    for each in theirs.model.body_mass[1:], ours.model.body_mass[1:]:
+        assert each.sum() == pytest.approx(theirs.model.body_mass.sum())
+
+
+def fly(data):
+    """Let a model fly for 0.2 s, its hinges driven by their springs and dampers alone."""
+    model = data.model
+    model.opt.timestep, model.opt.integrator = 1e-3, mujoco.mjtIntegrator.mjINT_RK4
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    for _ in range(200):
+        mujoco.mj_step(model, data)
+
+
+def test_a_rerooted_humanoid_moves_as_the_original():
+    robot = make_robot("dm_humanoid")
+    assert set(robot.flipped) == {"left_knee", "right_knee"}
+    start, theirs = in_both(robot, 3)
+    ours = mujoco.MjData(mujoco.MjModel.from_xml_string(robot.xml))
+    ours.qpos[:] = start.qpos
+    for hinge in robot.joint_names:  # rotors are ours
+        rotor = ours.model.dof_armature[ours.model.joint(hinge).dofadr[0]]
+        theirs.model.dof_armature[theirs.model.joint(hinge).dofadr[0]] = rotor
+    mujoco.mj_kinematics(start.model, start)
+    fly(ours)
+    fly(theirs)
+    for shape in ("head", "left_hand", "right_shin", "left_right_foot"):
+        here = ours.geom(shape).xpos
+        np.testing.assert_allclose(here, theirs.geom(shape).xpos, atol=2e-4)
+        assert np.linalg.norm((here - start.geom(shape).xpos)[:2]) > 0.005  # it not only falls
+
+
+@pytest.mark.parametrize("name", REROOTED)
+def test_dm_controls_humanoids_stand_upright_and_squat_and_raise_their_arms(name):
+    robot = make_robot(name)
+    data = mujoco.MjData(robot.model())
+    mujoco.mj_kinematics(robot.model(), data)
+    body = dict(robot.segments)
+    for side, left in (("l", 1.0), ("r", -1.0)):
+        hip, ankle = (data.body(body[f"{role}_{side}"]).xpos for role in ("thigh", "foot"))
+        assert hip[2] - ankle[2] > 0.7 and left * hip[1] > 0.05
+        down = data.body(body[f"forearm_{side}"]).xpos - data.body(body[f"upper_arm_{side}"]).xpos
+        assert down[2] < -0.95 * np.linalg.norm(down)
+        sole = data.geom(f"sole_{side}")
+        np.testing.assert_allclose(sole.xmat.reshape(3, 3), np.eye(3), atol=2e-2)
+        assert sole.xpos[0] > ankle[0]  # toes are ahead
+    done = perform(None, robot, ("squat down", "squat raise", "left arm raise"), simulated=True)
+    assert [span.name for span in done.motions[0].spans[:2]] == ["squat down", "squat raise"]
+    with pytest.raises(RobotError, match="reach of"):  # its hips or ankles let no weight aside
+        perform(None, robot, ("left kick raise",))
+
+
+def test_a_knee_that_bends_ahead_or_aside_is_refused():
+    exchanged = {k[:-1] + {"l": "r", "r": "l"}[k[-1]]: v for k, v in BIPED_SEGMENTS.items()
+                 if k != "pelvis"} | {"pelvis": "trunk"}  # fmt: skip
+    with pytest.raises(RobotError, match=r"'knee_r' bends ahead.*are exchanged"):
+        Robot.from_mjcf(biped(), "x", exchanged)
+    aside = biped().replace('name="knee_l" axis="0 1 0"', 'name="knee_l" axis="1 0 0"')
+    with pytest.raises(RobotError, match=r"'knee_l' turns about .*not about the line through"):
+        Robot.from_mjcf(aside, "x", BIPED_SEGMENTS)
+    with pytest.raises(RobotError, match="'thigh_l' does not hang on 'shank_l'"):
+        Robot.from_mjcf(biped(), "x", BIPED_SEGMENTS | {"pelvis": "shank_l"})
+
+
+def test_a_model_that_lies_in_another_frame_and_bends_its_knees_the_other_way_is_the_same():
+    """It lies on its side, its knees count negative when flexed, and it does not float."""
+    plain = Robot.from_mjcf(biped(), "biped", BIPED_SEGMENTS)
+    other = biped().replace('axis="0 1 0" range="-5 150"', 'axis="0 -1 0" range="-150 5"')
+    other = other.replace("<freejoint/>", "").replace(
+        '<body name="trunk" pos="0 0 1">', '<body name="trunk" quat="0.5 -0.5 -0.5 -0.5">'
+    )
+    robot = Robot.from_mjcf(other, "biped", BIPED_SEGMENTS)
+    assert robot.flipped == ("knee_l", "knee_r") and robot.origin is None
+    np.testing.assert_allclose(robot.position_limits, plain.position_limits, atol=1e-6)
+    a, b = reference_robot(robot), reference_robot(plain)
+    for field in ("rest", "corners", "inertia"):
+        np.testing.assert_allclose(getattr(a, field), getattr(b, field), atol=1e-5)
 
 
 def test_a_knee_that_is_never_quite_straight_stands_nearly_so():
@@ -325,9 +437,9 @@ def test_what_cannot_be_retargeted_is_said():
 
 
 def test_without_the_wheel_the_g1_is_named(monkeypatch):
-    monkeypatch.setattr("mplearn_envs.robot.unitree.find_spec", lambda name: None)
+    monkeypatch.setattr("mplearn_envs.robot.packaged.find_spec", lambda name: None)
     with pytest.raises(MissingDependencyError, match=r"mplearn\[robots\]"):
-        unitree_g1.__wrapped__()
+        packaged_robot.__wrapped__("unitree_g1")
 
 
 @needs_g1

@@ -86,7 +86,8 @@ def _content(motion: RobotMotion, model: RobotModel) -> dict[str, Any]:
                         "axis": model.axes[j].round(8).tolist(),
                         "anchor": own.jnt_pos[model.joints[j]].round(7).tolist(),
                         "shift": float(
-                            model.shift[j] + own.qpos0[own.jnt_qposadr[model.joints[j]]]
+                            model.shift[j]
+                            + model.signs[j] * own.qpos0[own.jnt_qposadr[model.joints[j]]]
                         ),
                     }
                     for j in hinges
