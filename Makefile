@@ -54,7 +54,7 @@ build: setup                        ## wheel and sdist, each installed in isolat
 	$(BIN)/python -m build --outdir dist .
 	$(BIN)/python benchmarks/smoke_build.py dist
 
-clean-cache:                        ## remove numba's caches, which do not notice changes across files
+clean-cache:                        ## remove what numba keeps of compiled kernels
 	find mplearn envs agents -name '*.nb[ic]' -delete
 
 clean: clean-cache                  ## remove what the other commands made

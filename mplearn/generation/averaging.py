@@ -8,9 +8,9 @@ between nearby frames that are known; so a single draw per frame does for any nu
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from ..maths.banded import factorise, multiply
+from ..maths.compiling import njit
 from ..recording import FloatArray, IntArray
 
 _WHITE = 1e-10  # of the variance, added to it: frames may otherwise determine one another

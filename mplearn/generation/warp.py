@@ -6,9 +6,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..errors import InvalidValueError
+from ..maths.compiling import njit
 from ..maths.splines import curvatures, fill_in, spline_values
 from ..recording import FloatArray, IntArray
 from .trajectory import Trajectory

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..maths.compiling import njit
 from ..recording import FloatArray, IntArray
 from .kernels import Gaussians, backward, forward, log_add, log_densities, log_norms
 from .sequences import SequenceBatch

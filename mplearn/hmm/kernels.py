@@ -14,8 +14,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
+from ..maths.compiling import njit
 from ..recording import FloatArray, IntArray
 
 # exp(-38) is less than half a unit in the last place of a sum whose larger term is 1

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 
 from ..errors import FrameError
+from ..maths.compiling import njit
 from ..recording import FloatArray
 from .kernels import log_add
 from .model import LeftRightHMM

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numba import njit
 
+from ..maths.compiling import njit
 from ..recording import BoolArray, FloatArray, IntArray
 from ..state import Array, Count, Range, State, require
 

@@ -7,9 +7,9 @@ t + i, column t of channel d's.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from ..recording import FloatArray
+from .compiling import njit
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,15 +1,25 @@
-"""How kernels are compiled where many call each other with large records.
+"""How kernels are compiled, and kept on disk.
 
-For each kernel numba makes, besides the kernel, an entrance for Python and one for C, which take
-every array of every record apart: longer to compile than a short kernel itself.
+**When a kernel is compiled again.** numba takes a kernel from its cache as long as the kernel's own
+file is as old as it was; what it calls in other files, and the constants it takes from there, are
+compiled into it and may have changed since. `njit` here looks at all of these, too.
+
+**Entrances.** For each kernel numba makes, besides the kernel, an entrance for Python and one for
+C, which take every array of every record apart: longer to compile than a short kernel itself.
+`kernel` and `inner_kernel` leave them out where many kernels call each other with large records.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
+from types import CodeType, FunctionType, ModuleType
 from typing import Any, TypeVar, cast
 
-from numba import njit
+import numba
+import numpy as np
+from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 # options that numba has and its types do not name
@@ -17,9 +27,29 @@ _NO_C: dict[str, Any] = {"no_cfunc_wrapper": True}
 _NO_PYTHON: dict[str, Any] = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
 
 
+def njit(**options: Any) -> Callable[[_Kernel], _Kernel]:
+    """Return numba's decorator of this name; what it keeps on disk is what it would compile now.
+
+    Example:
+        >>> @njit()
+        ... def twice(x: float) -> float:
+        ...     return 2.0 * x
+        >>> twice(1.5)
+        3.0
+    """
+
+    def compiled(function: _Kernel) -> _Kernel:
+        made: Any = numba.njit(**options)(function)
+        if options.get("cache") and hasattr(made, "py_func"):  # else numba is switched off
+            made._cache = _Cache(function)
+        return cast("_Kernel", made)
+
+    return compiled
+
+
 def kernel(function: _Kernel) -> _Kernel:
     """Compile a kernel, kept on disk, that leaves Python to other threads; it has no C entrance."""
-    return cast("_Kernel", njit(cache=True, nogil=True, **_NO_C)(function))
+    return njit(cache=True, nogil=True, **_NO_C)(function)
 
 
 def inner_kernel(function: _Kernel) -> _Kernel:
@@ -27,4 +57,79 @@ def inner_kernel(function: _Kernel) -> _Kernel:
 
     It has no entrance for Python either: a process that calls it from there ends.
     """
-    return cast("_Kernel", njit(cache=True, nogil=True, **_NO_PYTHON)(function))
+    return njit(cache=True, nogil=True, **_NO_PYTHON)(function)
+
+
+def fingerprint(function: Callable[..., Any]) -> str:
+    """Return what a kernel is made of, as a hash: its code, what it calls, constants it takes.
+
+    Equal in all processes of one version of Python. What is called is looked up now, as numba does
+    when it compiles.
+    """
+    found = hashlib.sha256()
+    _add(function, found, set())
+    return found.hexdigest()
+
+
+class _Cache(FunctionCache):
+    """A kernel's compiled forms on disk, good as long as its `fingerprint` is the same."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)  # type: ignore[no-untyped-call]
+        self._looked = False
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        self._look()
+        return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        self._look()
+        super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+
+    def _look(self) -> None:
+        """Look at what the kernel is made of; late, for what it calls may be defined after it."""
+        if not self._looked:
+            self._looked = True
+            file = self._cache_file
+            file._source_stamp = (file._source_stamp, fingerprint(self._py_func))
+
+
+def _add(value: Any, found: Any, seen: set[int]) -> None:
+    """Add a value that a kernel refers to."""
+    if isinstance(value, Dispatcher):
+        found.update(repr(sorted(value.targetoptions.items())).encode())
+        value = value.py_func
+    if isinstance(value, FunctionType):
+        if id(value) not in seen:
+            seen.add(id(value))
+            _add_code(value.__code__, value.__globals__, found, seen)
+            for cell in value.__closure__ or ():
+                _add(cell.cell_contents, found, seen)
+    elif isinstance(value, tuple):
+        for each in value:
+            _add(each, found, seen)
+    elif isinstance(value, np.ndarray):
+        found.update(repr((value.dtype, value.shape)).encode() + value.tobytes())
+    elif isinstance(value, type):
+        found.update(repr((value.__qualname__, getattr(value, "_fields", ()))).encode())
+    elif isinstance(value, (bool, int, float, complex, str, bytes, np.generic, np.dtype)):
+        found.update(repr(value).encode())
+    else:
+        found.update(type(value).__qualname__.encode())
+
+
+def _add_code(code: CodeType, names: dict[str, Any], found: Any, seen: set[int]) -> None:
+    found.update(code.co_code + repr((code.co_names, code.co_varnames)).encode())
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            _add_code(constant, names, found, seen)
+        else:
+            _add(constant, found, seen)
+    for name in code.co_names:
+        value = names.get(name)
+        if isinstance(value, ModuleType):
+            if value.__name__.startswith("mplearn"):
+                for attribute in code.co_names:
+                    _add(getattr(value, attribute, None), found, seen)
+        else:
+            _add(value, found, seen)

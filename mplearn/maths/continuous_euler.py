@@ -10,10 +10,10 @@ a joint stays close to gimbal lock, its outer angle goes only a part of the way 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from ..errors import InvalidValueError
 from ..recording import BoolArray, FloatArray, IntArray
+from .compiling import njit
 from .rotations import euler_to_matrix
 
 _NEAR_LOCK = np.radians(3.0)  # where half of a leap is taken; what is left out is 2 deg at most

@@ -10,10 +10,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..errors import InvalidValueError
 from ..recording import FloatArray
+from .compiling import njit
 
 
 class Butterworth(NamedTuple):

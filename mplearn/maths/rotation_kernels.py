@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from ..recording import FloatArray
+from .compiling import njit
 
 
 @njit(cache=True)

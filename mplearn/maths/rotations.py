@@ -11,10 +11,10 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 
 from ..errors import InvalidValueError
 from ..recording import FloatArray
+from .compiling import njit
 from .rotation_kernels import quaternion_matrix
 
 if TYPE_CHECKING:

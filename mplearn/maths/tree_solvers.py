@@ -8,9 +8,9 @@ from the leaves to the root, L'L = A, such a matrix fills no entry that was zero
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from ..recording import BoolArray, FloatArray, IntArray
+from .compiling import njit
 
 
 @njit(cache=True)

@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from ..recording import FloatArray
+from .compiling import njit
 from .quaternions import Numbers, Quaternion
 
 

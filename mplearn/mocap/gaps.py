@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..errors import FrameError, InvalidValueError
+from ..maths.compiling import njit
 from ..recording import FloatArray, IntArray
 from ..state import Array, State, require, validated, within
 from .rigidity import LookRules, Neighbours, RigidityState, predict, see_neighbours

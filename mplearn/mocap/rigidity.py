@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..maths.compiling import njit
 from ..maths.rotation_kernels import nearest_rotation
 from ..recording import BoolArray, FloatArray, IntArray
 from ..state import Array, Count, State, require

@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..maths.compiling import njit
 from ..recording import BoolArray, FloatArray, IntArray
 from .config import PeopleConfig
 from .shapes.offsets import offsets_of

@@ -15,8 +15,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..maths.compiling import njit
 from ..recording import FloatArray
 
 MOST_SEGMENTS = 12

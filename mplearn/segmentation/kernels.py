@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from numba import njit
-
+from ..maths.compiling import njit
 from ..recording import FloatArray
 
 

@@ -6,8 +6,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..maths.compiling import njit
 from ..recording import FloatArray, IntArray
 from .envelope import keep_row, switching_cost
 from .speed import (

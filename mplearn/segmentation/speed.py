@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..errors import InvalidValueError
+from ..maths.compiling import njit
 from ..recording import FloatArray
 from .base import check_positive, check_share, frames_of
 from .kernels import Smooth, all_finite, smooth_velocity

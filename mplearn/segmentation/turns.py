@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..maths.compiling import njit
 from ..recording import FloatArray
 from .base import check_positive, check_share, frames_of
 from .kernels import Smooth, distance

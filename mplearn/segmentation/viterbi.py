@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..maths.compiling import njit
 from ..recording import FloatArray, IntArray
 
 

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
-
+from ..maths.compiling import njit
 from ..recording import FloatArray
 from .speed import DIP, LENGTH, MOVING, OPENING, REST, STILL, close, running_speed
 

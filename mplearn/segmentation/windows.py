@@ -19,8 +19,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..maths.compiling import njit
 from ..recording import FloatArray
 
 

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
-
+from ..maths.compiling import njit
 from ..recording import FloatArray
 from .speed import Watched, ZeroVelocityConfig, readiness, take_speed
 from .speed_segmenter import SpeedSegmenter

@@ -14,10 +14,10 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..errors import InvalidValueError
 from ..hmm.kernels import log_likelihood
+from ..maths.compiling import njit
 from ..plugins import join_installed
 from ..recording import FloatArray, IntArray
 from .config import TreeConfig

@@ -79,6 +79,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
     def __init__(
         self,
         source: LibrarySource,
+        *,
         robot: Robot | str | None,
         task: Task | str | Mapping[str, Any],
         dynamics: Dynamics,

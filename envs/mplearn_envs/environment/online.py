@@ -117,16 +117,16 @@ class OnlinePrimitiveHumanoidEnv(MacroStepEnv):
         source = LibrarySource(self.learner)
         super().__init__(
             source,
-            robot,
-            task,
-            dynamics,
-            discount,
-            flat,
-            motion,
-            actions,
-            pictures,
-            render_mode,
-            body,
+            robot=robot,
+            task=task,
+            dynamics=dynamics,
+            discount=discount,
+            flat=flat,
+            motion=motion,
+            actions=actions,
+            pictures=pictures,
+            render_mode=render_mode,
+            body=body,
         )
         if isinstance(self.task, FollowTask):
             raise InvalidValueError(

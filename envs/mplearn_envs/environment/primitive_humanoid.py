@@ -204,16 +204,16 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
         source = LibrarySource(from_plain(library))
         super().__init__(
             source,
-            robot,
-            task,
-            dynamics,
-            discount,
-            flat,
-            motion,
-            actions,
-            pictures,
-            render_mode,
-            body,
+            robot=robot,
+            task=task,
+            dynamics=dynamics,
+            discount=discount,
+            flat=flat,
+            motion=motion,
+            actions=actions,
+            pictures=pictures,
+            render_mode=render_mode,
+            body=body,
         )
 
     def _begin(self, options: Mapping[str, Any]) -> None:

@@ -109,16 +109,16 @@ class VariedHumanoidEnv(MacroStepEnv):
             task = replace(TASKS[task])  # type: ignore[type-var]
         super().__init__(
             LibrarySource(library_of(self.person)),
-            robot,
-            task,
-            dynamics,
-            discount,
-            flat,
-            motion,
-            actions,
-            pictures,
-            render_mode,
-            body,
+            robot=robot,
+            task=task,
+            dynamics=dynamics,
+            discount=discount,
+            flat=flat,
+            motion=motion,
+            actions=actions,
+            pictures=pictures,
+            render_mode=render_mode,
+            body=body,
         )
 
     def _made_repertoire(self) -> Repertoire:

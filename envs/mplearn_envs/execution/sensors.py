@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numba import njit
 
+from mplearn.maths.compiling import njit
 from mplearn.maths.plane import turn_in_plane
 from mplearn.maths.yaw_roll_pitch import roll_pitch_of, yaw_of
 from mplearn.recording import FloatArray, IntArray

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from mplearn.maths.compiling import njit
 from mplearn.recording import FloatArray, IntArray
 
 from .kinematics import MassTree, cross, forward

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from mplearn.maths.compiling import njit
 from mplearn.maths.easing import smooth_step
 from mplearn.maths.plane import turn_in_plane
 from mplearn.maths.rotation_kernels import turn_about_vertical, turn_by_vector

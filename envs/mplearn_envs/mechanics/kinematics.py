@@ -9,11 +9,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mplearn.body.kinematics.kernels import forward_kinematics
 from mplearn.body.kinematics.linkage import Linkage, empty_configuration
 from mplearn.body.kinematics.tree import KinematicTree
+from mplearn.maths.compiling import njit
 from mplearn.maths.quaternions import quaternion_product, vector_quaternion
 from mplearn.recording import FloatArray, IntArray
 

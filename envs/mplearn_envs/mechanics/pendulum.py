@@ -7,8 +7,8 @@ the whole future known and both ends given): normal equations with seven bands, 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from mplearn.maths.compiling import njit
 from mplearn.recording import FloatArray
 
 from .support import GRAVITY

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mplearn.errors import InvalidValueError
+from mplearn.maths.compiling import njit
 from mplearn.recording import FloatArray, IntArray
 
 GRAVITY = 9.81

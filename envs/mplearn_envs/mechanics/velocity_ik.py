@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from mplearn.maths.compiling import njit
 from mplearn.maths.rotation_kernels import rotation_error
 from mplearn.maths.solvers import solve_damped
 from mplearn.recording import FloatArray, IntArray

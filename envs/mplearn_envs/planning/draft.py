@@ -18,7 +18,7 @@ from mplearn_envs.mechanics.support import margins_along
 from mplearn_envs.robot import Robot
 
 from .clearance import NEAR_M, feet_touch
-from .leg_ik import balanced_path
+from .leg_ik import Wanted, balanced_path
 from .plan import Motion, PlannerConfig
 from .splines import fading
 from .stride import CARRY_M, plan_ground, plan_rise, plan_weight
@@ -213,18 +213,9 @@ class Drafter:
         carried = smooth_step(np.clip(targets[:, -2:] / CARRY_M, 0.0, 1.0))
         if motion.footwork is not None and not motion.footwork.free:
             carried[:] = 0.0
-        what = (
-            self._reference,
-            targets[:, :width],
-            targets[:, width:],
-            ground,
-            heel,
-            carried,
-            cog,
-            start.q,
-            self.knot_s,
-        )
-        path: tuple[FloatArray, FloatArray] = balanced_path(*what)
+        wanted = Wanted(targets[:, :width], targets[:, width:], ground, heel, carried, cog)
+        what = self._reference, wanted, start.q, self.knot_s
+        path: tuple[FloatArray, FloatArray] = balanced_path(*what, False)
         beside = np.array_equal(start.ground, self._reference.ground)
         if carried.any() and feet_touch(self._reference, path[0], -_GRAZES_M if beside else NEAR_M):
             path = balanced_path(*what, True)

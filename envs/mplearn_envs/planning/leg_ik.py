@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numba import njit
+from typing import NamedTuple
 
+import numpy as np
+
+from mplearn.maths.compiling import njit
 from mplearn.maths.plane import turn_in_plane
 from mplearn.maths.rotation_kernels import rotation_error, turn_about_vertical, turn_by_vector
 from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix
@@ -22,18 +24,30 @@ RISING_M_S2 = 5.0  # so fast the base gathers speed, and loses it, where a leg l
 _MAX_ITERATIONS = 12
 
 
+class Wanted(NamedTuple):
+    """What is wanted of the reference robot at K moments.
+
+    Attributes:
+        targets: Tracked coordinates, shape (K, U) [m, rad].
+        swing: Angles of the legs' hinges [rad] that feet in the air follow, and heights of the left
+            and the right sole [m], shape (K, n_legs + 2).
+        ground: Where each foot stands or would: x, y [m] and yaw [rad], shape (K, 2, 3).
+        heel: By how much each heel is raised, shape (K, 2) [rad].
+        carried: How far each foot follows its leg's motion instead, shape (K, 2), 0 to 1.
+        cog: Horizontal COG, shape (K, 2) [m].
+    """
+
+    targets: FloatArray
+    swing: FloatArray
+    ground: FloatArray
+    heel: FloatArray
+    carried: FloatArray
+    cog: FloatArray
+
+
 @njit(cache=True, nogil=True)
 def balanced_path(
-    robot: ReferenceRobot,
-    targets: FloatArray,
-    swing: FloatArray,
-    ground: FloatArray,
-    heel: FloatArray,
-    carried: FloatArray,
-    cog: FloatArray,
-    start: FloatArray,
-    knot_s: float,
-    wide: bool = False,
+    robot: ReferenceRobot, wanted: Wanted, start: FloatArray, knot_s: float, wide: bool
 ) -> tuple[FloatArray, FloatArray]:
     """Balance the reference robot under every target.
 
@@ -42,15 +56,9 @@ def balanced_path(
 
     Args:
         robot: The reference robot.
-        targets: Tracked coordinates, shape (K, U) [m, rad].
-        swing: Angles of the legs' hinges [rad] that feet in the air follow, and heights of the left
-            and the right sole [m], shape (K, n_legs + 2).
-        ground: Where each foot stands or would: x, y [m] and yaw [rad], shape (K, 2, 3).
-        heel: By how much each heel is raised, shape (K, 2) [rad].
-        carried: How far each foot follows its leg's motion instead, shape (K, 2), 0 to 1.
-        cog: Horizontal COG, shape (K, 2) [m].
+        wanted: What is wanted of it, at K moments.
         start: Posture before them, shape (7 + n,).
-        knot_s: Time between targets [s].
+        knot_s: Time between the moments [s].
         wide: Whether a foot passes the other one as wide as it is turned, however far it follows
             its leg's motion.
 
@@ -58,6 +66,7 @@ def balanced_path(
         The postures, shape (K + 1, 7 + n), start included, and the largest error that is left in
         each, shape (K + 1,) [m, rad].
     """
+    targets, swing, ground, heel, carried, cog = wanted
     n_knots = targets.shape[0]
     out = np.empty((n_knots + 1, start.shape[0]))
     worst = np.zeros(n_knots + 1)

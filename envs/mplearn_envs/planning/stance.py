@@ -12,8 +12,8 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from mplearn.maths.compiling import njit
 from mplearn.maths.easing import smooth_step
 from mplearn.maths.plane import turn_in_plane, wrap_angle
 from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix

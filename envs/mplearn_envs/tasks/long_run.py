@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mplearn.errors import InvalidValueError
+from mplearn.maths.compiling import njit
 from mplearn.recording import FloatArray, IntArray
 
 _LEAST_GAIN = 1e-10  # of a policy's improvement, relative to the largest reward

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mplearn.recording import BoolArray, FloatArray
 
+from ...maths.compiling import njit
 from ..kinematics.linkage import Linkage
 from .gauss_newton import Markers, Moves, Search, solve_frame
 

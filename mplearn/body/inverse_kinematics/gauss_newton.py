@@ -17,11 +17,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mplearn.maths.tree_solvers import bounded_solve, inverse_diagonal
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
+from ...maths.compiling import njit
 from ..kinematics.kernels import integrate, locate
 from ..kinematics.linkage import Configuration, Linkage, empty_configuration
 

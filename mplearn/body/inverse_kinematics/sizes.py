@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mplearn.recording import FloatArray, IntArray
 
+from ...maths.compiling import njit
 from ..kinematics.tree import KinematicTree
 from ..models.human import PROPORTIONS
 

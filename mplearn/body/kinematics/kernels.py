@@ -6,12 +6,12 @@ Conventions as in `tree`; all of them fill arrays that the caller owns.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mplearn.maths.quaternions import quaternion_product, vector_quaternion
 from mplearn.maths.rotation_kernels import quaternion_matrix, turn_in_place
 from mplearn.recording import FloatArray, IntArray
 
+from ...maths.compiling import njit
 from .linkage import Configuration, Linkage, empty_configuration
 
 

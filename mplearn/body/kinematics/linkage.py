@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mplearn.recording import BoolArray, FloatArray, IntArray
+
+from ...maths.compiling import njit
 
 
 class Linkage(NamedTuple):

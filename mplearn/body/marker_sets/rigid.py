@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mplearn.recording import FloatArray, IntArray
 from mplearn.state import Array
 
+from ...maths.compiling import njit
 from .marker_set import find_marker_set
 
 FIRM = {"head": 0.003, "hand_l": 0.004, "hand_r": 0.004, "foot_l": 0.004, "foot_r": 0.004}

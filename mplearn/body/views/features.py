@@ -7,12 +7,12 @@ performed.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mplearn.errors import BodyError
 from mplearn.maths.yaw_roll_pitch import roll_pitch_of, yaw_roll_pitch_quaternion
 from mplearn.recording import FloatArray
 
+from ...maths.compiling import njit
 from ..models.body import Body
 from ..models.robot import robot_body
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mplearn.maths.yaw_roll_pitch import yaw_roll_pitch_quaternion
 from mplearn.recording import FloatArray, IntArray
 
+from ...maths.compiling import njit
 from ..kinematics.kernels import points_of_postures
 from ..models.body import Body
 

@@ -7,8 +7,8 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ...maths.compiling import njit
 from ...recording import FloatArray, IntArray
 from ..kernels import log_add
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 
+from ...maths.compiling import njit
 from ...recording import FloatArray, IntArray
 from ...tree import MirrorMap
 from .shape import Shape, ShapeState, mirrored, squares

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...maths.compiling import njit
 from ...recording import FloatArray, IntArray
 from ..exemplars.spread import pairs
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...maths.compiling import njit
 from ...recording import BoolArray, FloatArray, IntArray
 from ...state import Array, Range, State, require, require_no_cycle
 from ..config import TreeConfig

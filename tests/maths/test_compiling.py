@@ -1,0 +1,67 @@
+"""What is kept on disk of a kernel is what would be compiled now."""
+
+import importlib
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+CALLER = """
+from mplearn.maths.compiling import njit
+from called import SHIFT, inner
+
+@njit(cache=True)
+def outer(x):
+    return later(x) + SHIFT[0]
+
+@njit(cache=True)
+def later(x):
+    return inner(x)
+"""
+CALLED = """
+from mplearn.maths.compiling import njit
+SHIFT = ({shift},)
+FACTOR = {factor}
+
+@njit(cache=True)
+def inner(x):
+    return FACTOR * x{more}
+"""
+
+
+@pytest.fixture
+def outer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Load the two files anew, as another process would; the caller's file is never touched."""
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "caller.py").write_text(CALLER)
+
+    def load(shift: float = 1.0, factor: float = 2.0, more: str = "") -> Any:
+        called = tmp_path / "called.py"
+        text = CALLED.format(shift=shift, factor=factor, more=more)
+        if not called.exists() or called.read_text() != text:
+            called.write_text(text)
+            os.utime(called, ns=(0, called.stat().st_mtime_ns + 10**9))
+        for name in ("caller", "called"):
+            monkeypatch.delitem(sys.modules, name, raising=False)
+        importlib.invalidate_caches()
+        return importlib.import_module("caller").outer
+
+    return load
+
+
+def test_a_kernel_is_compiled_again_where_what_it_calls_or_takes_has_changed(outer: Any) -> None:
+    first = outer()
+    assert first(3.0) == 7.0 and not first.stats.cache_hits
+    again = outer()
+    assert again(3.0) == 7.0 and again.stats.cache_hits
+    for changed, result in (
+        ({"more": " - 1.0"}, 6.0),  # the text of a kernel two calls away
+        ({"factor": 5.0}, 16.0),  # a constant of it
+        ({"shift": 4.0}, 10.0),  # a constant from its file
+        ({}, 7.0),
+    ):
+        renewed = outer(**changed)
+        assert renewed(3.0) == result
+        assert not renewed.stats.cache_hits
