@@ -11,6 +11,7 @@ from mplearn.library import PrimitiveLibrary
 from mplearn_agents.cli import main
 from mplearn_agents.rl import ProjectIllegal, TrainedPolicy, TrainingConfig
 from mplearn_agents.rl.config import VERSION
+from mplearn_agents.rl.growing import grow
 from mplearn_agents.rl.projection import project
 from mplearn_agents.rl.train import make_environment, train
 
@@ -149,6 +150,48 @@ def test_what_the_prior_is_to_an_untrained_agent(config, prior):
     env.close()
 
 
+def test_an_agent_chooses_the_speed_with_the_primitive(folder, config):
+    """Untrained, at any speed as the prior says; in a while it has found out that fast is good."""
+    from stable_baselines3.common.vec_env import DummyVecEnv
+
+    from mplearn_agents.rl.algorithms import new_model
+
+    usual = make_environment(config)
+    capacity = int(usual.action_space.n)
+    usual.close()
+    fast = replace(config, speeds=(0.5, 1.0), n_envs=4, round_steps=1024, steps=4096)
+    env = make_environment(fast)
+    assert env.action_space.n == 2 * capacity
+    untrained = new_model(fast, DummyVecEnv([lambda: env]), {}).policy
+    observation, info = env.reset(seed=1)
+    seen = untrained.obs_to_tensor({key: np.asarray(x) for key, x in observation.items()})[0]
+    with torch.no_grad():
+        given = untrained.get_distribution(seen, info["action_mask"].astype(bool))
+        slow, quick = given.distribution.probs[0].numpy().reshape(2, capacity)
+    np.testing.assert_allclose(slow, quick, atol=0.02)
+    mask, prior = (info[key][:capacity] for key in ("action_mask", "transition_prior"))
+    likely = np.maximum(prior, 0.01) * mask
+    np.testing.assert_allclose(slow + quick, likely / likely.sum(), atol=0.05)
+    agent = train(fast, folder / "speeds")
+    again = TrainedPolicy.load(folder / "speeds")
+    again.require_fit(env)
+    quickly = []
+    for seed in range(8):
+        observation, info = env.reset(seed=seed)
+        for _ in range(20):
+            action = agent.act(observation, info)
+            assert action == again.act(observation, info)
+            if action % capacity:
+                quickly.append(action >= capacity)
+            observation, _, ended, _, info = env.step(action)
+            if ended:
+                break
+    env.close()
+    assert np.mean(quickly) > 0.8
+    with pytest.raises(InvalidValueError, match="speeds must be one or more"):
+        replace(config, speeds=())
+
+
 def embedded(observation, env, slots):
     """Return an observation as an environment with more slots would show it."""
     out = {key: np.asarray(value) for key, value in observation.items()}
@@ -159,6 +202,16 @@ def embedded(observation, env, slots):
     current = int(out["current_primitive"])
     out["current_primitive"] = np.int64(slots[current] if current else 0)
     return out
+
+
+def test_an_agent_of_speeds_grows_with_them(folder, config):
+    speeds = replace(config, speeds=(1.0, 0.5), n_envs=2, steps=256, round_steps=256)
+    agent = train(speeds, folder / "growing speeds")
+    more = make_environment(replace(speeds, library=str(folder / "grown.mplearn")))
+    grow(agent, more).require_fit(more)
+    less = make_environment(replace(config, library=str(folder / "grown.mplearn")))
+    with pytest.raises(InvalidValueError, match="chooses among 2 speeds, here it would among 1"):
+        grow(agent, less)
 
 
 @pytest.mark.parametrize("task", ["goal", "recite"])

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 from mplearn_agents.contests.suited import SUITED
-from mplearn_agents.terminal.arguments import count, seed
+from mplearn_agents.terminal.arguments import count, positive, seed
 
 if TYPE_CHECKING:
     from mplearn_agents.contests.contest import Contest
@@ -38,6 +38,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=["nominal"],
         help="what the simulated body is like: nominal, randomised, harsh (default: nominal)",
+    )
+    parser.add_argument(
+        "--speeds",
+        type=positive,
+        nargs="+",
+        default=[1.0],
+        help="among which speeds everyone chooses, as shares of the usual one, which comes first "
+        "(default: 1)",
     )
     parser.add_argument("--library", type=Path, help="library file (default: the built-in one)")
     parser.add_argument("--tasks", nargs="+", default=list(SUITED))
@@ -92,6 +100,7 @@ def run(args: argparse.Namespace) -> None:
         env=args.env,
         people=tuple(args.people),
         bodies=tuple(args.bodies),
+        speeds=tuple(args.speeds),
     )
     comparisons = [comparison]
     if args.variants:

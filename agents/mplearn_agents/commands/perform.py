@@ -99,9 +99,14 @@ def run(args: argparse.Namespace) -> None:
         "task": args.task or trained.task,
         "dynamics": args.dynamics,
         "robot": make_robot(args.robot),
+        "actions": {"speeds": trained.speeds},
         "disable_env_checker": True,
     }
-    name = "mplearn/PrimitiveHumanoid-v0"
+    name = f"mplearn/PrimitiveHumanoid-{trained.env}"
+    if trained.env == "v1":
+        if options.pop("library") is not None:
+            raise InvalidValueError("the agent was trained on v1, which has its own library")
+        options |= trained.environment
     whole: dict[str, Any] = {"speed": args.speed}
     standing = whole | {"upper_body": True, "feasibility": _CUT_OFF}
     env = gymnasium.make(name, motion=standing if args.upper_body else whole, **options)

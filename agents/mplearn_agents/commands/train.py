@@ -63,6 +63,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             help=f"{what} (default: {default[name]})",
         )
     parser.add_argument(
+        "--speeds",
+        type=positive,
+        nargs="+",
+        default=default["speeds"],
+        help="among which speeds it chooses, as shares of the usual one, which comes first "
+        "(default: 1)",
+    )
+    parser.add_argument(
         "--discount",
         type=positive,
         help="what a reward in a second's time is worth (default: 0.95, in v1 0.98)",

@@ -10,7 +10,7 @@ from mplearn_agents.contests.contest import Contest, Game
 from mplearn_agents.contests.suited import NEEDS_TASK, SUITED, suited
 from mplearn_agents.policies import POLICIES
 from mplearn_agents.rl import TrainingConfig
-from mplearn_agents.rl.config import AlgorithmName, EnvVersion, PriorUse
+from mplearn_agents.rl.config import USUAL_SPEED, AlgorithmName, EnvVersion, PriorUse
 from mplearn_envs.execution.bodies import BodyName
 from mplearn_envs.execution.modes import Dynamics
 from mplearn_envs.tasks import TASKS
@@ -40,6 +40,7 @@ class Comparison:
         library: File of the library; None is the built-in one.
         env: Version of the environment.
         people: Of v1: with whom it is played, one game each. Agents are trained with "train".
+        speeds: Among which speeds everyone chooses with the primitive, the usual one first.
         bodies: Levels of what the body is like, simulated; see `mplearn_envs.execution.bodies`.
     """
 
@@ -56,6 +57,7 @@ class Comparison:
     env: EnvVersion = "v0"
     people: tuple[str, ...] = ("train", "test")
     bodies: tuple[str, ...] = ("nominal",)
+    speeds: tuple[float, ...] = USUAL_SPEED
 
     def __post_init__(self) -> None:
         for what, allowed in (
@@ -102,6 +104,7 @@ class Comparison:
                     self.library,
                     training and replace(training, seed=seed),
                     self.env,
+                    self.speeds,
                 )
                 for seed in self.seeds
             ]
@@ -142,6 +145,7 @@ class Comparison:
                 library=self.library,
                 round_steps=min(steps, ROUND_STEPS),
                 episodes=PROBES,
+                speeds=self.speeds,
             )
             for algorithm, use in uses
         }

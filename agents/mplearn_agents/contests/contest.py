@@ -13,7 +13,7 @@ import mplearn_envs  # noqa: F401  (registers the environment)
 from mplearn_agents.contests.episodes import Episode, play
 from mplearn_agents.policies import POLICIES, Policy
 from mplearn_agents.rl import TrainedPolicy, TrainingConfig
-from mplearn_agents.rl.config import EnvVersion
+from mplearn_agents.rl.config import USUAL_SPEED, EnvVersion
 from mplearn_agents.rl.train import train
 from mplearn_agents.rl.trained import CONFIG, POLICY
 from mplearn_envs.tasks import FreeTask
@@ -54,6 +54,7 @@ class Contest:
         library: File of the library; None is the built-in one.
         training: Of an agent; None for a policy.
         env: Version of the environment.
+        speeds: Among which speeds one chooses with the primitive.
     """
 
     task: str
@@ -63,6 +64,7 @@ class Contest:
     library: str | None
     training: TrainingConfig | None
     env: EnvVersion = "v0"
+    speeds: tuple[float, ...] = USUAL_SPEED
 
     def play(self, folder: Path) -> list[list[Episode]]:
         """Return the episodes of each game; those that the folder has are taken from there.
@@ -78,6 +80,7 @@ class Contest:
         task = FreeTask(ceiling=True) if self.task == "free" else self.task
         options: dict[str, Any] = {"task": task, "dynamics": game.dynamics, "body": game.body}
         options |= {"library": self.library} if self.env == "v0" else {"people": game.people}
+        options["actions"] = {"speeds": self.speeds}
         name = f"mplearn/PrimitiveHumanoid-{self.env}"
         env = gymnasium.make(name, disable_env_checker=True, **options)
         asked: dict[str, Any] = {
@@ -85,8 +88,11 @@ class Contest:
             "library": env.unwrapped.library.version,  # type: ignore[attr-defined]
             "training": None if self.training is None else asdict(self.training),
         }
+        if self.speeds != USUAL_SPEED:
+            asked["speeds"] = self.speeds
         asked = json.loads(json.dumps(asked))  # as it is kept: with lists for tuples
         what = f"{self.task}-{game.name}-{self.name}-{self.seed}".replace(", ", "-")
+        what += _suffix(self.speeds)
         file = folder / "episodes" / f"{what.replace(' ', '-')}.json"
         episodes = _kept(file, asked)
         if episodes is None:
@@ -116,12 +122,17 @@ def _kept(file: Path, asked: dict[str, Any]) -> list[Episode] | None:
     return None
 
 
+def _suffix(speeds: tuple[float, ...]) -> str:
+    """Return what tells apart files of those who choose among other speeds than the usual one."""
+    return "" if speeds == USUAL_SPEED else "-at-" + "-".join(f"{each:g}" for each in speeds)
+
+
 def _trained(config: TrainingConfig, agents: Path) -> TrainedPolicy:
     """Return the agent of a training, which is made, or ended, if it was not before."""
     what = [config.task, config.algorithm, config.prior, config.steps, config.seed]
     if config.env != "v0":
         what.insert(0, config.env)
-    folder = agents / "-".join(map(str, what))
+    folder = agents / ("-".join(map(str, what)) + _suffix(config.speeds))
     if (folder / POLICY).exists() and TrainingConfig.load(folder / CONFIG)[0] == config:
         return TrainedPolicy.load(folder)
     return train(config, folder, resume=(folder / CONFIG).exists())

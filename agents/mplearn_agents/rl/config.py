@@ -11,8 +11,10 @@ from typing import Any, Literal, TypeAlias, get_args
 
 from mplearn.errors import InvalidValueError, MPLearnError
 from mplearn_agents.contests.suited import PriorUse as PriorUse
+from mplearn_envs.environment.options import ActionOptions
 
 VERSION = 3  # of agents: changes with networks, what they see, and what tasks show
+USUAL_SPEED = (1.0,)  # as the only one
 Ends: TypeAlias = list[list[float]]  # the tracked coordinates where a motion begins and ends
 EnvVersion: TypeAlias = Literal["v0", "v1"]
 AlgorithmName: TypeAlias = Literal["maskable-ppo", "ppo", "dqn"]
@@ -44,6 +46,7 @@ class TrainingConfig:
         network: Widths of the hidden layers, of actor and critic each.
         n_envs: Environments that it learns from at once; None is the algorithm's own. DQN has one.
         discount: What a reward in a second's time is worth, in (0, 1]; None is the environment's.
+        speeds: Among which speeds it chooses with the primitive, see `ActionOptions.speeds`.
         environment: Further arguments of the environment.
     """
 
@@ -61,6 +64,7 @@ class TrainingConfig:
     network: tuple[int, ...] = (128, 128)
     n_envs: int | None = None
     discount: float | None = None
+    speeds: tuple[float, ...] = USUAL_SPEED
     environment: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -81,6 +85,7 @@ class TrainingConfig:
         if self.seed < 0:
             raise InvalidValueError(f"seed must not be negative, but is {self.seed}")
         object.__setattr__(self, "network", tuple(self.network))  # JSON has lists
+        object.__setattr__(self, "speeds", ActionOptions(speeds=tuple(self.speeds)).speeds)
         if not self.network or min(self.network) < 1:
             raise InvalidValueError(
                 f"network must be widths of hidden layers from 1, not {self.network}"

@@ -34,6 +34,11 @@ class Scale(NamedTuple):
 Scaling: TypeAlias = Mapping[str, Scale]
 
 
+def capacity_of(observation_space: spaces.Dict) -> int:
+    """Return the number of slots; there are as many actions at each speed."""
+    return int(observation_space["current_primitive"].n)  # type: ignore[attr-defined]
+
+
 def width_of_slots(part: spaces.Space[Any], capacity: int) -> int:
     """Return how many of a part's numbers are about slots; they come first.
 
@@ -58,10 +63,8 @@ def measure_scaling(
         seed: Of the walks.
     """
     parts: dict[str, spaces.Space[Any]] = dict(env.observation_space.spaces)  # type: ignore[attr-defined]
-    first = {
-        key: width_of_slots(part, int(env.action_space.n))  # type: ignore[attr-defined]
-        for key, part in parts.items()
-    }
+    capacity = capacity_of(env.observation_space)  # type: ignore[arg-type]
+    first = {key: width_of_slots(part, capacity) for key, part in parts.items()}
     seen: dict[str, list[NDArray[np.float64]]] = {
         key: [] for key, part in parts.items() if spaces.flatdim(part) > first[key]
     }

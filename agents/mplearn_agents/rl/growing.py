@@ -13,6 +13,7 @@ from torch import Tensor
 from mplearn.errors import InvalidValueError
 
 from .algorithms import new_model
+from .encoding import capacity_of
 from .features import features_of
 from .trained import TrainedPolicy, ends_of, same_motion
 
@@ -29,11 +30,19 @@ def grow(agent: TrainedPolicy, env: gymnasium.Env[Any, Any]) -> TrainedPolicy:
         env: The environment to act in from now on; of the same task.
 
     Raises:
-        InvalidValueError: The agent is of another kind, or the environment's observation has other
-            parts.
+        InvalidValueError: The agent is of another kind, chooses among other speeds, or the
+            environment's observation has other parts.
     """
     if agent.config.algorithm == "dqn":
         raise InvalidValueError("agents of maskable-ppo and ppo can grow, not of dqn")
+    before = capacity_of(agent.model.observation_space)
+    now = capacity_of(env.observation_space)  # type: ignore[arg-type]
+    n_speeds = int(agent.model.action_space.n) // before
+    if int(env.action_space.n) != n_speeds * now:  # type: ignore[attr-defined]
+        raise InvalidValueError(
+            f"the agent chooses among {n_speeds} speeds, here it would among "
+            f"{int(env.action_space.n) // now}"  # type: ignore[attr-defined]
+        )
     slots: dict[int, int] = dict(env.unwrapped.repertoire.slots)  # type: ignore[attr-defined]
     ends = ends_of(env)
     moved = {0: 0} | {
@@ -45,6 +54,7 @@ def grow(agent: TrainedPolicy, env: gymnasium.Env[Any, Any]) -> TrainedPolicy:
     known: dict[str, Tensor] = agent.model.policy.state_dict()
     grown: dict[str, Tensor] = model.policy.state_dict()
     columns = _columns(agent.model, model, moved)
+    actions = {s * before + a: s * now + b for s in range(n_speeds) for a, b in moved.items()}
     with torch.no_grad():
         for name, old in known.items():
             new = grown[name]
@@ -53,7 +63,7 @@ def grow(agent: TrainedPolicy, env: gymnasium.Env[Any, Any]) -> TrainedPolicy:
                 n_common = old.shape[1] - _n_inputs(agent.model)
                 new[:, -n_common:] = old[:, -n_common:]  # of blocks, whatever their slots
             elif name.startswith("action_net."):
-                _copy_actions(old, new, moved)
+                _copy_actions(old, new, actions)
             elif not name.startswith(("features_extractor.", "pi_features", "vf_features")):
                 new.copy_(old)
     return TrainedPolicy(model, agent.config, slots, agent.deterministic, ends)
@@ -64,8 +74,8 @@ def _columns(old: Any, new: Any, moved: Mapping[int, int]) -> dict[int, int]:
 
     The log prior is left out.
     """
-    before = features_of(old.observation_space, int(old.action_space.n))[: _n_inputs(old)]
-    after = features_of(new.observation_space, int(new.action_space.n))[: _n_inputs(new)]
+    before = features_of(old.observation_space)[: _n_inputs(old)]
+    after = features_of(new.observation_space)[: _n_inputs(new)]
     if {each.part for each in before} != {each.part for each in after}:
         raise InvalidValueError(
             f"the agent sees {sorted({each.part for each in before})}, the environment shows "
@@ -81,7 +91,7 @@ def _columns(old: Any, new: Any, moved: Mapping[int, int]) -> dict[int, int]:
 
 def _n_inputs(model: Any) -> int:
     """Return the number of features but for the log prior."""
-    return int(model.policy.features_dim - model.action_space.n)
+    return int(model.policy.features_dim) - capacity_of(model.observation_space)
 
 
 def _copy_actions(old: Tensor, new: Tensor, moved: Mapping[int, int]) -> None:

@@ -10,6 +10,7 @@ from stable_baselines3.common.policies import MultiInputActorCriticPolicy
 from torch import nn
 
 from .config import PriorUse
+from .encoding import capacity_of
 from .features import blocks_of, log_prior
 from .trunk import Trunk
 
@@ -31,10 +32,10 @@ class _WithPrior:
         super().__init__(*args, **kwargs)
 
     def _build_mlp_extractor(self: Any) -> None:
-        n_actions = int(self.action_space.n)
-        blocks = blocks_of(self.observation_space, n_actions)
+        n_speeds = int(self.action_space.n) // capacity_of(self.observation_space)
+        blocks = blocks_of(self.observation_space)
         self.mlp_extractor = Trunk(
-            self.net_arch, self.activation_fn, self.features_dim, blocks, self.prior
+            self.net_arch, self.activation_fn, self.features_dim, blocks, self.prior, n_speeds
         )
 
     def _build(self, lr_schedule: Any) -> None:
@@ -53,7 +54,9 @@ class _WithPrior:
         values, log_prob, bonus = super().evaluate_actions(obs, actions, **masks)  # type: ignore[misc]
         if self.prior == "regulariser":
             probs = self.get_distribution(obs, **masks).distribution.probs
-            bonus = bonus + (probs * log_prior(obs)).sum(dim=1)
+            capacity = capacity_of(self.observation_space)
+            n_speeds = int(self.action_space.n) // capacity
+            bonus = bonus + (probs * log_prior(obs, capacity).repeat(1, n_speeds)).sum(dim=1)
         return values, log_prob, bonus
 
     def _get_constructor_parameters(self) -> dict[str, Any]:

@@ -19,7 +19,7 @@ import numpy as np
 from mplearn.errors import InvalidValueError
 from mplearn.extras import require
 
-from .config import TrainingConfig
+from .config import USUAL_SPEED, TrainingConfig
 from .encoding import measure_scaling
 from .projection import ProjectIllegal
 from .trained import CONFIG, POLICY, TrainedPolicy, ends_of
@@ -39,10 +39,13 @@ def make_environment(config: TrainingConfig) -> gymnasium.Env[Any, Any]:
         options["library"] = config.library
     if config.discount is not None:
         options["discount"] = config.discount
+    options |= config.environment
+    if config.speeds != USUAL_SPEED:
+        options["actions"] = {**options.get("actions", {}), "speeds": config.speeds}
     return gymnasium.make(
         f"mplearn/PrimitiveHumanoid-{config.env}",
         disable_env_checker=True,
-        **(options | config.environment),
+        **options,
     )
 
 
@@ -98,8 +101,6 @@ def train(
     envs = DummyVecEnv([make] * n_envs(config))
     tested = make_environment(config)
     inner: Any = tested.unwrapped
-    if tested.action_space != gymnasium.spaces.Discrete(inner.capacity):
-        raise InvalidValueError("agents that are trained here choose no speed: give one of speeds")
     slots = dict(inner.repertoire.slots)
     out.mkdir(parents=True, exist_ok=True)
     ends = ends_of(tested)

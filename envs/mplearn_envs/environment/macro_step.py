@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any, Literal, NamedTuple, SupportsFloat, get_args
+from typing import Any, ClassVar, Literal, NamedTuple, SupportsFloat, get_args
 
 import gymnasium
 import mujoco
@@ -75,6 +75,8 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         "render_modes": list(RENDER_MODES),
         "render_fps": 25,
     }
+
+    reset_options: ClassVar[tuple[str, ...]] = ()  # of the environment's own, beside the task's
 
     def __init__(
         self,
@@ -178,6 +180,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
             options: For the task: see there.
 
         Raises:
+            InvalidValueError: There is no such option.
             RobotError: The robot can perform nothing of the library.
             NoPathError: The task's goal cannot be reached.
         """
@@ -186,6 +189,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
             own = seed if seed is not None else int(self.np_random.integers(2**63))
             self._streams = RandomStreams.of(own)
         self._episode = None
+        self._require_known(options or {})
         self._begin(options or {})
         draw = 0 if self.body.certain else int(self.streams.body.integers(2**63))
         measured = self.performer.reset(draw)
@@ -317,6 +321,15 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         if self._episode is None:
             raise InvalidValueError("the episode has not begun: call reset first")
         return self._episode
+
+    def _require_known(self, options: Mapping[str, Any]) -> None:
+        """Check the names of options for a reset."""
+        own = self.task.reset_options
+        if own is None:
+            return
+        known = (*self.reset_options, *own)
+        if unknown := [name for name in options if name not in known]:
+            raise InvalidValueError(f"reset takes the options {known} here, not {unknown}")
 
     def _running(self) -> Episode:
         """Return the episode, which goes on."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -87,6 +87,8 @@ class VariedHumanoidEnv(MacroStepEnv):
         (True, 2)
         >>> env.close()
     """
+
+    reset_options: ClassVar[tuple[str, ...]] = ("person",)
 
     def __init__(
         self,

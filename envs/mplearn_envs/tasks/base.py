@@ -78,10 +78,13 @@ class Task(ABC):
         fallen: Price of a fall.
         terms: Names of the terms that its rewards have: ``info["reward_terms"]`` has them from the
             reset on, with 0 where nothing was earned. Others are there only when they are earned.
+        reset_options: Names of what it reads of `Scene.options`: others that are given to the
+            environment's ``reset`` are refused. None takes whatever there is.
     """
 
     fallen: float = 10.0
     terms: ClassVar[tuple[str, ...]] = ()
+    reset_options: ClassVar[tuple[str, ...] | None] = None
 
     def space(self, repertoire: Repertoire) -> spaces.Box | None:
         """Return the bounds of what `observe` returns; None if the task shows nothing.

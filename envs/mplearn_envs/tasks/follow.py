@@ -75,6 +75,7 @@ class FollowTask(Task):
     agree: float = 1.0
     fallen: float = 10.0
     terms: ClassVar[tuple[str, ...]] = ("agree",)
+    reset_options: ClassVar[tuple[str, ...] | None] = ()
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.pace) and self.pace > 0):

@@ -58,6 +58,7 @@ class FreeTask(Task):
     memory: int = 10
     ceiling: bool = False
     terms: ClassVar[tuple[str, ...]] = ("likely", "varied", "alive", "balanced")
+    reset_options: ClassVar[tuple[str, ...] | None] = ()
 
     def space(self, repertoire: Repertoire) -> spaces.Box:
         """Return the bounds of the shares."""

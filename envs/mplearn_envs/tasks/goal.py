@@ -88,6 +88,7 @@ class GoalTask(Task):
     reached: float = 1.0
     fallen: float = 10.0
     terms: ClassVar[tuple[str, ...]] = ("hurry", "reached")
+    reset_options: ClassVar[tuple[str, ...] | None] = ("target",)
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(KindName):

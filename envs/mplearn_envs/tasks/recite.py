@@ -64,6 +64,7 @@ class ReciteTask(Task):
     complete: float = 1.0
     fallen: float = 10.0
     terms: ClassVar[tuple[str, ...]] = ("hurry", "said", "complete")
+    reset_options: ClassVar[tuple[str, ...] | None] = ("request",)
 
     def __post_init__(self) -> None:
         if self.request is not None:

@@ -112,6 +112,8 @@ def foreknowledge_robot():
 
 
 def test_people_of_a_split_come_and_their_ways_differ(env):
+    with pytest.raises(InvalidValueError, match=r"\('person', 'target'\) here, not \['people'\]"):
+        env.reset(options={"people": 7})
     people = {env.reset(seed=seed)[1]["person"] for seed in range(40)}
     assert people == set(SPLITS["train"])
     test = make(people="test")

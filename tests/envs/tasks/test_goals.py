@@ -5,6 +5,7 @@ import pytest
 from standing_env import SLOT, legal
 from standing_task import make, named, shortest_way
 
+from mplearn.errors import InvalidValueError
 from mplearn_envs.execution.earliest_arrival import earliest_arrivals
 from mplearn_envs.tasks import GoalTask
 
@@ -89,4 +90,6 @@ def test_given_goals():
     assert env.step(SLOT["bow down"])[4]["is_success"]
     env = make(GoalTask("primitive"))
     assert named(env.reset(options={"target": "rise"})[1]) == [SLOT["rise"]]
+    with pytest.raises(InvalidValueError, match=r"\('target',\) here, not \['targt'\]"):
+        env.reset(options={"targt": "rise"})
     assert named(env.reset(options={"target": 4})[1]) == [SLOT["arms down"]]
