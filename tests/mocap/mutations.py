@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import gzip
+import io
 import re
+import zipfile
 
 import numpy as np
 
@@ -24,11 +26,30 @@ def mutated(rng: np.random.Generator, data: bytes, other: bytes) -> bytes:
         data: A valid file.
         other: Another one, pieces of which may get in.
     """
+    if zipfile.is_zipfile(io.BytesIO(data)) and rng.random() < 0.7:
+        return _repacked(rng, data, other)  # else checksums refuse what is changed
     for _ in range(int(rng.integers(1, 5))):
         data = _CHANGES[int(rng.integers(len(_CHANGES)))](rng, data, other)
         if not data:
             break
     return data
+
+
+def _repacked(rng: np.random.Generator, data: bytes, other: bytes) -> bytes:
+    """Return an archive in which one of the files, or its name, is changed."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    names = list(members)
+    name = names[int(rng.integers(len(names)))]
+    if rng.random() < 0.1:
+        members[names[int(rng.integers(len(names)))]] = members[name]
+    else:
+        members[name] = mutated(rng, members[name], other)
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    return stream.getvalue()
 
 
 def _span(rng: np.random.Generator, data: bytes, longest: int = 200) -> tuple[int, int]:

@@ -59,11 +59,10 @@ class DeepLabCutReader(Reader):
         at = _coords_row([row for _, row in rows[:_LOOK]])
         if at is None or at == 0:
             raise bad_file(path, "no rows of key points", "heads scorer, bodyparts and coords")
-        heads = {
-            (row[0].lower() if row[0].lower() in _HEADS else _HEADS[k - at - 1]): row
-            for k, (_, row) in enumerate(rows[: at + 1])
-        }
-        coords, parts = heads["coords"], heads.get("bodyparts", rows[at - 1][1])
+        heads: dict[str, list[str]] = {}
+        for name, (_, row) in zip(reversed(_HEADS), reversed(rows[: at + 1]), strict=False):
+            heads[row[0].lower() if row[0].lower() in _HEADS else name] = row
+        coords, parts = rows[at][1], heads.get("bodyparts", rows[at - 1][1])
         width = len(coords)
         animals = (*heads.get("individuals", ()), *[""] * width)[:width]
         body = [(n, row) for n, row in rows[at + 1 :] if any(row[1:])]  # below the index' name
