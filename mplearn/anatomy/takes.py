@@ -77,6 +77,13 @@ def as_bodies(
 
     Raises:
         BodyError: No take holds a body, or one does not and ``strict`` is set.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> take = demonstrate(["BAD", "BAU"], seed=1).recording
+        >>> bodies = as_bodies([take])
+        >>> len(bodies.recordings), len(bodies.refused)
+        (1, 0)
     """
     maps: dict[str, BodyMap] = {}
     refused: dict[str, MPLearnError] = {}

@@ -39,6 +39,10 @@ class Person:
 
     Raises:
         InvalidValueError: A name is unknown or a value out of range.
+
+    Example:
+        >>> Person(height_m=1.6, tempo={"SQD": 1.2}).name  # squats down more slowly
+        'average'
     """
 
     name: str = "average"

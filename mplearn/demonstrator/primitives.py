@@ -255,6 +255,10 @@ def followers(name: str) -> tuple[str, ...]:
 
     Raises:
         InvalidValueError: There is no such primitive.
+
+    Example:
+        >>> followers("SQD")  # squat down
+        ('SQR',)
     """
     posture = primitive(name).end
     return tuple(other.name for other in PRIMITIVES.values() if other.start == posture)

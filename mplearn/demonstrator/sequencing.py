@@ -167,6 +167,10 @@ def markov_script(
 
     Raises:
         InvalidValueError: As `markov_walk`, or the length is no positive integer.
+
+    Example:
+        >>> markov_script(4, np.random.default_rng(1))
+        ('BAD', 'BAU', 'RAR', 'RAL')
     """
     if isinstance(length, bool) or not isinstance(length, int | np.integer) or length < 1:
         raise InvalidValueError(f"length must be an integer of at least 1, not {length!r}")

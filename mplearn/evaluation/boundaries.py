@@ -190,6 +190,13 @@ def score_boundaries(
 
     Raises:
         InvalidValueError: There are no labels, or they overlap.
+
+    Example:
+        >>> found = [Segment(0, 103), Segment(103, 180), Segment(180, 300)]
+        >>> truth = [LabelledSegment(0, 100, "raise"), LabelledSegment(100, 300, "lower")]
+        >>> score = score_boundaries(found, truth, rate_hz=100.0)
+        >>> score.n_truth, score.n_found, score.median_error_s
+        (1, 2, 0.03)
     """
     if not labels:
         raise InvalidValueError("a stream without labels cannot be scored")

@@ -14,6 +14,14 @@ def gaps_filled(frames: FloatArray, hmm: LeftRightHMM) -> FloatArray:
 
     Gaps are bridged linearly in time; a channel that is missing throughout moves as the model's
     means do.
+
+    Example:
+        >>> from mplearn.hmm import fit
+        >>> wave = np.sin(np.linspace(0.0, 3.0, 40))[:, None]
+        >>> hidden = wave.copy()
+        >>> hidden[10:14] = np.nan
+        >>> bool(np.abs(gaps_filled(hidden, fit([wave], 5)) - wave).max() < 0.02)
+        True
     """
     filled = bridge_gaps(frames)
     unseen = np.isnan(filled).any(axis=0)

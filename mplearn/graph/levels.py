@@ -21,6 +21,10 @@ def tree_levels(parents: Mapping[int, int | None]) -> tuple[dict[int, int], ...]
     Returns:
         A mapping leaf -> ancestor for each depth at which there is something to tell apart, the
         deepest first. A leaf that ends above that depth stands for itself.
+
+    Example:
+        >>> tree_levels({0: None, 1: 0, 2: 1, 3: 1, 4: 0})  # leaves 2, 3 and 4
+        ({2: 1, 3: 1, 4: 4},)
     """
     inner = {parent for parent in parents.values() if parent is not None}
     ways = {}  # leaf -> the nodes from below the root down to it

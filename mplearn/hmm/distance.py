@@ -67,6 +67,14 @@ def distance_matrix(
     """Return the distances [nat] of M motions of one sequence each, shape (M, M), symmetric.
 
     Model m is the one fitted to sequence m.
+
+    Example:
+        >>> from mplearn.hmm import fit
+        >>> t = np.linspace(0.0, 1.0, 30)[:, None]
+        >>> motions = [np.sin(3.0 * t), np.sin(3.0 * t) + 0.01, np.cos(3.0 * t)]
+        >>> apart = distance_matrix([fit([motion], 5) for motion in motions], motions)
+        >>> bool(apart[0, 1] < 0.1 * apart[0, 2])
+        True
     """
     stack, batch = ModelStack.of(models), SequenceBatch.of(sequences, weights)
     pairs = np.indices((stack.n_models, batch.n_sequences)).reshape(2, -1).T

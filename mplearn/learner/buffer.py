@@ -25,6 +25,14 @@ class FrameBuffer:
 
     Args:
         n_channels: Width of a frame.
+
+    Example:
+        >>> held = FrameBuffer(2)
+        >>> for k in range(5):
+        ...     held.append(np.array([k, 10.0 * k]))
+        >>> held.drop_before(3)
+        >>> held.take(3, 5).tolist()
+        [[3.0, 30.0], [4.0, 40.0]]
     """
 
     def __init__(self, n_channels: int) -> None:

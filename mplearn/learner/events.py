@@ -37,6 +37,13 @@ class Recognised:
         segment: The segment.
         primitive: Id of the primitive.
         distance: Symmetric likelihood distance to it [nats a frame] ([Kulic2012] eq. 5).
+
+    Example:
+        >>> event = Recognised(Segment(100, 180), primitive=3, distance=0.8)
+        >>> match event:
+        ...     case Recognised(segment, primitive):
+        ...         print(f"primitive {primitive} until frame {segment.end}")
+        primitive 3 until frame 180
     """
 
     segment: Segment

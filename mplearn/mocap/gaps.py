@@ -25,6 +25,10 @@ class GapConfig:
         coast_s: Time constant with which a velocity fades while nothing at all is seen [s].
         max_speed_m_s: No part of a person is faster [m/s]; what seems to be is no measurement.
         noise_m: How far apart two measurements of a resting marker can lie [m].
+
+    Example:
+        >>> GapConfig(max_gap_s=0.2).max_speed_m_s  # gives up sooner
+        15.0
     """
 
     max_gap_s: float = 0.5

@@ -35,6 +35,14 @@ def join_by_name(recordings: Sequence[Recording]) -> Joined:
 
     Args:
         recordings: At least one.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.recording import marker_channels
+        >>> ours = Recording(np.zeros((5, 9)), 100.0, marker_channels(("C7", "T10", "LASI")), "a")
+        >>> theirs = Recording(np.ones((4, 9)), 100.0, marker_channels(("LASI", "C7", "STRN")), "b")
+        >>> [take.marker_names for take in join_by_name([ours, theirs]).recordings]
+        [('C7', 'LASI'), ('C7', 'LASI')]
     """
     markers = [recording.is_markers for recording in recordings]
     names = [

@@ -191,6 +191,12 @@ def take_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
 
     Raises:
         RecordingError: The path holds no recording.
+
+    Example:
+        >>> table = os.linesep.join(("time,C7.x,C7.y,C7.z", "0.00,0,0,1.4", "0.01,0,0,1.4"))
+        >>> written = [Path(name).write_text(table) for name in ("bow.csv", "walk.csv")]
+        >>> take_names(".")
+        ('bow', 'walk')
     """
     return tuple(_takes(Path(path)))
 

@@ -67,6 +67,18 @@ class Reader(ABC):
     Attributes:
         format: Name of the format or dialect, for reports and messages.
         suffixes: The file suffixes of the format, lower case, without ``.gz``.
+
+    Example:
+        >>> class Shouts(Reader):
+        ...     format, suffixes = "shouts", (".shout",)
+        ...     def read(self, path, hints, *, positions):
+        ...         rows = [[float(line)] for line in path.read_text().split()]
+        ...         return Recording(np.array(rows), hints.rate_hz or 25.0, ("loudness",))
+        >>> file = Path("a.shout")
+        >>> file.write_text("0.1 0.5 0.2")
+        11
+        >>> len(Shouts().read(file, Hints(), positions=True))
+        3
     """
 
     format: ClassVar[str]

@@ -35,6 +35,12 @@ class PeopleConfig:
             motions are known from others meanwhile.
         offset_prior: Primitives that a person must share before half of his or her usual deviation
             in posture is allowed for.
+
+    Example:
+        >>> from mplearn import LearnerConfig
+        >>> eager = PeopleConfig(min_exemplars=2)  # a newcomer's motions are born sooner
+        >>> LearnerConfig(("x", "y"), people=eager).people.min_exemplars
+        2
     """
 
     posture: float = 0.5

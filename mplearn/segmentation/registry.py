@@ -34,6 +34,13 @@ def register_segmenter(name: str, make: Callable[[int, float], Segmenter]) -> No
 
     Raises:
         InvalidValueError: The name is taken by another.
+
+    Example:
+        >>> from mplearn.segmentation import ZeroVelocity
+        >>> register_segmenter("by rests", ZeroVelocity)
+        >>> type(make_segmenter("by rests", 2, 100.0)).__name__
+        'ZeroVelocity'
+        >>> del SEGMENTERS["by rests"]
     """
     if SEGMENTERS.setdefault(name, make) is not make:
         raise InvalidValueError(f"there is a segmenter {name!r} already")

@@ -37,6 +37,14 @@ class ZeroVelocity(SpeedSegmenter):
 
     Raises:
         InvalidValueError: An argument is out of range.
+
+    Example:
+        >>> import numpy as np
+        >>> segmenter = ZeroVelocity(n_channels=1, rate_hz=50.0)
+        >>> swings = np.sin(np.pi * np.arange(400) / 50.0)[:, None]  # turns each second
+        >>> cuts = [cut for frame in swings for cut in segmenter.update(frame)]
+        >>> (cuts[3].end - cuts[2].end) / 50.0
+        1.0
     """
 
     def __init__(

@@ -174,6 +174,11 @@ class Tally:
         unrecognised: Frames in which nobody was recognised, before anybody was.
         unread: Frames that had come and were not read yet when the source was closed.
         reconnected: How often a connection was made again.
+
+    Example:
+        >>> tally = Tally(frames=100, lost=2)
+        >>> f"{tally.lost / tally.frames:.0%} lost"
+        '2% lost'
     """
 
     frames: int = 0

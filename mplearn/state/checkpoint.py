@@ -139,7 +139,13 @@ def hash_of(data: bytes) -> str:
 
 
 def to_bytes(plain: Any) -> bytes:
-    """Return plain values and arrays as bytes: those of a document, or of a part."""
+    """Return plain values and arrays as bytes: those of a document, or of a part.
+
+    Example:
+        >>> data = to_bytes({"n": 3, "last": np.array([1.5, np.nan])})
+        >>> from_bytes(data)["last"].tolist()
+        [1.5, nan]
+    """
     body, blob = packed(plain)
     text = as_json(body)
     return len(text).to_bytes(8, "little") + text + blob

@@ -28,6 +28,16 @@ class State:
     tuples of those, `Blob`, and other states. Arrays in it are never written to: who makes a state
     copies what changes later, and so does who resumes from one. States are equal if all that they
     hold is, NaN included.
+
+    Example:
+        >>> from mplearn.segmentation import make_segmenter
+        >>> from mplearn.state import from_plain, to_plain
+        >>> state = make_segmenter("zero-velocity", 2, 100.0).state()
+        >>> from_plain(type(state), to_plain(state)) == state
+        True
+        >>> from_plain(type(state), to_plain(state) | {"n_frames": -1})
+        Traceback (most recent call last):
+        mplearn.errors.StateError: n_frames: ...
     """
 
     def check(self) -> None:

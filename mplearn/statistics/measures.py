@@ -118,6 +118,14 @@ def tempo(table: SegmentTable, unit: Unit = "person") -> Measure:
     """Return how fast each primitive is repeated [1/min], by the median time between starts.
 
     Only what lies between two executions in a take counts, whatever is done in between.
+
+    Example:
+        >>> rows = [
+        ...     RecognisedSegment("t", start, start + 0.5, 1, "bow", "bow", 0.1, 0.9, "anna")
+        ...     for start in (0.0, 2.0, 4.0)
+        ... ]
+        >>> tempo(SegmentTable(rows)).of("anna", "bow")
+        30.0
     """
 
     def value(takes: Mapping[str, list[RecognisedSegment]], primitive: str) -> float:
@@ -132,7 +140,16 @@ def tempo(table: SegmentTable, unit: Unit = "person") -> Measure:
 
 
 def variability(table: SegmentTable, unit: Unit = "person") -> Measure:
-    """Return how uneven the durations of each primitive are: their coefficient of variation."""
+    """Return how uneven the durations of each primitive are: their coefficient of variation.
+
+    Example:
+        >>> rows = [
+        ...     RecognisedSegment("t", 0.0, end, 1, "bow", "bow", 0.1, 0.9, "anna")
+        ...     for end in (0.9, 1.1)
+        ... ]
+        >>> round(variability(SegmentTable(rows)).of("anna", "bow"), 2)
+        0.14
+    """
 
     def value(takes: Mapping[str, list[RecognisedSegment]], primitive: str) -> float:
         lengths = [row.duration_s for row in _executions(takes, primitive)]
@@ -142,7 +159,13 @@ def variability(table: SegmentTable, unit: Unit = "person") -> Measure:
 
 
 def spread(table: SegmentTable, unit: Unit = "person") -> Measure:
-    """Return how far executions lie from what was learned of their primitive [nats a frame]."""
+    """Return how far executions lie from what was learned of their primitive [nats a frame].
+
+    Example:
+        >>> rows = [RecognisedSegment("t", 0.0, 0.5, 1, "bow", "bow", 0.1, 0.9, "anna")]
+        >>> spread(SegmentTable(rows)).of("anna", "bow")
+        0.1
+    """
 
     def value(takes: Mapping[str, list[RecognisedSegment]], primitive: str) -> float:
         return _mean([row.distance for row in _executions(takes, primitive)])

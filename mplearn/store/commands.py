@@ -111,7 +111,12 @@ def from_record(record: dict[str, Any]) -> Command:
 @register_command("rename")
 @dataclass(frozen=True)
 class Rename(Operation):
-    """Give a primitive a name."""
+    """Give a primitive a name.
+
+    Example:
+        >>> Rename(7, "bow down").name
+        'bow down'
+    """
 
     primitive: Count
     name: str

@@ -312,6 +312,17 @@ def backup(path: str | Path, to: str | Path) -> Path:
     Raises:
         StoreError: It cannot be read, or the copy cannot be written.
         InvalidValueError: There is a file already.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner, StoreReader
+        >>> config = LearnerConfig(channels=("x", "y"))
+        >>> with LifelongLearner.open("life.db", lambda: MotionLearner(config)) as life:
+        ...     events = life.learn_many(np.zeros((300, 2)))
+        >>> copy = backup("life.db", "copy.db")
+        >>> check(copy), info(copy).version == info("life.db").version, is_begun("none.db")
+        ((), True, False)
     """
     path, to = Path(path), Path(to)
     if to.exists():

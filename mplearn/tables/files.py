@@ -140,6 +140,11 @@ def read_segments(path: str | PathLike[str]) -> SegmentTable:
     Raises:
         InvalidValueError: The name is of no format.
         RecordingError: The file is missing, or holds something else.
+
+    Example:
+        >>> row = RecognisedSegment("walk", 0.5, 1.7, 3, "step", "step", 0.2, 0.6, "anna", 0.9)
+        >>> read_segments(write_segments(SegmentTable([row]), "walk.csv")).column("name")
+        ['step']
     """
     path = Path(path)
     try:

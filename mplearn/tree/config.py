@@ -24,6 +24,12 @@ class NormalisationConfig:
         head: Share of the segment's start that is left out.
         ramp: Share over which the weight then rises to 1.
         centring: Share of the mean posture that is taken away, in [0, 1].
+
+    Example:
+        >>> from mplearn.tree import TreeConfig
+        >>> finer = NormalisationConfig(n_points=24)
+        >>> TreeConfig(normalisation=finer).normalisation.n_points
+        24
     """
 
     n_points: int = 16

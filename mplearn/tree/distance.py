@@ -158,6 +158,10 @@ def make_distance(config: TreeConfig) -> Distance:
 
     Raises:
         InvalidValueError: There is none of that name.
+
+    Example:
+        >>> type(make_distance(TreeConfig())).__name__
+        'LikelihoodDistance'
     """
     _load_entry_points()
     if config.distance not in _KINDS:

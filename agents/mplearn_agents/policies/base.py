@@ -33,6 +33,10 @@ def legal_actions(info: Mapping[str, Any]) -> BoolArray:
 
     Raises:
         InvalidValueError: ``info`` has no ``"action_mask"``, or the mask allows nothing.
+
+    Example:
+        >>> legal_actions({"action_mask": np.array([1, 0, 1], dtype=np.int8)})
+        array([ True, False,  True])
     """
     mask = np.asarray(_entry(info, "action_mask"), dtype=bool)
     if mask.ndim != 1 or not mask.any():
@@ -46,6 +50,11 @@ def transition_prior(info: Mapping[str, Any]) -> FloatArray:
     Raises:
         InvalidValueError: ``info`` has no ``"transition_prior"``, or it is no distribution over
             the allowed actions.
+
+    Example:
+        >>> prior = np.array([0.25, 0.0, 0.75])
+        >>> transition_prior({"action_mask": np.array([1, 0, 1]), "transition_prior": prior})
+        array([0.25, 0.  , 0.75])
     """
     prior = np.asarray(_entry(info, "transition_prior"), dtype=np.float64)
     mask = legal_actions(info)

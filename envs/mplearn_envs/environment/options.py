@@ -57,6 +57,10 @@ class MotionOptions(Options):
         feasibility: What the robot is allowed.
         upper_body: Whether only arms, head and the trunk's turn are performed, by a robot that
             stands: for motions whose legs it cannot follow.
+
+    Example:
+        >>> MotionOptions(speed=0.8, feasibility={"slowest": 0.2}).feasibility.slowest
+        0.2
     """
 
     speed: float = 0.5
@@ -91,6 +95,10 @@ class ActionOptions(Options):
         speeds: Among which speeds the agent chooses, as shares of `MotionOptions.speed`: for S
             speeds there are S blocks of ``capacity`` actions each. The first is the one of which
             the transition prior speaks. A plan is slower where balance or the joints ask for it.
+
+    Example:
+        >>> ActionOptions(illegal="raise", speeds=(1.0, 0.7)).hold_s
+        0.5
     """
 
     capacity: int | None = None

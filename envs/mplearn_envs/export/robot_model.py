@@ -59,6 +59,12 @@ class RobotModel:
         shift: What is added to the model's angles, times their `signs`, to get those in the zero of
             the robot's own MJCF, shape (n,) [rad].
         robot: The description that it comes from; None where only an MJCF is known.
+
+    Example:
+        >>> from mplearn_envs.robot import humanoid
+        >>> model = RobotModel.of(humanoid())
+        >>> model.name, len(model.joint_names)
+        ('robot', 30)
     """
 
     name: str

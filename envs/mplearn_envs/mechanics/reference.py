@@ -159,7 +159,14 @@ def reference_robot(robot: Robot) -> ReferenceRobot:
 
 
 def rest_reference(robot: Robot) -> Reference:
-    """Return the reference of a robot that stands still, arms hanging."""
+    """Return the reference of a robot that stands still, arms hanging.
+
+    Example:
+        >>> from mplearn_envs.robot import humanoid
+        >>> rest = rest_reference(humanoid())
+        >>> rest.ground.round(2).tolist()  # where its feet stand: x, y, yaw
+        [[0.0, 0.09, 0.0], [0.0, -0.09, 0.0]]
+    """
     ref = reference_robot(robot)
     target = np.zeros(len(ref.limits))
     target[0] = ref.standing_height

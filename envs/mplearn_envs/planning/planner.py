@@ -49,6 +49,14 @@ class Planner:
     Args:
         robot: The robot.
         config: See `PlannerConfig`.
+
+    Example:
+        >>> from mplearn_envs.mechanics import rest_reference
+        >>> from mplearn_envs.robot import humanoid
+        >>> planner = Planner(humanoid())
+        >>> plan = planner.hold(rest_reference(humanoid()), 1.0)
+        >>> plan.duration_s, plan.commands.shape
+        (1.0, (250, 30))
     """
 
     def __init__(self, robot: Robot, config: PlannerConfig | None = None) -> None:

@@ -21,6 +21,11 @@ class JointGroup:
         damping: Its velocity gain, ``kv`` [N m s/rad].
         torque: Torque limit [N m].
         velocity: Velocity limit [rad/s].
+
+    Example:
+        >>> knees = JointGroup(("knee_l", "knee_r"), 9000.0, 208.0, 300.0, 6.0)
+        >>> knees.torque
+        300.0
     """
 
     names: tuple[str, ...]

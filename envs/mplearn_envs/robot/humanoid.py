@@ -19,7 +19,13 @@ LEG = ("hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle_pitch", "ankle_roll")
 
 @cache
 def humanoid() -> Robot:
-    """Return the human-sized robot with 30 driven joints (1.65 m, 63 kg)."""
+    """Return the human-sized robot with 30 driven joints (1.65 m, 63 kg).
+
+    Example:
+        >>> robot = humanoid()
+        >>> len(robot.joint_names), robot.legs[0][3]
+        (30, 'knee_l')
+    """
     return Robot(
         name="robot",
         xml=read_model("humanoid"),

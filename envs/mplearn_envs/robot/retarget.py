@@ -50,6 +50,13 @@ class Retargeting:
 
     Raises:
         RobotError: The features belong to no known body.
+
+    Example:
+        >>> from mplearn_envs.robot import humanoid
+        >>> robot = humanoid()
+        >>> retargeting = Retargeting(robot.channels, "robot", robot)
+        >>> retargeting(np.zeros((5, 33))).shape
+        (5, 33)
     """
 
     def __init__(self, channels: Sequence[str], body: str, robot: Robot) -> None:

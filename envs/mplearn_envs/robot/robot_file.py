@@ -33,6 +33,16 @@ def described_robot(path: Path) -> Robot:
     Raises:
         RobotError: There is no such file, it lacks something, or the model is no humanoid on two
             feet, with the reason.
+
+    Example:
+        >>> import os
+        >>> from mplearn_envs.robot import ROLES, humanoid
+        >>> written = Path("mine.xml").write_text(humanoid().xml)
+        >>> segments = (f'{role} = "{role}"' for role in ROLES)
+        >>> lines = ('mjcf = "mine.xml"', "[segments]", *segments)
+        >>> written = Path("mine.toml").write_text(os.linesep.join(lines))
+        >>> described_robot(Path("mine.toml")).name
+        'mine'
     """
     if path.suffix.lower() != ".toml":
         raise RobotError(

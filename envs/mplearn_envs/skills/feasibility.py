@@ -44,6 +44,10 @@ class FeasibilityConfig:
     Raises:
         InvalidValueError: A limit is no number from 0 on, ``slowest`` is 0, or ``transitions`` is
             neither true nor false.
+
+    Example:
+        >>> FeasibilityConfig(torque_share=0.8, transitions=True).slowest
+        0.3
     """
 
     flight_m: float = 0.06

@@ -47,6 +47,15 @@ class FreeTask(Task):
             greatest reward per second in the long run): the best that is possible where plans are
             taken at their word, see `mplearn_envs.tasks.wandering`. It takes some seconds, once for
             each library.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> name, task = "mplearn/PrimitiveHumanoid-v0", FreeTask(likely=1.0)
+        >>> env = gym.make(name, task=task, dynamics="kinematic")
+        >>> observation, info = env.reset(seed=1)
+        >>> sorted(info["reward_terms"])
+        ['alive', 'balanced', 'fall', 'illegal', 'likely', 'novel', 'varied']
     """
 
     alive: float = 0.05

@@ -75,6 +75,15 @@ class GoalTask(Task):
         hurry: Price of a second.
         reached: Reward of the goal.
         fallen: Price of a fall.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> task = GoalTask("primitive", target="squat down")
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", task=task, dynamics="kinematic")
+        >>> observation, info = env.reset(seed=1)
+        >>> info["is_success"]
+        False
     """
 
     kind: KindName = "hand"

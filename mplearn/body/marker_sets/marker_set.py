@@ -164,6 +164,12 @@ def find_marker_set(marker_names: Sequence[str]) -> MarkerSet:
 
     Raises:
         BodyError: A name occurs twice, or no set knows enough of the names.
+
+    Example:
+        >>> names = "LFHD RFHD C7 T10 CLAV STRN LSHO LELB RSHO RELB LASI RASI".split()
+        >>> found = find_marker_set([f"Anna:{name}" for name in names])
+        >>> found.knows(["LASI", "bottle"])
+        (True, False)
     """
     plain = [plain_name(name) for name in marker_names]
     twice = sorted({name for name in plain if plain.count(name) > 1})

@@ -20,7 +20,12 @@ BASE_CHANNELS = ("base_height", "base_roll", "base_pitch")
 
 
 def feature_channels(body: Body | None = None) -> tuple[str, ...]:
-    """Return the channel names: the three of the base, then the driven joints (the robot's: 33)."""
+    """Return the channel names: the three of the base, then the driven joints (the robot's: 33).
+
+    Example:
+        >>> feature_channels()[:4]
+        ('base_height', 'base_roll', 'base_pitch', 'waist_yaw')
+    """
     return BASE_CHANNELS + (body or robot_body()).driven_names
 
 
@@ -71,6 +76,13 @@ def posture_of(
 
     Returns:
         Postures, shape (..., 7 + n); held joints are zero.
+
+    Example:
+        >>> from mplearn.body import features_of, robot_body
+        >>> features = features_of(robot_body().rest)
+        >>> posture = posture_of(features, x=1.5)
+        >>> float(posture[0]), bool(np.allclose(features_of(posture), features))
+        (1.5, True)
     """
     body = body or robot_body()
     width = 3 + len(body.driven)

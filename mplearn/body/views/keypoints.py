@@ -38,7 +38,12 @@ KEYPOINTS = {"face": ("head", (0.06, 0.0, 0.06))} | {
 
 
 def keypoint_channels() -> tuple[str, ...]:
-    """Return the channel names: x, y, z of each key point, then the base's height (46)."""
+    """Return the channel names: x, y, z of each key point, then the base's height (46).
+
+    Example:
+        >>> len(keypoint_channels()), keypoint_channels()[-1]
+        (46, 'base_height')
+    """
     return (*(f"{point}.{axis}" for point in KEYPOINTS for axis in "xyz"), "base_height")
 
 

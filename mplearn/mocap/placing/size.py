@@ -132,6 +132,10 @@ def named_unit(text: str) -> float | None:
     """Return the length of a unit as files write it [m]: in short, in words, or cut; or None.
 
     ``"mm"``, ``"Millimeters"``, ``"mete"``, ``"[m]"``, ``"inches"``, ``"mm/deg"``.
+
+    Example:
+        >>> named_unit("Millimeters"), named_unit("[m]"), named_unit("furlongs")
+        (0.001, 1.0, None)
     """
     plain = "".join(c for c in _ANGLES_TOO.sub("", text.lower()) if c.isalpha())
     if plain in UNITS_M:
