@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import threading
 import time
 from collections import Counter
@@ -20,10 +21,10 @@ from typing import Any, TypeVar
 from ..errors import CorpusError, InvalidValueError, MPLearnError, RecordingError
 from ..learner import LearnerConfig, MotionLearner
 from ..learner.learner_state import FILES
-from ..merging import merged_state
+from ..merging import merged_learner, merged_state
 from ..mocap import TakeFiles, find_takes
 from ..state import to_plain
-from ..store import StoreReader
+from ..store import learner_of
 from .dealing import SHARD_TAKES, Shard, deal
 from .executors import Executor, Here, Processes
 from .progress import Progress
@@ -31,7 +32,7 @@ from .reading import Reading, probe
 from .shard import ShardJournal, ShardReport, ShardTask, learn_shard
 
 _TRIES = 3  # of what dies without a trace of progress
-_FAN_IN = 8  # of the tree of merging: few levels, as each reads and writes all that is known
+_FAN_IN = 8  # of the tree of merging: few levels, as each reads and writes what it merges
 _LOOK_S = 0.5  # between two looks at how far it is
 
 T = TypeVar("T")
@@ -265,35 +266,54 @@ class _Run:
             journal.refresh()
             self._reports[k] = journal.report()
 
-    def _merge(self) -> MotionLearner:
-        """Merge what the shards know, eight at a time, until one is left."""
-        level = [
-            task.store
-            for task, report in zip(self._tasks, self._reports, strict=True)
+    def _merge(self) -> MotionLearner | None:
+        """Merge what the shards know: what is of one person first, by the workers; None if stopped.
+
+        Only then exemplars are compared. The rest is put together here, where it is needed.
+        """
+        parts = [
+            (shard.person, task.store)
+            for shard, task, report in zip(
+                self._plan.shards, self._tasks, self._reports, strict=True
+            )
             if report.learned
         ]
-        if not level:
+        if not parts:
             refused = self._progress().refused
             name, why = next(iter(refused.items()))
             raise RecordingError(f"none of {len(refused)} takes can be learned; {name}: {why}")
         folder = self._into / "merged"
-        folder.mkdir(exist_ok=True)
         depth = 0
-        while len(level) > 1 or depth == 0:
-            parts = [tuple(level[k : k + _FAN_IN]) for k in range(0, len(level), _FAN_IN)]
-            to = [folder / f"{depth}-{k:04d}.mplearn" for k in range(len(parts))]
-            work = [(own, path, len(parts) == 1) for own, path in zip(parts, to, strict=True)]
-
-            def done(k: int, _: None, work: list[Any] = work) -> None:
-                self._merged += len(work[k][0]) - 1
-
-            self._all(merge_files, work, done, lambda k: 0)
-            level, depth = to, depth + 1
-        learner = MotionLearner.load(level[0])
-        for path in folder.iterdir():
-            path.unlink()
-        folder.rmdir()
+        while len(groups := _by_person(parts)) > 1 and len(groups) < len(parts):
+            parts = self._merged_groups(groups, folder / f"{depth}")
+            depth += 1
+        learners = []
+        for k, (_, part) in enumerate(parts):
+            if self._stop.is_set():
+                return None
+            learners.append(_learner_of(part))
+            self._merged += k > 0
+            self._show(self._progress())
+        learner = merged_learner(learners)
+        shutil.rmtree(folder, ignore_errors=True)
         return learner
+
+    def _merged_groups(
+        self, groups: Sequence[tuple[str, tuple[Path, ...]]], folder: Path
+    ) -> list[tuple[str, Path]]:
+        """Have the parts of each group merged; return the person and the file of each."""
+        folder.mkdir(parents=True, exist_ok=True)
+        to = [
+            own[0] if len(own) == 1 else folder / f"{k:04d}.mplearn"
+            for k, (_, own) in enumerate(groups)
+        ]
+        several = [k for k, (_, own) in enumerate(groups) if len(own) > 1]
+
+        def done(k: int, _: None) -> None:
+            self._merged += len(groups[several[k]][1]) - 1
+
+        self._all(merge_files, [(groups[k][1], to[k]) for k in several], done, lambda k: 0)
+        return [(person, path) for (person, _), path in zip(groups, to, strict=True)]
 
     # ---- doing
 
@@ -366,20 +386,31 @@ class _Run:
         )
 
 
-def merge_files(parts: Sequence[Path], to: Path, last: bool) -> None:
+def merge_files(parts: Sequence[Path], to: Path) -> None:
     """Merge what some stores, or files of learners, know; write it to a file.
 
     Args:
         parts: The stores and files.
         to: The file.
-        last: Whether these are all, see `merged_state`.
 
     Raises:
         MPLearnError: One cannot be read, or the file cannot be written.
     """
-    state = merged_state((_learner_of(part) for part in parts), last=last)
+    state = merged_state(_learner_of(part) for part in parts)
     replace(FILES, compression=0).write(to, to_plain(state))  # it is read once, and goes
 
 
 def _learner_of(path: Path) -> MotionLearner:
-    return StoreReader(path).life.learner if path.suffix == ".db" else MotionLearner.load(path)
+    return learner_of(path) if path.suffix == ".db" else MotionLearner.load(path, lazily=True)
+
+
+def _by_person(parts: Sequence[tuple[str, Path]]) -> list[tuple[str, tuple[Path, ...]]]:
+    """Return what is merged at once: parts of one person, as many as may be."""
+    people: dict[str, list[Path]] = {}
+    for person, path in parts:
+        people.setdefault(person, []).append(path)
+    return [
+        (person, tuple(paths[k : k + _FAN_IN]))
+        for person, paths in people.items()
+        for k in range(0, len(paths), _FAN_IN)
+    ]

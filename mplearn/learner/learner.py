@@ -397,8 +397,13 @@ class MotionLearner:
         )
 
     @classmethod
-    def from_state(cls, state: LearnerState) -> MotionLearner:
+    def from_state(cls, state: LearnerState, *, lazily: bool = False) -> MotionLearner:
         """Return the learner that `state` described.
+
+        Args:
+            state: That.
+            lazily: Whether models of segments are made only once they are asked for, which learners
+                that are merged hardly do; a segment that cannot be modelled is found out then.
 
         Raises:
             StateError: The state is damaged; its place says where.
@@ -420,7 +425,7 @@ class MotionLearner:
         with within("buffer"):
             learner._buffer.load_state(state.buffer)
         with within("tree"):
-            learner.tree.load_state(state.tree)
+            learner.tree.load_state(state.tree, lazily=lazily)
         with within("graph"):
             learner.graph = TransitionGraph.from_state(state.graph)
         learner.chain = Chain(learner.graph, state.config.rate_hz, state.config.longest_pause_s)
@@ -442,15 +447,30 @@ class MotionLearner:
         return Path(path)
 
     @classmethod
-    def load(cls, path: str | Path) -> MotionLearner:
+    def load(cls, path: str | Path, *, lazily: bool = False) -> MotionLearner:
         """Read a learner that `save` wrote, which goes on bit for bit.
+
+        Args:
+            path: The file.
+            lazily: See `from_state`.
 
         Raises:
             StateError: The file is missing, damaged, foreign, or of a newer version.
         """
         content = FILES.read(Path(path))
         with within(str(path)):
-            return cls.from_state(from_plain(LearnerState, content))
+            return cls.from_state(from_plain(LearnerState, content), lazily=lazily)
+
+    # ---- being merged, see `mplearn.merging`
+
+    def adopt(self, tree: PeopleTree, chain: Chain, n_frames: int, person: int) -> None:
+        """Go on with what other learners know, too, after so many frames; ``person`` was last."""
+        frozen = self._snapshots.frozen
+        self.tree, self.chain, self.graph = tree, chain, chain.graph
+        self.n_frames = self._stream_start = n_frames
+        self._person, self._looking = person, None
+        self._snapshots = Snapshots(self._view, self.channels, self.config.rate_hz, self._body)
+        self._snapshots.frozen = frozen
 
     # ---- inside
 

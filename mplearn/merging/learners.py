@@ -9,7 +9,7 @@ from ..errors import InvalidValueError
 from ..learner import LearnerConfig, LearnerState, MotionLearner
 from ..learner.chain import Chain
 from .graphs import merge_graphs
-from .people import merged_into
+from .people import merge_many
 from .watching import merge_watching
 
 
@@ -27,7 +27,8 @@ def merge_learners(learners: Sequence[MotionLearner]) -> MotionLearner:
     executions, of all of them, than several people need (`PeopleConfig.min_exemplars`) wait again:
     they were born while each person was alone.
 
-    Each learner is copied once, however many there are; exemplars never are.
+    Each learner is copied once, however many there are; exemplars never are. Which leaves of
+    different people are one primitive is found once, when all are there.
 
     Raises:
         InvalidValueError: There are no learners, or they have other configurations; bodies may be
@@ -48,43 +49,73 @@ def merge_learners(learners: Sequence[MotionLearner]) -> MotionLearner:
     """
     for other in learners[1:]:
         _check_rules(learners[0], other)
-    merged = _merged(_copied(each) for each in learners)
-    merged.withdraw_young()
-    return merged.learner()
+    return merged_learner(_copied(each) for each in learners)
 
 
-def merged_state(learners: Iterable[MotionLearner], *, last: bool = True) -> LearnerState:
-    """Return the state of what `merge_learners` makes of some, all of which are used up.
-
-    Nothing is copied, and two at a time are held, so that many fit into memory.
-
-    Args:
-        learners: The learners.
-        last: Whether these are all; if what comes of it will be merged with others, nothing is made
-            to wait again, so that the order in which many are merged does not matter to it.
+def merged_learner(learners: Iterable[MotionLearner]) -> MotionLearner:
+    """Return what `merge_learners` makes of some, all of which are used up.
 
     Raises:
         InvalidValueError: As `merge_learners`; some are used up by then.
     """
-    merged = _merged(learners)
-    if last:
-        merged.withdraw_young()
-    return merged.state()
-
-
-def _merged(learners: Iterable[MotionLearner]) -> _Merged:
-    merged: _Merged | None = None
-    for each in learners:
-        if merged is not None:
-            _check_rules(merged.first, each)
-        each.end_stream()
-        if merged is None:
-            merged = _Merged(each)
-        else:
-            merged.take(each)
-    if merged is None:
-        raise InvalidValueError("at least one learner is needed to merge")
+    merged, several = _merged(learners)
+    merged.tree.wake()
+    if several:
+        merged.chain.revise(merged.tree.withdraw_young())
     return merged
+
+
+def merged_state(learners: Iterable[MotionLearner]) -> LearnerState:
+    """Return the state of what some learners know that will be merged with others yet.
+
+    All of them are used up. Nothing is made to wait again, so that the order in which many are
+    merged does not matter to it. Nothing is copied, and where the learners' models are made lazily,
+    only those of people whom several know are made.
+
+    Raises:
+        InvalidValueError: As `merge_learners`; some are used up by then.
+    """
+    return _merged(learners)[0].state()
+
+
+def _merged(learners: Iterable[MotionLearner]) -> tuple[MotionLearner, bool]:
+    """Return the first learner, which knows what all know; and whether there were several."""
+    all_of_them = list(learners)
+    if not all_of_them:
+        raise InvalidValueError("at least one learner is needed to merge")
+    first, *others = all_of_them
+    for other in others:
+        _check_rules(first, other)
+    for each in all_of_them:
+        each.end_stream()
+    if not others:
+        return first, False
+    people = [{person: person for person in first.tree.people}]
+    for other in others:
+        own = {person: person for person in other.tree.people}
+        if first.watching is not None and other.watching is not None:
+            own |= merge_watching(first.watching, other.watching)
+        people.append(own)
+    merged = merge_many([each.tree for each in all_of_them], people)
+    graph = merge_graphs(
+        (each.graph, {id: new_id[id] for id in each.graph.ids})
+        for each, new_id in zip(all_of_them, merged.new_ids, strict=True)
+    )
+    for id in merged.tree.leaves:
+        graph.add_node(id)
+    chain = Chain(graph, first.config.rate_hz, first.config.longest_pause_s)
+    n_frames = 0
+    for each, new_id, n_before in zip(all_of_them, merged.new_ids, merged.new_numbers, strict=True):
+        each.chain.rename(new_id)
+        chain.append(each.chain, n_before, n_frames)
+        n_frames += each.n_frames
+    chain.correct(merged.moved)
+    chain.count_late(merged.placed)
+    person = first.state().person
+    for each, own in zip(all_of_them, people, strict=True):
+        person = own.get(each.state().person, person)
+    first.adopt(merged.tree, chain, n_frames, person)
+    return first, True
 
 
 def _check_rules(one: MotionLearner, other: MotionLearner) -> None:
@@ -101,70 +132,4 @@ def _rules(learner: MotionLearner) -> LearnerConfig:
 
 
 def _copied(learner: MotionLearner) -> MotionLearner:
-    return MotionLearner.from_state(learner.state())
-
-
-class _Merged:
-    """What some learners know, one after the other.
-
-    Args:
-        first: The first of them; it is used up, and so are all others.
-    """
-
-    def __init__(self, first: MotionLearner) -> None:
-        self.first = first
-        self._state = first.state()
-        self._tree, self._graph, self._chain = first.tree, first.graph, first.chain
-        self._watching = first.watching
-
-    def take(self, other: MotionLearner) -> None:
-        """Merge another learner into what is known."""
-        state, n_frames = other.state(), self._state.n_frames
-        people = {person: person for person in other.tree.people}
-        if self._watching is not None and other.watching is not None:
-            people |= merge_watching(self._watching, other.watching)
-        merged = merged_into(self._tree, other.tree, people)
-        parts = ((self._graph, merged.first), (other.graph, merged.second))
-        graph = merge_graphs((each, {id: new[id] for id in each.ids}) for each, new in parts)
-        for id in merged.tree.leaves:
-            graph.add_node(id)
-        config = self._state.config
-        chain = Chain(graph, config.rate_hz, config.longest_pause_s)
-        self._chain.rename(merged.first)
-        other.chain.rename(merged.second)
-        chain.append(self._chain, 0, 0)
-        chain.append(other.chain, merged.new_number, n_frames)
-        chain.correct(merged.moved)
-        chain.count_late(merged.placed)
-        self._tree, self._graph, self._chain = merged.tree, graph, chain
-        self._state = replace(
-            self._state,
-            n_frames=n_frames + state.n_frames,
-            stream_start=n_frames + state.n_frames,
-            person=people.get(state.person, self._state.person),
-        )
-
-    @property
-    def _alone(self) -> bool:
-        return self._tree is self.first.tree and self._graph is self.first.graph
-
-    def withdraw_young(self) -> None:
-        """Let what several people have shown too seldom wait again, if there were several parts."""
-        if not self._alone:
-            self._chain.revise(self._tree.withdraw_young())
-
-    def learner(self) -> MotionLearner:
-        """Return a learner that knows it all."""
-        if self._alone:
-            return self.first
-        return MotionLearner.from_state(self.state())
-
-    def state(self) -> LearnerState:
-        """Return the state of a learner that knows it all."""
-        return replace(
-            self._state,
-            watches=() if self._watching is None else self._watching.state(),
-            tree=self._tree.state(),
-            graph=self._graph.state(),
-            chain=self._chain.state(),
-        )
+    return MotionLearner.from_state(learner.state(), lazily=True)

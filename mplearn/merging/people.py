@@ -1,9 +1,10 @@
-"""Two trees of several people that were learned apart, as one that goes on learning."""
+"""Trees of several people that were learned apart, as one that goes on learning."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from ..people import PeopleTree
@@ -11,7 +12,7 @@ from ..people.constraints import Key
 from ..people.leaf import Leaf
 from ..people.nodes import tidied
 from ..people.sharing import Sharing
-from ..tree import ROOT, Node
+from ..tree import ROOT, Node, PrimitiveTree
 from .trees import merge_trees
 
 
@@ -49,65 +50,145 @@ def merge_people(first: PeopleTree, second: PeopleTree, people: Mapping[int, int
     Raises:
         InvalidValueError: The trees have other rules, channels or rates.
     """
-    return merged_into(first.copy(), second.copy(), people)
-
-
-def merged_into(first: PeopleTree, second: PeopleTree, people: Mapping[int, int]) -> MergedPeople:
-    """Merge two trees of several people, both of which are used up; see `merge_people`."""
-    if not second.n_seen:
-        return MergedPeople(first, {id: id for id in first.leaves}, {}, first.n_seen, {}, {})
-    everyone = {*first.people, *(people[each] for each in second.people)}
-    if everyone == {first.people[0]}:
-        return _of_one_person(first, second)
-    return _of_several(first, second, people)
-
-
-def _of_one_person(first: PeopleTree, second: PeopleTree) -> MergedPeople:
-    person, leaves, n_before = first.people[0], first.leaves, first.n_seen
-    joined = merge_trees(first.of(person), second.of(second.people[0]))
-    first.adopt({person: joined.tree}, n_before + second.n_seen)
+    own = {person: person for person in first.people}
+    merged = merge_many([first.copy(), second.copy()], [own, people])
+    mine, theirs = merged.new_ids
     return MergedPeople(
-        first,
-        {id: id for id in leaves},
-        {id: joined.new_id[id] for id in second.leaves},
-        joined.new_number,
-        dict(joined.change.moved),
-        {},
+        merged.tree, mine, theirs, merged.new_numbers[1], merged.placed, merged.moved
     )
 
 
-def _of_several(first: PeopleTree, second: PeopleTree, people: Mapping[int, int]) -> MergedPeople:
-    before = first.leaves, second.leaves
-    mine, theirs = first.sharing(), second.sharing()
-    ids, numbers = mine.next_id - 1, mine.n_seen
-    mine.next_id += theirs.next_id - 1
-    mine.n_seen += theirs.n_seen
-    new_key, placed = _join_trees(mine, theirs, people, numbers)
-    origins = [_Origin.of(mine, leaf, 0, leaf.key) for leaf in mine.leaves]
-    origins += [_Origin.of(theirs, leaf, ids, new_key[leaf.key]) for leaf in theirs.leaves]
-    _join_leaves(mine, theirs, new_key, ids)
-    mine.constraints = mine.constraints.merged(theirs.constraints.renamed(new_key))
-    for each in theirs.provisional:
-        shapes = {n + numbers: shape for n, shape in each.shapes.items()}
-        mine.provisional.join(people[each.person], each.primitive + ids, shapes)
+class MergedMany(NamedTuple):
+    """Trees of several people as one.
+
+    Attributes:
+        tree: The tree, which goes on learning.
+        new_ids: Its id of each primitive of each of the trees; most of the first keep theirs.
+        new_numbers: How much its numbers of the segments of each are larger than they were.
+        placed: Segments that no tree had placed, and the primitive that each is in now.
+        moved: Other segments that changed their primitive, unlike most of it; `ROOT` for none.
+    """
+
+    tree: PeopleTree
+    new_ids: tuple[dict[int, int], ...]
+    new_numbers: tuple[int, ...]
+    placed: dict[int, int]
+    moved: dict[int, int]
+
+
+def merge_many(trees: Sequence[PeopleTree], people: Sequence[Mapping[int, int]]) -> MergedMany:
+    """Merge trees of several people, all of which are used up; see `merge_people`.
+
+    The trees of each person are merged at once, and it is found once which leaves are one
+    primitive.
+
+    Args:
+        trees: The trees, at least one.
+        people: For each of them, the number of each of its people in the merged one; those of the
+            first keep theirs.
+
+    Raises:
+        InvalidValueError: The trees have other rules, channels or rates.
+    """
+    first = trees[0]
+    seen = [k for k, tree in enumerate(trees) if tree.n_seen or k == 0]
+    everyone = {people[k][person] for k in seen for person in trees[k].people}
+    some = [trees[k] for k in seen]
+    if len(seen) == 1:
+        merged = MergedMany(first, ({id: id for id in first.leaves},), (0,), {}, {})
+    elif len(everyone) == 1:
+        merged = _of_one_person(some)
+    else:
+        merged = _of_several(some, [people[k] for k in seen])
+    ids = dict(zip(seen, merged.new_ids, strict=True))
+    numbers = dict(zip(seen, merged.new_numbers, strict=True))
+    n_trees = range(len(trees))  # what has seen nothing has no primitives and no numbers
+    return merged._replace(
+        new_ids=tuple(ids.get(k, {}) for k in n_trees),
+        new_numbers=tuple(numbers.get(k, 0) for k in n_trees),
+    )
+
+
+def _of_one_person(trees: Sequence[PeopleTree]) -> MergedMany:
+    first, leaves = trees[0], [tree.leaves for tree in trees]
+    joined = merge_trees([tree.of(tree.people[0]) for tree in trees])
+    first.adopt({first.people[0]: joined.tree}, sum(tree.n_seen for tree in trees))
+    new_ids = tuple(
+        {id: new_id[id] for id in own} for own, new_id in zip(leaves, joined.new_ids, strict=True)
+    )
+    return MergedMany(first, new_ids, joined.new_numbers, dict(joined.change.moved), {})
+
+
+def _of_several(trees: Sequence[PeopleTree], people: Sequence[Mapping[int, int]]) -> MergedMany:
+    leaves = [tree.leaves for tree in trees]
+    parts = []
+    ids = numbers = 0
+    for tree, numbered in zip(trees, people, strict=True):
+        part = _Part(tree.sharing(), numbered, ids, numbers)
+        parts.append(part)
+        ids += part.sharing.next_id - 1
+        numbers += part.sharing.n_seen
+    mine, *others = parts
+    sharing = mine.sharing
+    sharing.next_id, sharing.n_seen = ids + 1, numbers
+    before = [(part, leaf) for part in parts for leaf in part.sharing.leaves]
+    placed, both = _join_trees(parts)
+    origins = [_Origin.of(part, leaf, part.new_key[leaf.key]) for part, leaf in before]
+    _join_leaves(parts, both)
+    sharing.constraints = sharing.constraints.renamed(mine.new_key)
+    for part in others:
+        theirs = part.sharing
+        sharing.constraints = sharing.constraints.merged(theirs.constraints.renamed(part.new_key))
+        for each in theirs.provisional:
+            shapes = {n + part.numbers: shape for n, shape in each.shapes.items()}
+            sharing.provisional.join(part.people[each.person], each.primitive + part.ids, shapes)
+        for id, node in theirs.above.items():
+            new = id + part.ids
+            sharing.above[new] = Node(new, None, node.born_at, history=list(node.history))
+        sharing.parents |= {
+            id + part.ids: above + part.ids if above != ROOT else ROOT
+            for id, above in theirs.parents.items()
+        }
     for (person, _), number in placed:
-        mine.provisional.leave(person, {number})
-    for id, node in theirs.above.items():
-        mine.above[id + ids] = Node(id + ids, None, node.born_at, history=list(node.history))
-    mine.parents |= {
-        id + ids: above + ids if above != ROOT else ROOT for id, above in theirs.parents.items()
-    }
-    heirs, moved = _regrouped(mine, origins)
-    first.adopt(mine.trees, mine.n_seen)
-    homes = {leaf.key: leaf.primitive for leaf in mine.leaves}
-    return MergedPeople(
-        first,
-        {id: heirs[id] for id in before[0]},
-        {id: heirs[id + ids] for id in before[1]},
-        numbers,
+        sharing.provisional.leave(person, {number})
+    heirs, moved = _regrouped(sharing, origins)
+    trees[0].adopt(sharing.trees, sharing.n_seen)
+    homes = {leaf.key: leaf.primitive for leaf in sharing.leaves}
+    return MergedMany(
+        trees[0],
+        tuple(
+            {id: heirs[id + part.ids] for id in own}
+            for own, part in zip(leaves, parts, strict=True)
+        ),
+        tuple(part.numbers for part in parts),
         {number: homes[key] for key, number in placed},
         moved,
     )
+
+
+@dataclass
+class _Part:
+    """What is shared by the people of one of the trees, and its names in the merged one.
+
+    Attributes:
+        sharing: That.
+        people: The number of each of its people.
+        ids: How much larger ids are.
+        numbers: How much larger numbers of segments are.
+        new_key: Where each of its leaves is.
+        own: The tree of each of its people, and how much each weighs, as it was.
+    """
+
+    sharing: Sharing
+    people: Mapping[int, int]
+    ids: int
+    numbers: int
+    new_key: dict[Key, Key] = field(default_factory=dict)
+    own: dict[int, PrimitiveTree] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Note the trees, which become others."""
+        self.own = dict(self.sharing.trees)
 
 
 class _Origin(NamedTuple):
@@ -119,49 +200,63 @@ class _Origin(NamedTuple):
     key: Key
 
     @classmethod
-    def of(cls, sharing: Sharing, leaf: Leaf, ids: int, key: Key) -> _Origin:
-        n_placed = sharing.trees[leaf.person].node(leaf.local).n_placed
-        return cls(leaf.primitive + ids, n_placed, leaf.founded == leaf.primitive, key)
+    def of(cls, part: _Part, leaf: Leaf, key: Key) -> _Origin:
+        n_placed = part.own[leaf.person].node(leaf.local).n_placed
+        return cls(leaf.primitive + part.ids, n_placed, leaf.founded == leaf.primitive, key)
 
 
-def _join_trees(
-    mine: Sharing, theirs: Sharing, people: Mapping[int, int], numbers: int
-) -> tuple[dict[Key, Key], list[tuple[Key, int]]]:
-    """Take over people's trees; return where leaves went, and what waited and is in one now."""
-    new_key: dict[Key, Key] = {}
+def _join_trees(parts: Sequence[_Part]) -> tuple[list[tuple[Key, int]], list[int]]:
+    """Merge the trees of each person into the first part's.
+
+    Returns:
+        What waited and is in a leaf now; and the people who had several trees.
+    """
+    sharing = parts[0].sharing
+    trees: dict[int, list[tuple[_Part, int]]] = {}
+    for part in parts:
+        for person in part.own:
+            trees.setdefault(part.people[person], []).append((part, person))
+    numbers: dict[int, dict[int, int]] = {}
     placed: list[tuple[Key, int]] = []
-    for person, own in theirs.trees.items():
-        home, shift = people[person], 0
-        moved: tuple[tuple[int, int], ...] = ()
-        local = {node.id: node.id for node in own.nodes}
-        if home in mine.trees:
-            least = mine.rules.min_exemplars
-            own, local, shift, change = merge_trees(mine.trees[home], own, least)
-            moved = change.moved
-        mine.trees[home] = own
-        here = mine.numbers.setdefault(home, {})
-        here |= {n + shift: number + numbers for n, number in theirs.numbers[person].items()}
-        new_key |= {(person, old): (home, new) for old, new in local.items()}
+    for home, own in trees.items():
+        tree, moved = own[0][0].own[own[0][1]], tuple[tuple[int, int], ...]()
+        new_ids: Sequence[Mapping[int, int]] = [{node.id: node.id for node in tree.nodes}]
+        shifts: Sequence[int] = [0]
+        if len(own) > 1:
+            least = sharing.rules.min_exemplars
+            merged = merge_trees([part.own[person] for part, person in own], least)
+            tree, new_ids, shifts, moved = *merged[:3], merged.change.moved
+        here = numbers[home] = {}
+        for (part, person), new_id, shift in zip(own, new_ids, shifts, strict=True):
+            known = part.sharing.numbers.get(person, {})
+            here |= {n + shift: number + part.numbers for n, number in known.items()}
+            part.new_key |= {(person, old): (home, new) for old, new in new_id.items()}
         placed += [((home, leaf), here[n]) for n, leaf in moved]
-    return new_key, placed
+        sharing.trees[home] = tree
+    sharing.numbers = numbers
+    return placed, [home for home, own in trees.items() if len(own) > 1]
 
 
-def _join_leaves(mine: Sharing, theirs: Sharing, new_key: Mapping[Key, Key], ids: int) -> None:
+def _join_leaves(parts: Sequence[_Part], both: Collection[int]) -> None:
     """Bring the leaves of all people up to date; those of the first keep their names."""
-    known = {leaf.key for leaf in mine.leaves}
-    for leaf in mine.leaves:
-        mine.look_again(leaf)
-    for leaf in theirs.leaves:
-        key = new_key[leaf.key]
-        if key not in known:
-            known.add(key)
-            new = mine.new_leaf(*key)
-            new.id, new.primitive = leaf.id + ids, leaf.primitive + ids
-            new.founded = leaf.founded + ids if leaf.founded != ROOT else ROOT
-    for person, tree in mine.trees.items():
-        for local in tree.leaves:
+    sharing = parts[0].sharing
+    known = {leaf.key for leaf in sharing.leaves}
+    for leaf in sharing.leaves:
+        if leaf.person in both:
+            sharing.look_again(leaf)
+    for part in parts[1:]:
+        for leaf in part.sharing.leaves:
+            key = part.new_key[leaf.key]
+            if key not in known:
+                known.add(key)
+                shape = None if key[0] in both else part.sharing.table[leaf.slot]
+                new = sharing.new_leaf(*key, shape)
+                new.id, new.primitive = leaf.id + part.ids, leaf.primitive + part.ids
+                new.founded = leaf.founded + part.ids if leaf.founded != ROOT else ROOT
+    for person in both:
+        for local in sharing.trees[person].leaves:
             if (person, local) not in known:
-                mine.new_leaf(person, local)
+                sharing.new_leaf(person, local)
 
 
 def _regrouped(

@@ -1,4 +1,4 @@
-"""Two trees of one person that were learned apart, as one that goes on learning."""
+"""Trees of one person that were learned apart, as one that goes on learning."""
 
 from __future__ import annotations
 
@@ -18,60 +18,82 @@ from ..tree.nodes.search import mean_nearest
 from ..tree.tree import TreeState
 
 _REACH = 1.25  # radii of few exemplars are small
+_FAR = 1.5  # times that, the most typical exemplars say enough
 
 
 class MergedTree(NamedTuple):
-    """Two trees as one.
+    """Several trees as one.
 
     Attributes:
         tree: The tree, which goes on learning.
-        new_id: Its id of each node of the second tree; those of the first keep theirs.
-        new_number: How much its numbers of the second tree's segments are larger than they were.
-        change: What became of segments that neither tree alone had placed.
+        new_ids: Its id of each node of each of the trees; those of the first keep theirs.
+        new_numbers: How much its numbers of the segments of each are larger than they were.
+        change: What became of segments that no tree alone had placed.
     """
 
     tree: PrimitiveTree
-    new_id: dict[int, int]
-    new_number: int
+    new_ids: tuple[dict[int, int], ...]
+    new_numbers: tuple[int, ...]
     change: Change
 
 
-def merge_trees(first: PrimitiveTree, second: PrimitiveTree, least: int = 2) -> MergedTree:
-    """Merge two trees; neither changes, and their exemplars are not copied.
+def merge_trees(trees: Sequence[PrimitiveTree], least: int = 2) -> MergedTree:
+    """Merge some trees; none changes, and their exemplars are not copied.
 
-    A leaf of the second becomes one with a leaf of the first if the distance from the exemplars of
+    A leaf of one becomes one with a leaf of those before it if the distance from the exemplars of
     each to those of the other is, on average, hardly above its radius; one to one, the nearest
     pairs first. All others stay what they were. Statistics add up as if one tree had seen all
     segments; those that wait in the roots are placed where they fit now.
 
+    Models are made once, and distances within nodes measured once, however many trees there are.
+
     Args:
-        first: One tree.
-        second: The other.
+        trees: The trees, at least one.
         least: Members from which on what waits becomes a primitive, if that is more than by the
             rules.
 
     Raises:
         InvalidValueError: The trees have other rules, channels or rates.
     """
-    for name in ("config", "n_channels", "rate_hz", "groups"):
-        mine, other = getattr(first, name), getattr(second, name)
-        if mine != other:
-            raise InvalidValueError(f"trees must agree in {name}, not {mine} and {other}")
-    a, b = first.state(), second.state()
-    shift = a.next_id - 1
-    new_id = {node.id: node.id + shift if node.id != ROOT else ROOT for node in b.nodes}
+    first, *others = trees
+    for other in others:
+        for name in ("config", "n_channels", "rate_hz", "groups"):
+            one, two = getattr(first, name), getattr(other, name)
+            if one != two:
+                raise InvalidValueError(f"trees must agree in {name}, not {one} and {two}")
     tree = PrimitiveTree(first.config, first.n_channels, first.rate_hz, first.groups)
-    tree.load_state(_joined(tree, a, b, new_id))
+    state = first.state()
+    new_ids, new_numbers = [{node.id: node.id for node in state.nodes}], [0]
+    for other in others:
+        more, shift = other.state(), state.next_id - 1
+        new_id = {node.id: node.id + shift if node.id != ROOT else ROOT for node in more.nodes}
+        new_ids.append(new_id)
+        new_numbers.append(state.n_seen)
+        state = _joined(tree, state, more, new_id)
+    tree.load_state(state)
     tree.require_exemplars(least)
     tree.remeasure()
-    gone = _merge(tree, first.leaves, [new_id[id] for id in second.leaves])
-    older = tree.leaves
-    change = tree.place_waiting()
-    late = _merge(tree, older, change.born)
-    moved = tuple((number, late.get(id, id)) for number, id in change.moved)
-    born = tuple(id for id in change.born if id not in late)
-    known = {old: gone.get(new, new) for old, new in new_id.items()}
-    return MergedTree(tree, known, first.n_seen, Change(born=born, moved=moved))
+    mine, gone = list(first.leaves), dict[int, int]()
+    for other, new_id in zip(others, new_ids[1:], strict=True):
+        theirs = [new_id[id] for id in other.leaves]
+        gone |= _merge(tree, mine, theirs)
+        mine += [id for id in theirs if id not in gone]
+    known = tuple({old: gone.get(new, new) for old, new in each.items()} for each in new_ids)
+    return MergedTree(tree, known, tuple(new_numbers), _placed(tree, len(others)))
+
+
+def _placed(tree: PrimitiveTree, most: int) -> Change:
+    """Place what waits, so many times at most: leaves reach farther once they hold more."""
+    born, moved = list[int](), dict[int, int]()
+    for _ in range(most):
+        older = tree.leaves
+        change = tree.place_waiting()
+        late = _merge(tree, older, change.born)
+        moved |= {number: late.get(id, id) for number, id in change.moved}
+        born += [id for id in change.born if id not in late]
+        if not change.moved:
+            break
+    return Change(born=tuple(born), moved=tuple(moved.items()))
 
 
 def _merge(tree: PrimitiveTree, mine: Sequence[int], theirs: Sequence[int]) -> dict[int, int]:
@@ -174,28 +196,47 @@ def _with_one_root(
 def _matches(
     tree: PrimitiveTree, mine: Sequence[int], theirs: Sequence[int]
 ) -> list[tuple[int, int]]:
-    """Return the pairs of leaves that are one primitive."""
+    """Return the pairs of leaves that are one primitive.
+
+    Of the pairs that are nearest by their mean trajectories those are compared whose most typical
+    exemplars are not far from the other leaf.
+    """
     if not (mine and theirs):
         return []
     config, bank = tree.config, tree.bank
+    radii = {id: tree.radius(id) for id in (*mine, *theirs)}
     means = np.stack([bank.mean_profile(tree.node(id).members) for id in mine])
     near = []
     for other in theirs:
         offsets = means - bank.mean_profile(tree.node(other).members)
         closest = np.argsort((offsets**2).sum(axis=1), kind="stable")
-        for k in closest[: config.n_candidates or None]:
-            matrix = np.stack(
-                [
-                    bank.distances(bank[n], tree.node(other).members)
-                    for n in tree.node(mine[k]).members
-                ]
-            )
-            forth = mean_nearest(matrix, config.n_nearest).mean() / tree.radius(mine[k])
-            back = mean_nearest(matrix.T, config.n_nearest).mean() / tree.radius(other)
+        for one in [mine[k] for k in closest[: config.n_candidates or None]]:
+            apart = [
+                _away(tree, of, _typical(tree, to)) / radii[of]
+                for of, to in ((one, other), (other, one))
+            ]
+            if sum(apart) > 2 * _REACH * _FAR:
+                continue
+            numbers = tree.node(other).members
+            matrix = np.stack([bank.distances(bank[n], numbers) for n in tree.node(one).members])
+            forth = mean_nearest(matrix, config.n_nearest).mean() / radii[one]
+            back = mean_nearest(matrix.T, config.n_nearest).mean() / radii[other]
             if forth + back <= 2 * _REACH:
-                near.append((float(forth + back), mine[k], other))
+                near.append((float(forth + back), one, other))
     pairs: list[tuple[int, int]] = []
     for _, i, j in sorted(near):
         if all(i != one and j != other for one, other in pairs):
             pairs.append((i, j))
     return pairs
+
+
+def _typical(tree: PrimitiveTree, id: int) -> int:
+    """Return the number of the exemplar of a leaf that is nearest to all others of it."""
+    node = tree.node(id)
+    return node.members[int(node.matrix.sum(axis=1).argmin())]
+
+
+def _away(tree: PrimitiveTree, id: int, number: int) -> float:
+    """Return how far a segment is from the nearest exemplars of a leaf."""
+    row = tree.bank.distances(tree.bank[number], tree.node(id).members)
+    return float(mean_nearest(row, tree.config.n_nearest))

@@ -15,6 +15,7 @@ from ..tree import (
     ROOT,
     Change,
     Exchange,
+    KeptTree,
     MirrorMap,
     Node,
     Placement,
@@ -299,6 +300,12 @@ class PeopleTree:
             self._require_exemplars()
         return primitives.sharing
 
+    def wake(self) -> None:
+        """Let trees that were loaded lazily make their models now."""
+        for tree in self._trees.values():
+            if isinstance(tree, KeptTree):
+                tree.wake()
+
     def withdraw_young(self) -> Change:
         """Let primitives wait again that have fewer members than several people need.
 
@@ -324,7 +331,7 @@ class PeopleTree:
         """Return a tree that knows the same, and goes on apart; exemplars are shared."""
         rules = self.config, self.n_channels, self.rate_hz, self.groups
         twin = PeopleTree(*rules, self.people_config, self.mirror)
-        twin.load_state(self.state())
+        twin.load_state(self.state(), lazily=True)
         return twin
 
     # ---- keeping
@@ -338,8 +345,12 @@ class PeopleTree:
             sharing=self._primitives.state(),
         )
 
-    def load_state(self, state: PeopleState) -> None:
+    def load_state(self, state: PeopleState, *, lazily: bool = False) -> None:
         """Resume from what `state` returned, under the same configuration.
+
+        Args:
+            state: That.
+            lazily: Whether people's trees make their models only once they are asked for.
 
         Raises:
             StateError: Something in it is wrong, or does not fit this tree; nothing has changed.
@@ -348,9 +359,9 @@ class PeopleTree:
         if state.sharing is not None:
             with within("sharing"):
                 self._check_widths(state.sharing)
-        trees = {}
+        trees: dict[int, PrimitiveTree] = {}
         for k, each in enumerate(state.trees):
-            trees[each.person] = self._new_tree()
+            trees[each.person] = self._new_tree(KeptTree if lazily else PrimitiveTree)
             with within(f"trees[{k}].tree"):
                 trees[each.person].load_state(each.tree)
         self.n_seen, self._trees = state.n_seen, trees
@@ -382,8 +393,8 @@ class PeopleTree:
 
     # ---- inside
 
-    def _new_tree(self) -> PrimitiveTree:
-        return PrimitiveTree(self.config, self.n_channels, self.rate_hz, self.groups)
+    def _new_tree(self, kind: type[PrimitiveTree] = PrimitiveTree) -> PrimitiveTree:
+        return kind(self.config, self.n_channels, self.rate_hz, self.groups)
 
     def _require_exemplars(self) -> None:
         """Let births be as rare as several people need them to be."""

@@ -179,9 +179,9 @@ class Sharing:
         self.next_id += 1
         return self.next_id - 1
 
-    def new_leaf(self, person: int, local: int) -> Leaf:
-        """Take a leaf of a person's tree, of no primitive yet."""
-        slot = self.table.add(self.seen(person, local))
+    def new_leaf(self, person: int, local: int, shape: Shape | None = None) -> Leaf:
+        """Take a leaf of a person's tree, of no primitive yet, whose shape may be known."""
+        slot = self.table.add(self.seen(person, local) if shape is None else shape)
         self.leaves.append(Leaf(person, local, ROOT, ROOT, ROOT, slot))
         return self.leaves[-1]
 

@@ -18,6 +18,7 @@ from .journal import Entry as Entry
 from .journal import Happening as Happening
 from .life import LifelongLearner as LifelongLearner
 from .reader import StoreReader as StoreReader
+from .reader import learner_of as learner_of
 from .reader import library_of as library_of
 from .store import Store as Store
 from .store import StoreInfo as StoreInfo

@@ -123,14 +123,18 @@ class LifelongLearner(Closing):
         return life
 
     @classmethod
-    def of_found(cls, found: Found) -> LifelongLearner:
+    def of_found(cls, found: Found, *, lazily: bool = False) -> LifelongLearner:
         """Return what a store held: its checkpoint, and what was learned since.
+
+        Args:
+            found: That.
+            lazily: See `MotionLearner.from_state`.
 
         Raises:
             StoreDamagedError: They do not fit each other.
         """
         try:
-            life = cls.from_state(found.state)
+            life = cls.from_state(found.state, lazily=lazily)
             for row in found.rows:
                 life.replay(record_of(row))
         except StateError as error:
@@ -370,15 +374,19 @@ class LifelongLearner(Closing):
         )
 
     @classmethod
-    def from_state(cls, state: LifeState) -> LifelongLearner:
+    def from_state(cls, state: LifeState, *, lazily: bool = False) -> LifelongLearner:
         """Return the learner that `state` described.
+
+        Args:
+            state: That.
+            lazily: See `MotionLearner.from_state`.
 
         Raises:
             StateError: The state is damaged; its place says where.
         """
         state = validated(state)
         with within("learner"):
-            life = cls(MotionLearner.from_state(state.learner))
+            life = cls(MotionLearner.from_state(state.learner, lazily=lazily))
         life.labels = Labels(state.labels)
         with within("journal"):
             life._journal.load_state(state.journal)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import NotAStoreError, StoreDamagedError
+from ..learner import MotionLearner
 from ..library import PrimitiveLibrary
 from .database import errors_of, open_reading
 from .life import LifelongLearner
 from .rows import checkpoints, read_rows, record_of
-from .store import read_all
+from .store import Found, read_all
 
 
 class StoreReader:
@@ -71,14 +72,7 @@ class StoreReader:
         return True
 
     def _read(self) -> LifelongLearner:
-        connection = open_reading(self.path)
-        try:
-            with errors_of(self.path):
-                found = read_all(connection, self.path)
-        finally:
-            connection.close()
-        if found is None:
-            raise NotAStoreError(f"{self.path} holds no store: it was never finished")
+        found = _found(self.path)
         self._seq = found.rows[-1].seq if found.rows else found.seq
         return LifelongLearner.of_found(found)
 
@@ -90,3 +84,24 @@ def library_of(path: str | Path) -> PrimitiveLibrary:
         StoreError: It cannot be read; the class says why.
     """
     return StoreReader(path).life.snapshot()
+
+
+def learner_of(path: str | Path) -> MotionLearner:
+    """Return what a store knows now, to be merged: models are made once they are asked for.
+
+    Raises:
+        StoreError: It cannot be read; the class says why.
+    """
+    return LifelongLearner.of_found(_found(Path(path)), lazily=True).learner
+
+
+def _found(path: Path) -> Found:
+    connection = open_reading(path)
+    try:
+        with errors_of(path):
+            found = read_all(connection, path)
+    finally:
+        connection.close()
+    if found is None:
+        raise NotAStoreError(f"{path} holds no store: it was never finished")
+    return found

@@ -124,7 +124,7 @@ class Store:
             StoreDamagedError: It is not what was written.
         """
         with errors_of(self.path):
-            return read_all(self._connection, self.path, salvage=salvage)
+            return read_all(self._connection, self.path, salvage=salvage, older=True)
 
     def start(self, found: Found | None, state: Callable[[], LifeState], rate_hz: float) -> None:
         """Begin to write, now that what the store holds is known.
@@ -228,8 +228,16 @@ class Store:
         self._warned = problem is not None
 
 
-def read_all(connection: sqlite3.Connection, path: Path, *, salvage: bool = False) -> Found | None:
+def read_all(
+    connection: sqlite3.Connection, path: Path, *, salvage: bool = False, older: bool = False
+) -> Found | None:
     """Return the newest checkpoint that is sound, and the log since; None where there is none.
+
+    Args:
+        connection: To the store.
+        path: The store.
+        salvage: Whether a damaged log is good for as far as it is sound.
+        older: Whether to look through older checkpoints, too, as whoever writes does.
 
     Raises:
         StoreDamagedError: There are checkpoints, and none is sound; or the log is damaged.
@@ -246,7 +254,8 @@ def read_all(connection: sqlite3.Connection, path: Path, *, salvage: bool = Fals
                 continue
             parts[seq] = loaded.parts
             rows = _rows(connection, seq, damage, salvage=salvage)
-            _others(connection, seq, parts, damage)
+            if older:
+                _others(connection, seq, parts, damage)
             return Found(seq, loaded.state, rows, parts, tuple(damage))
         if damage:
             raise StoreDamagedError(
@@ -352,7 +361,7 @@ def check(path: str | Path) -> tuple[str, ...]:
         wrong = integrity(connection)
         if not wrong:
             try:
-                found = read_all(connection, Path(path), salvage=True)
+                found = read_all(connection, Path(path), salvage=True, older=True)
                 wrong = [*(found.damage if found else ("it holds no checkpoint",))]
             except StoreDamagedError as error:
                 wrong = [str(error)]

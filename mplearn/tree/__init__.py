@@ -8,6 +8,7 @@ from .distance import LikelihoodDistance as LikelihoodDistance
 from .distance import MonteCarloDistance as MonteCarloDistance
 from .distance import make_distance as make_distance
 from .distance import register_distance as register_distance
+from .kept import KeptTree as KeptTree
 from .mirror import MirrorMap as MirrorMap
 from .nodes.node import Node as Node
 from .placement import ROOT as ROOT

@@ -91,6 +91,20 @@ def test_the_order_in_which_shards_are_done_changes_no_byte(
     assert len(orders) == 2
 
 
+def test_shards_of_one_person_are_merged_first_and_in_any_order(
+    folder: Path, tmp_path: Path
+) -> None:
+    libraries = set()
+    for seed in (1, 2):
+        workers = Shuffled(seed)
+        corpus = learn_corpus(folder, tmp_path / f"{seed}", executor=workers, shard_takes=1)
+        libraries.add(saved(corpus, tmp_path))
+        assert corpus.progress.merged == len(corpus.shards) - 2  # that of a broken take is empty
+        assert sum(what.startswith("(") for what in workers.order) == 4  # three, and nobody
+        assert not (tmp_path / f"{seed}" / "merged").exists()
+    assert len(libraries) == 1
+
+
 def _writer_of(into: Path) -> int:
     """Return the process that writes to a store there; 0 for none."""
     for lock in into.glob("*.lock"):

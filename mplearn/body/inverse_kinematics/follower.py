@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -66,8 +66,9 @@ class Follower:
         return weight
 
 
+@lru_cache(maxsize=16)
 def follower(body: Body) -> Follower:
-    """Return the follower of a body."""
+    """Return the follower of a body: the same for the same body, as nobody changes it."""
     if "clavicle_l" in body.tree.body_names:
         return Follower(body, body.tree)
     import mujoco

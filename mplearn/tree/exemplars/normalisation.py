@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from ...maths.resampling import interpolate_linearly
@@ -35,6 +37,24 @@ def centred(points: FloatArray, config: NormalisationConfig) -> FloatArray:
 
 def mean_posture(points: FloatArray, config: NormalisationConfig) -> FloatArray:
     """Return the weighted mean of points (P, D) where they are seen, shape (D,)."""
-    weight = np.where(np.isnan(points), 0.0, weights(config)[:, None])
-    total = np.maximum(weight.sum(axis=0), 1e-12)
-    return np.asarray((weight * np.nan_to_num(points)).sum(axis=0) / total)
+    if np.isnan(points.sum()):
+        weight = np.where(np.isnan(points), 0.0, weights(config)[:, None])
+        points = np.nan_to_num(points)
+        total = weight.sum(axis=0)
+    else:
+        weight, total = _all_weights(config, points.shape[1], points.flags.c_contiguous)
+    return np.asarray((weight * points).sum(axis=0) / np.maximum(total, 1e-12))
+
+
+@lru_cache(maxsize=32)
+def _all_weights(
+    config: NormalisationConfig, n_channels: int, by_rows: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Return the weights of points that are all seen, (P, D), and their sums, (D,), as above.
+
+    Sums depend in their last bit on how values lie in memory: one point after the other or one
+    channel after the other.
+    """
+    column = weights(config)[:, None] * np.ones(n_channels)
+    weight = np.array(column, order="C" if by_rows else "F")
+    return weight, weight.sum(axis=0)
