@@ -1,9 +1,12 @@
 """A long life with a store, accelerated: ``python -m benchmarks.life --hours 168 --out life.png``.
 
 The demonstrator's motions come again and again, each time a little different, with new ones now and
-then in the first tenth and none after it: from there on nothing may grow. Prints, and plots over
-the stream: memory, size of the file, time a frame, time of a checkpoint, and for how long the
-stream was ever held up by a checkpoint or by a snapshot for readers (processor time).
+then in the first tenth and none after it: from there on nothing may grow. As people do, he rests
+between: with ``--busy 0.03``, the default, he moves half a minute in a quarter of an hour, day and
+night; with ``--busy 1`` without a pause. ``--rate`` is that of the stream, 20 Hz where not said:
+the slowest that can be learned. Prints, and plots over the stream: memory, size of the file, time a
+frame, time of a checkpoint, and for how long the stream was ever held up by a checkpoint or by a
+snapshot for readers (processor time).
 """
 
 import argparse
@@ -42,15 +45,16 @@ class Figures:
     primitives: list[int] = field(default_factory=list)
 
 
-def motions(n: int = 40) -> tuple[list[FloatArray], tuple[str, ...], float]:
-    """Return n performances of half a minute, in which four primitives come, and their channels.
+def motions(n: int = 40, rate_hz: float = 100.0) -> tuple[list[FloatArray], tuple[str, ...], float]:
+    """Return n performances of half a minute, in which four primitives come, channels and rate.
 
     No two repetitions are alike, as a person's are not: few that came again and again to the bit
     would be told apart, and each become a primitive.
     """
     script = ["BAR", "BAL", "BAD", "BAU"] * 6
     shown = [observe(demonstrate(script, seed=seed).recording) for seed in range(n)]
-    return [each.frames for each in shown], shown[0].channels, shown[0].rate_hz
+    step = max(1, round(shown[0].rate_hz / rate_hz))
+    return [each.frames[::step] for each in shown], shown[0].channels, shown[0].rate_hz / step
 
 
 def scene(frames: FloatArray, rng: np.random.Generator, kind: int) -> FloatArray:
@@ -72,9 +76,30 @@ def scene(frames: FloatArray, rng: np.random.Generator, kind: int) -> FloatArray
     return np.asarray(out + 1e-3 * rng.normal(size=frames.shape))
 
 
-def live(hours: float, path: Path, checkpoint_s: float = 30.0) -> Figures:
-    """Live for so long [h of stream], and measure a hundred times."""
-    performances, channels, rate_hz = motions()
+def rest(frames: FloatArray, busy: float, rate_hz: float, rng: np.random.Generator) -> int:
+    """Return for how many frames somebody rests after such a motion, a whole number of seconds."""
+    mean_s = len(frames) / rate_hz * (1.0 / busy - 1.0)
+    return round(mean_s * rng.uniform(0.5, 1.5)) * round(rate_hz)
+
+
+def live(
+    hours: float,
+    path: Path,
+    checkpoint_s: float = 30.0,
+    *,
+    busy: float = 1.0,
+    rate_hz: float = 100.0,
+) -> Figures:
+    """Live for so long [h of stream], and measure a hundred times.
+
+    Args:
+        hours: How long [h].
+        path: The store.
+        checkpoint_s: Time of stream between checkpoints [s].
+        busy: Share of the time in which somebody moves, in (0, 1].
+        rate_hz: Frames per second of the stream [1/s].
+    """
+    performances, channels, rate_hz = motions(rate_hz=rate_hz)
     config = LearnerConfig(channels, rate_hz)
     rng = np.random.default_rng(0)
     figures = Figures()
@@ -101,11 +126,15 @@ def live(hours: float, path: Path, checkpoint_s: float = 30.0) -> Figures:
             shown = scene(frames, rng, int(rng.integers(n_kinds)))
             for at in range(0, len(shown), _BLOCK):
                 life.learn_many(shown[at : at + _BLOCK])
+            stands = performances[0][0]
+            second = round(rate_hz), len(stands)
+            for _ in range(0, rest(shown, busy, rate_hz, rng), second[0]):
+                life.learn_many(stands + 1e-3 * rng.normal(size=second))
+            life.store.flush()  # the stream runs hundreds of times as fast as in life
             if life.n_frames >= due:
                 due += n_frames / 100
                 took = time.process_time() - start
                 figures.snapshot_ms.append(1e3 * longest_part(life))
-                life.store.flush()
                 gc.collect()
                 figures.at_h.append(life.n_frames / rate_hz / 3600)
                 figures.memory_mb.append(memory_mb())
@@ -165,15 +194,21 @@ def plot(figures: Figures, out: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.life", description=__doc__)
     parser.add_argument("--hours", type=float, default=168.0, help="of stream")
+    parser.add_argument("--busy", type=float, default=0.03, help="share of it in which he moves")
+    parser.add_argument("--rate", type=float, default=20.0, help="frames per second of stream")
     parser.add_argument("--out", type=Path, default=Path("life.png"))
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         begin = time.perf_counter()
-        figures = live(args.hours, Path(folder) / "life.db")
+        path = Path(folder) / "life.db"
+        figures = live(args.hours, path, busy=args.busy, rate_hz=args.rate)
         took = time.perf_counter() - begin
     plot(figures, args.out)
     table = Table("what", "after a fifth", "at the end", "largest", title_justify="left")
-    table.title = f"{args.hours:g} h of stream in {took / 60:.1f} minutes"
+    table.title = (
+        f"{args.hours:g} h of stream at {args.rate:g} Hz, {100 * args.busy:g} % of it motion, in "
+        f"{took / 60:.1f} minutes ({time.process_time() / 60:.1f} of processor)"
+    )
     early = len(figures.at_h) // 5
     for name, values in (
         ("memory [MB]", figures.memory_mb),
@@ -184,7 +219,7 @@ def main() -> None:
         ("primitives", figures.primitives),
     ):
         table.add_row(name, *(f"{v:.1f}" for v in (values[early], values[-1], max(values))))
-    console = Console(width=120)
+    console = Console(width=120, markup=False)
     console.print(table)
     p50, p99 = np.percentile(figures.held_up_ms, [50, 99])
     console.print(

@@ -1,5 +1,11 @@
-"""Live motion: how late events are, what a bad network costs, and an hour of it."""
+"""Live motion: how late events are, what a bad network costs, and an hour of it.
 
+``python -m benchmarks.live --minutes 60`` measures how late events are for an hour at its own pace,
+and the memory meanwhile; ``python -m benchmarks live`` for two minutes, and an hour as fast as it
+is learned.
+"""
+
+import argparse
 import resource
 import subprocess
 import sys
@@ -19,6 +25,7 @@ from mplearn.sources import Block, Change, Source, Stream, Wanted, open_source
 from mplearn.sources.played import PlayedSource
 from mplearn.sources.recognised import RecognisedSource
 from mplearn.sources.sending import open_sender, send
+from mplearn_agents.learning.pauses import short_pauses
 
 from .bad_network import BadNetwork
 
@@ -29,7 +36,7 @@ HOUR_S = 3600.0
 
 def rows() -> list[tuple[str, str, str, str]]:
     session = paper_session(7).recording
-    return [*_bad_network(session), *_delays(session), *_hour(session)]
+    return [*_bad_network(session), *_delays(session, LIVE_S), *_hour(session)]
 
 
 def _bad_network(session: Recording) -> list[tuple[str, str, str, str]]:
@@ -100,19 +107,23 @@ def _learned(source: Source) -> tuple[list[Segment], list[object]]:
     return segments, [event.placement for event in closed]
 
 
-def _delays(session: Recording) -> list[tuple[str, str, str, str]]:
+def _delays(session: Recording, seconds: float) -> list[tuple[str, str, str, str]]:
     """Return how long after a packet came what it causes is there, with 16 minutes learned."""
     learner = MotionLearner(LearnerConfig(session.channels, session.rate_hz))
     learner.learn_many(session.frames)
     learner.end_stream()
-    frames, events, work = [], [], []
+    frames, events, work, sizes = [], [], [], []
+    n = round(seconds * 100)
     with (
+        short_pauses(),
         tempfile.TemporaryDirectory() as folder,
         open_source("udp:0") as source,
         subprocess.Popen(_sender(session, Path(folder), source.name)) as sender,
     ):
-        until = time.monotonic() + LIVE_S + 60.0
-        while learner.n_frames < len(session) + round(LIVE_S * 100) and time.monotonic() < until:
+        until = time.monotonic() + seconds + 60.0
+        while learner.n_frames < len(session) + n and time.monotonic() < until:
+            if learner.n_frames - len(session) >= n // 4 * (len(sizes) + 1):
+                sizes.append(_resident_mb())
             for item in source.read(0.1):
                 if isinstance(item, Change):
                     continue
@@ -133,7 +144,7 @@ def _delays(session: Recording) -> list[tuple[str, str, str, str]]:
         (
             "a packet to what it changes",
             f"p99 {frame[1]:.1f} ms",
-            f"median {frame[0]:.2f} ms, {LIVE_S:.0f} s at 100 Hz by UDP",
+            f"median {frame[0]:.2f} ms, {seconds:.0f} s at 100 Hz by UDP",
             ", ".join(f"{n} {fault}" for fault, n in lost.items()) or "nothing lost",
         ),
         (
@@ -147,6 +158,12 @@ def _delays(session: Recording) -> list[tuple[str, str, str, str]]:
             f"p99 {busy[1]:.1f} ms",
             f"median {busy[0]:.1f} ms",
             "the rest is waiting",
+        ),
+        (
+            "memory after each quarter of that",
+            " ".join(f"{size:.0f}" for size in [*sizes, _resident_mb()]) + " MB",
+            f"{len(learner.tree.leaves)} primitives",
+            "16 minutes learned before",
         ),
     ]
 
@@ -217,3 +234,15 @@ def _resident_mb() -> float:
     except OSError:
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     return pages * resource.getpagesize() / 1e6
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.live", description=__doc__)
+    parser.add_argument("--minutes", type=float, default=60.0, help="at their own pace")
+    args = parser.parse_args()
+    for row in _delays(paper_session(7).recording, 60.0 * args.minutes):
+        print("; ".join(row), flush=True)
+
+
+if __name__ == "__main__":
+    main()

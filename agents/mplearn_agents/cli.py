@@ -21,6 +21,7 @@ from mplearn.errors import InvalidValueError, MPLearnError
 from mplearn_agents.terminal.exit_codes import BAD_INPUT, INTERRUPTED
 from mplearn_agents.terminal.inert import inert_output
 from mplearn_agents.terminal.interrupts import interrupted
+from mplearn_agents.terminal.plain_warnings import plain_warnings
 
 from . import commands
 
@@ -57,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Args:
         argv: The command line without the program's name; None takes ``sys.argv``.
     """
-    with inert_output(), interrupted() as came:
+    with inert_output(), plain_warnings(), interrupted() as came:
         try:
             code = _run(argv)
         except KeyboardInterrupt:

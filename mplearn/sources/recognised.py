@@ -145,6 +145,11 @@ class RecognisedSource(Source):
         self._begin_search()
         if before is None or self._sight is None:
             return out
+        if before.is_markers != block.stream.is_markers:
+            self._sight, self._last, self._free = None, None, self._free[:0]
+            what = "points" if block.stream.is_markers else "channels that are no points"
+            said = f"the names changed; what comes are {what} now"
+            return [*out, Change("names", said, float(block.times_s[0]))]
         names, known = _names(block.stream), set(_names(before))
         at = {name: i for i, name in reversed([*enumerate(names)])}
         self._columns = np.array([at.get(label, -1) for label in self._sight.labels])

@@ -343,7 +343,8 @@ def backup(path: str | Path, to: str | Path) -> Path:
         with errors_of(to):
             connection.execute("VACUUM INTO ?", (str(to),))
     except BaseException:
-        to.unlink(missing_ok=True)
+        for each in (to, to.with_name(f"{to.name}-journal")):
+            each.unlink(missing_ok=True)
         raise
     finally:
         connection.close()

@@ -15,6 +15,7 @@ import pytest
 from mplearn.demonstrator import demonstrate
 from mplearn.learner import LearnerConfig, MotionLearner
 from mplearn.library import PrimitiveLibrary
+from mplearn.recording import Recording
 from mplearn.sources import Block, Change, Source, Stream, Tally, source_kinds
 from mplearn.sources.played import PlayedSource
 from mplearn_agents.cli import main
@@ -186,6 +187,47 @@ def test_a_stretch_that_does_not_join_ends_the_stream() -> None:
     assert log.learner is not None
     assert log.learner.n_frames == learner.n_frames
     assert len(log.learner.snapshot()) == len(learner.snapshot())
+
+
+class Breaking(Source):
+    """A source of somebody else, which breaks what it promised."""
+
+    name = "mine"
+
+    def __init__(self, recording: Recording) -> None:
+        self.tally = Tally()
+        stream = Stream(recording.channels, recording.rate_hz, unit_m=1.0, up="z")
+        n = len(recording)
+        times = np.arange(n) / recording.rate_hz
+        wrong = Stream(("a", "b"), recording.rate_hz)
+        few = np.zeros((5, 2)), times[:5], times[:5]
+        self._blocks = [Block(stream, recording.frames, times, times), Block(wrong, *few)]
+
+    @property
+    def ended(self) -> bool:
+        return False
+
+    def read(self, timeout_s: float | None = None) -> list[Block | Change]:
+        return [self._blocks.pop(0)]
+
+    def close(self) -> None:
+        pass
+
+
+def test_what_was_learned_before_a_source_broke_is_kept(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording = demonstrate(["BAR", "BAL"] * 3, seed=2).recording
+    broken = Breaking(recording)
+    monkeypatch.setattr("mplearn.sources.open_source", lambda *_, **__: broken)
+    kept = tmp_path / "live.mplearn", tmp_path / "life.db"
+    command = ["learn", "--live", "mine", "--out", str(kept[0]), "--store", str(kept[1])]
+    assert main(command) == 2
+    told = capsys.readouterr()
+    assert "must have shape" in told.err and len(told.err.splitlines()) == 1
+    assert "what was learned before is written" in told.out
+    assert not kept[1].with_name("life.db-wal").exists()  # it was closed
+    assert len(PrimitiveLibrary.load(kept[0])) == len(PrimitiveLibrary.load(kept[1])) > 0
 
 
 def test_the_first_wish_to_stop_is_noted_and_the_second_interrupts() -> None:

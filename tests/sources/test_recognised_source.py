@@ -162,3 +162,15 @@ def test_positions_and_channels(session: Recording, observe: str) -> None:
     stream = Stream(session.channels, 100.0, unit_m=1.0, up="z")
     items = seen(blocks(stream, session.frames), observe=observe)
     np.testing.assert_array_equal(frames_of(items), session.frames)
+
+
+@pytest.mark.parametrize("observe", ["channels", "robot"])
+def test_channels_that_become_markers_of_the_same_names_are_missing(observe: str) -> None:
+    channels, markers = Stream(("a", "b"), 100.0), Stream(marker_channels(("a", "b")), 100.0)
+    ones, more = np.ones((30, 2)), np.ones((200, 6))
+    items = seen(blocks(channels, ones) + blocks(markers, more, 30), observe=observe)
+    frames = frames_of(items)
+    assert frames.shape[1] == 2
+    np.testing.assert_array_equal(frames[:30], ones)
+    assert np.isnan(frames[30:]).all()
+    assert "what comes are points now" in texts_of(items, "names")[0]

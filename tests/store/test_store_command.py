@@ -3,6 +3,8 @@
 import json
 import os
 import signal
+import sqlite3
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +14,13 @@ from streams import CHANNELS, RATE_HZ, learner, stream
 
 import mplearn_agents.learning.watched
 from mplearn import PrimitiveLibrary, Recording
-from mplearn.store import LifelongLearner, StoreReader
+from mplearn.errors import StoreWarning, StoreWriteError
+from mplearn.store import LifelongLearner, Store, StoreReader, backup
+from mplearn.store.database import open_reading
+from mplearn.store.life_state import LifeState
 from mplearn_agents.cli import main
 from mplearn_agents.learning.watched import learn
+from mplearn_agents.terminal.plain_warnings import plain_warnings
 
 TAKES = [Recording(stream(24, k), RATE_HZ, CHANNELS, name=f"take {k}") for k in range(3)]
 
@@ -139,3 +145,46 @@ def test_what_cannot_be_is_said_in_a_line(
     (tmp_path / "b.db").write_bytes(store.read_bytes()[:5000])
     assert "damaged" in refused(capsys, "store", "check", tmp_path / "b.db")
     assert "--out, or a store" in refused(capsys, "learn", tmp_path)
+
+
+def test_what_could_not_be_written_is_not_said_to_be_done(
+    store: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = Store.close
+
+    def close(self: Store, state: LifeState | None = None) -> None:
+        whole(self, state)
+        raise StoreWriteError("the disk is full")
+
+    monkeypatch.setattr(Store, "close", close)
+    for command in (["note", store, "x"], ["undo", store]):
+        assert main(["store", *map(str, command)]) == 2
+        told = capsys.readouterr()
+        assert told.out == "" and told.err == "mplearn: the disk is full\n"
+
+
+def test_a_backup_that_fails_leaves_nothing(store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    copy = store.with_name("copy.db")
+
+    class Full:
+        def __init__(self, connection: sqlite3.Connection) -> None:
+            self.close, self._execute = connection.close, connection.execute
+
+        def execute(self, words: str, *values: object) -> object:
+            if not words.startswith("VACUUM"):
+                return self._execute(words, *values)
+            copy.with_name("copy.db-journal").write_bytes(b"half")
+            raise sqlite3.OperationalError("database or disk is full")
+
+    monkeypatch.setattr("mplearn.store.store.open_reading", lambda path: Full(open_reading(path)))
+    with pytest.raises(StoreWriteError):
+        backup(store, copy)
+    assert [path.name for path in store.parent.glob("copy.db*")] == []
+
+
+def test_warnings_are_a_line() -> None:
+    with plain_warnings():
+        said = warnings.formatwarning(StoreWarning("a store\nis full"), StoreWarning, "x.py", 3)
+        other = warnings.formatwarning("of somebody else", UserWarning, "x.py", 3)
+    assert said == "mplearn: warning: a store is full\n"
+    assert "x.py:3" in other

@@ -195,13 +195,15 @@ def _command(args: argparse.Namespace) -> None:
             command = Note(args.text, about)
         else:
             command = one[args.kind](_id(life, args.primitive))
-        print(_line(life.execute(command, by=args.by)))
+        done = life.execute(command, by=args.by)
+    print(_line(done))  # now that it is in the file
 
 
 def _toggle(args: argparse.Namespace) -> None:
     with _open(args) as life:
         toggle = life.undo if args.kind == "undo" else life.redo
-        print(_line(toggle(by=args.by, number=args.number)))
+        done = toggle(by=args.by, number=args.number)
+    print(_line(done))
 
 
 def rename(path: Path, key: str, name: str) -> str:

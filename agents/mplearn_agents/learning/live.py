@@ -12,7 +12,7 @@ from pathlib import Path
 from threading import Event as Flag
 from typing import TYPE_CHECKING, Any
 
-from mplearn.errors import RecordingError
+from mplearn.errors import MPLearnError, RecordingError
 from mplearn_agents.learning.pauses import short_pauses
 from mplearn_agents.recordings.reading import hints_of
 from mplearn_agents.terminal.arguments import pace, positive
@@ -21,6 +21,7 @@ from mplearn_agents.terminal.interrupts import asked_to_stop
 
 if TYPE_CHECKING:
     from mplearn.learner import Event, LearnerConfig, MotionLearner
+    from mplearn.library import PrimitiveLibrary
     from mplearn.sources import Block, Source
     from mplearn.store import LifelongLearner
 
@@ -116,19 +117,29 @@ def learn_from_source(
                 markup=False,
                 highlight=False,
             )
-            with short_pauses():
-                log = learn_live(
-                    source,
-                    stop,
-                    _say(),
-                    config=configure,
-                    as_json=args.json,
-                    seconds=args.seconds,
-                    life=life,
-                    store=args.store,
-                )
-            if log.life is not None:
-                stack.push(log.life)
+            log = LiveLog()
+            try:
+                with short_pauses():
+                    learn_live(
+                        source,
+                        stop,
+                        _say(),
+                        config=configure,
+                        as_json=args.json,
+                        seconds=args.seconds,
+                        life=life,
+                        store=args.store,
+                        log=log,
+                    )
+            except MPLearnError:
+                if log.life is not None:
+                    _save(args, log.life.snapshot())
+                    told = f"what was learned before is written to {printable(kept)}"
+                    console.print(told, markup=False)
+                raise
+            finally:
+                if log.life is not None:
+                    stack.push(log.life)
         _report(console, args, source, log, stopped=stop.is_set())
 
 
@@ -142,6 +153,7 @@ def learn_live(
     seconds: float | None = None,
     life: LifelongLearner | None = None,
     store: Path | None = None,
+    log: LiveLog | None = None,
 ) -> LiveLog:
     """Learn from a source until it ends, or until it is asked to stop.
 
@@ -154,13 +166,14 @@ def learn_live(
         seconds: How much of the stream to learn [s]; all of it where None.
         life: Who has learned before, and goes on.
         store: Where one who is new keeps what it learns; None for nowhere.
+        log: What is filled in and returned; a new one where None.
     """
     from mplearn.learner import FramesLost, LearnerConfig, MotionLearner, SegmentClosed
     from mplearn.sources import Change
     from mplearn.store import LifelongLearner
     from mplearn_agents.terminal.event_lines import change_json, change_text, event_json, event_text
 
-    log = LiveLog()
+    log = LiveLog() if log is None else log
 
     def tell(events: list[Event], arrived_s: float, rate_hz: float) -> None:
         for event in events:
@@ -218,6 +231,12 @@ def _say() -> Callable[[str], object]:
     return say
 
 
+def _save(args: argparse.Namespace, library: PrimitiveLibrary) -> None:
+    if args.out is not None:
+        args.out.parent.mkdir(parents=True, exist_ok=True)
+        library.save(args.out)
+
+
 def _report(
     console: Any, args: argparse.Namespace, source: Source, log: LiveLog, *, stopped: bool
 ) -> None:
@@ -230,9 +249,7 @@ def _report(
         told = ", ".join(f"{n} {name}" for name, n in faults.items()) or "nothing came"
         raise RecordingError(f"nothing could be learned from {source.name}: {told}")
     library = log.life.snapshot()
-    if args.out is not None:
-        args.out.parent.mkdir(parents=True, exist_ok=True)
-        library.save(args.out)
+    _save(args, library)
     paths = [str(path) for path in (args.out, args.store) if path is not None]
     if args.json:
         summary = {

@@ -178,7 +178,7 @@ class Watcher:
             case "request":
                 self._answer(item)
             case "stream" if isinstance(item, Block):
-                self._learn(item)
+                self._try(item)
             case "stream":
                 self._changed(item)
             case "ended":
@@ -194,6 +194,19 @@ class Watcher:
             self._status_at = now
             self._outbox.post(self._status(), key="status")
         return not self._outbox.broken
+
+    def _try(self, block: Block) -> None:
+        """Learn from a block; one that cannot be learned from costs nothing else.
+
+        Raises:
+            MPLearnError: It is the first one: nothing can be learned from this source.
+        """
+        try:
+            self._learn(block)
+        except MPLearnError as error:
+            if self._figure is None:
+                raise
+            self._happened("source", f"{len(block)} frames were not learned: {error}")
 
     def _learn(self, block: Block) -> None:
         if self._figure is None:

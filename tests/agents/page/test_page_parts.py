@@ -17,6 +17,7 @@ from mplearn.demonstrator import demonstrate
 from mplearn.errors import InvalidValueError, LibraryError
 from mplearn.learner import LearnerConfig, MotionLearner
 from mplearn.maths.rotations import quaternion_to_matrix
+from mplearn.sources import Block, Stream
 from mplearn.store import LifelongLearner
 from mplearn_agents.page import messages, teaching
 from mplearn_agents.page.figures import CLIP_HZ, has_figure, human_poses, poses_of, shapes_of
@@ -267,6 +268,9 @@ class Kept:
     def post(self, header, blob=b"", key=None):
         self.posted.append((header, blob))
 
+    def post_later(self, make, key):
+        pass
+
 
 def test_a_click_shows_the_figure_with_its_demonstrations(taught):
     """The learner answers: its own library, as it was told last, whatever the robot does."""
@@ -293,6 +297,24 @@ def test_a_click_shows_the_figure_with_its_demonstrations(taught):
     np.testing.assert_allclose(lengths[1:] / CLIP_HZ, seconds, atol=0.5 / CLIP_HZ)
     poses = np.frombuffer(blob, "<f4", offset=16 + 4 * n).reshape(lengths.sum(), -1, 7)
     assert 0.5 < poses[:, 0, 2].min() < poses[:, 0, 2].max() < 1.3  # the pelvis
+    theirs.close()
+
+
+def test_frames_that_cannot_be_learned_cost_nothing_else():
+    """A source of somebody else that breaks what it promised."""
+    mine, theirs = Pipe()
+    kept = Kept()
+    watcher = Watcher(Watch("mine"), mine, kept)
+
+    def block(*channels):
+        times = np.arange(10) / 100.0
+        stream = Stream(channels, 100.0)
+        return Block(stream, np.zeros((10, len(channels))), times, times)
+
+    for each in (block("a", "b"), block("a"), block("a", "b")):
+        watcher._try(each)
+    assert watcher._lifelong.n_frames == 20
+    assert any("10 frames were not learned" in str(h.get("text")) for h, _ in kept.posted)
     theirs.close()
 
 
