@@ -120,7 +120,7 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
         )
         if named in (None, name):
             module.add_arguments(command)
-            command.set_defaults(run=module.run)
+            command.set_defaults(run=module.run, build_parser=build_parser)
     return parser
 
 

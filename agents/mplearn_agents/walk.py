@@ -1,7 +1,7 @@
 """Walks on the primitive graph: a policy chooses, the robot performs.
 
-As a program: ``python -m mplearn_agents.walk --policy random --steps 20 --video walk.mp4``, or
-``--task goal --policy search --episodes 5``. What it does, to copy and to change::
+As a program: ``mplearn perform --policy random --steps 20 --video walk.mp4``, or ``--task goal
+--policy search --episodes 5``. What it does, to copy and to change::
 
     import gymnasium as gym
     import mplearn_envs
@@ -22,7 +22,6 @@ As a program: ``python -m mplearn_agents.walk --policy random --steps 20 --video
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from typing import Any
 
@@ -187,9 +186,3 @@ def walk(
         episodes=n_ended,
         successes=sum(outcomes) if len(outcomes) == n_ended else None,
     )
-
-
-if __name__ == "__main__":
-    from .cli import main
-
-    sys.exit(main(["perform", *sys.argv[1:]]))

@@ -52,7 +52,8 @@ def test_perform_writes_a_film(renderer, library_file, tmp_path):
     command = [
         sys.executable,
         "-m",
-        "mplearn_agents.walk",
+        "mplearn_agents.cli",
+        "perform",
         library_file,
         "--steps",
         "1",

@@ -5,7 +5,7 @@ from standing_library import standing_library
 
 from mplearn_agents.cli import main
 from mplearn_agents.contests import contest
-from mplearn_agents.contests.episodes import play
+from mplearn_agents.episodes import play
 from mplearn_agents.policies import RandomWalk
 
 pytest.importorskip("sb3_contrib")

@@ -8,7 +8,7 @@ import pytest
 
 import mplearn_envs  # noqa: F401  (registers the environment)
 from mplearn.errors import InvalidValueError
-from mplearn_agents.contests.episodes import play
+from mplearn_agents.episodes import play
 from mplearn_agents.policies import PathToTask
 from mplearn_agents.policies.experienced import Experience, Experienced, explore
 

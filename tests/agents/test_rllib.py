@@ -30,7 +30,7 @@ def trained(options):
 
 @pytest.mark.filterwarnings("default")
 def test_no_agent_takes_an_illegal_action(trained, options):
-    from mplearn_agents.contests.episodes import play
+    from mplearn_agents.episodes import play
     from mplearn_agents.rl.rllib import ClusterPolicy, make_environment
 
     env = make_environment(options)

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from mplearn.errors import InvalidValueError, RobotError, UnknownPrimitiveError
-from mplearn_agents.contests.suited import NEEDS_TASK
 from mplearn_agents.policies import (
     POLICIES,
     Greedy,
@@ -13,6 +12,7 @@ from mplearn_agents.policies import (
     Policy,
     RandomWalk,
 )
+from mplearn_agents.suited import NEEDS_TASK
 from mplearn_agents.walk import walk
 from mplearn_envs.skills.feasibility import FeasibilityConfig
 

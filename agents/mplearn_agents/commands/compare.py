@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from mplearn_agents.contests.suited import SUITED
+from mplearn_agents.suited import SUITED
 from mplearn_agents.terminal.arguments import count, positive, seed
 
 if TYPE_CHECKING:

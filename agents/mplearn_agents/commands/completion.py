@@ -19,9 +19,7 @@ def run(args: argparse.Namespace) -> None:
 
     import shtab
 
-    from mplearn_agents.cli import build_parser
-
-    parser = build_parser()
+    parser = args.build_parser()
     for each in _parsers(parser):
         for action in each._actions:
             if action.type is Path:

@@ -7,7 +7,7 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from mplearn_agents.contests.suited import suited
+from mplearn_agents.suited import suited
 from mplearn_agents.terminal.arguments import count, positive, seed
 
 if TYPE_CHECKING:

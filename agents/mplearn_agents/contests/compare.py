@@ -19,7 +19,7 @@ from mplearn.evaluation import Table
 from mplearn.recording import FloatArray
 from mplearn_agents.contests.comparison import SLOW, Comparison
 from mplearn_agents.contests.contest import Contest
-from mplearn_agents.contests.episodes import Episode
+from mplearn_agents.episodes import Episode
 
 COLUMNS = ("task", "dynamics", "policy", "return", "share of the best", "success", "falls", "time")
 CONFIDENCE = 0.95

@@ -7,10 +7,10 @@ from typing import get_args
 
 from mplearn.errors import InvalidValueError
 from mplearn_agents.contests.contest import Contest, Game
-from mplearn_agents.contests.suited import NEEDS_TASK, SUITED, suited
 from mplearn_agents.policies import POLICIES
 from mplearn_agents.rl import TrainingConfig
 from mplearn_agents.rl.config import USUAL_SPEED, AlgorithmName, EnvVersion, PriorUse
+from mplearn_agents.suited import NEEDS_TASK, SUITED, suited
 from mplearn_envs.execution.bodies import BodyName
 from mplearn_envs.execution.modes import Dynamics
 from mplearn_envs.tasks import TASKS

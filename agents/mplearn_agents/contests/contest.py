@@ -10,7 +10,7 @@ from typing import Any
 import gymnasium
 
 import mplearn_envs  # noqa: F401  (registers the environment)
-from mplearn_agents.contests.episodes import Episode, play
+from mplearn_agents.episodes import Episode, play
 from mplearn_agents.policies import POLICIES, Policy
 from mplearn_agents.rl import TrainedPolicy, TrainingConfig
 from mplearn_agents.rl.config import USUAL_SPEED, EnvVersion

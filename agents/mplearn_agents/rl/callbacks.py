@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from stable_baselines3.common.callbacks import BaseCallback
 
-from mplearn_agents.contests.episodes import Episode, play
+from mplearn_agents.episodes import Episode, play
 from mplearn_agents.policies import Policy
 
 from .config import TrainingConfig

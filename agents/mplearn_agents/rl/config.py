@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
 
 from mplearn.errors import InvalidValueError, MPLearnError
-from mplearn_agents.contests.suited import PriorUse as PriorUse
+from mplearn_agents.suited import PriorUse as PriorUse
 from mplearn_envs.environment.options import ActionOptions
 
 VERSION = 3  # of agents: changes with networks, what they see, and what tasks show

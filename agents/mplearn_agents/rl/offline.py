@@ -12,7 +12,7 @@ import gymnasium
 from mplearn.errors import InvalidValueError
 from mplearn.extras import require
 from mplearn.library import PrimitiveLibrary
-from mplearn_agents.contests.episodes import Episode, play
+from mplearn_agents.episodes import Episode, play
 from mplearn_agents.policies import Policy
 from mplearn_envs.environment.plain import to_plain
 

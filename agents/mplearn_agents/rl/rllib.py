@@ -34,7 +34,7 @@ from ray.rllib.evaluation.postprocessing import Postprocessing
 from ray.tune.registry import register_env
 from torch import nn
 
-from mplearn_agents.contests.episodes import play
+from mplearn_agents.episodes import play
 from mplearn_agents.policies import Policy
 
 from .encoding import FAR, LEAST_PRIOR, PRIOR, measure_scaling

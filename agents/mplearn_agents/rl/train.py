@@ -1,6 +1,6 @@
 """Trains an agent in rounds, with checkpoints, evaluations and a log; goes on where it stopped.
 
-As a program: ``python -m mplearn_agents.rl.train --task goal --out out/goal``. In Python::
+As a program: ``mplearn train --task goal --out out/goal``. In Python::
 
     policy = train(TrainingConfig(task="goal", steps=60_000), "out/goal")
     action = policy.act(observation, info)
@@ -8,7 +8,6 @@ As a program: ``python -m mplearn_agents.rl.train --task goal --out out/goal``. 
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -148,9 +147,3 @@ def _steps_done(config: TrainingConfig, out: Path, resume: bool) -> int:
         raise InvalidValueError(f"{out} holds another training, {before}, not {config}")
     found = sorted(out.glob("checkpoint-*.zip"))
     return int(found[-1].stem.removeprefix("checkpoint-")) if found else 0
-
-
-if __name__ == "__main__":
-    from mplearn_agents.cli import main
-
-    sys.exit(main(["train", *sys.argv[1:]]))

@@ -158,7 +158,7 @@ def test_an_episode_starts_at_one_primitive_and_its_goal_is_far(env):
 @pytest.mark.parametrize("task", ["goal", "recite"])
 def test_the_quickest_way_earns_what_is_said_to_be_the_best(task):
     """And no other policy more."""
-    from mplearn_agents.contests.episodes import play
+    from mplearn_agents.episodes import play
     from mplearn_agents.policies import POLICIES
 
     env = make(task=task, people="test")
