@@ -18,10 +18,29 @@ KEYS = re.findall(
 SOURCE = re.compile(rf"\[({'|'.join(KEYS)})\b")
 
 #: Where the packages lie whose rooms get a page of the reference each.
-PACKAGES = {"mplearn": "mplearn", "mplearn_envs": "envs/mplearn_envs"}
+PACKAGES = {
+    "mplearn": "mplearn",
+    "mplearn_envs": "envs/mplearn_envs",
+    "mplearn_agents": "agents/mplearn_agents",
+}
 
-#: Modules beside the rooms that get a page, too.
-MODULES = ("mplearn.errors", "mplearn.recording", "mplearn_envs.checks")
+#: Modules that get a page, too: beside the rooms, or of rooms whose doors import nothing.
+MODULES = (
+    "mplearn.errors",
+    "mplearn.recording",
+    "mplearn.maths.rotations",
+    "mplearn_envs.checks",
+    *(
+        f"mplearn_envs.environment.{name}"
+        for name in ("primitive_humanoid", "varied_humanoid", "online", "vector", "options")
+    ),
+    *(f"mplearn_envs.skills.{name}" for name in ("feasibility", "repertoire", "skills")),
+    *(
+        f"mplearn_envs.execution.{name}"
+        for name in ("bodies", "sensors", "simulation", "tracking_report")
+    ),
+    "mplearn_agents.walk",
+)
 
 
 def on_page_content(content: str, page: Any, **_: Any) -> str:

@@ -98,7 +98,8 @@ class InverseKinematics:
     Args:
         body: The body whose angles are wanted.
         marker_names: Names of the M markers of every frame; names that the set does not know are
-        ignored. rate_hz: Frames per second [1/s].
+            ignored.
+        rate_hz: Frames per second [1/s].
         config: Assumptions of the solver.
         markers: Where the markers sit; found by their names where not given.
 
