@@ -169,17 +169,17 @@ def _delays(session: Recording, seconds: float) -> list[tuple[str, str, str, str
 
 
 def _sender(session: Recording, folder: Path, to: str) -> list[str]:
-    """Return the command that sends a session from a process of its own."""
+    """Return the command that sends a session again and again from a process of its own."""
     path = folder / "session.npy"
     np.save(path, session.frames)
     names = ",".join(session.marker_names)
     code = (
-        "import sys, numpy as np; from mplearn.recording import marker_channels; "
+        "import itertools, sys, numpy as np; from mplearn.recording import marker_channels; "
         "from mplearn.sources import Stream; from mplearn.sources.played import PlayedSource; "
         "from mplearn.sources.sending import open_sender, send; "
         "channels = marker_channels(tuple(sys.argv[2].split(','))); "
         "stream = Stream(channels, 100.0, unit_m=1.0, up='z'); "
-        "played = PlayedSource(stream, [np.load(sys.argv[1])]); "
+        "played = PlayedSource(stream, itertools.repeat(np.load(sys.argv[1]))); "
         "s = open_sender(sys.argv[3]); send(played, s.__enter__())"
     )
     return [sys.executable, "-c", code, str(path), names, to]

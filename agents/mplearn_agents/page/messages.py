@@ -20,6 +20,7 @@ from mplearn.errors import InvalidValueError
 Header = dict[str, Any]
 Poses = NDArray[np.float32]
 
+LONGEST_REQUEST = 8192  # characters
 TICK, CLIP = 1, 2
 _TICK = struct.Struct("<BBHHHII")  # kind, 0, bodies of person and robot, channels, first row, rows
 _CLIP = struct.Struct("<BBHIfI")  # kind, 0, bodies, number of the request, rate, motions
@@ -85,8 +86,10 @@ def request(text: str) -> Header:
     """Return what a page asks for.
 
     Raises:
-        InvalidValueError: It is no JSON object with a string ``do``.
+        InvalidValueError: It is too long, or no JSON object with a string ``do``.
     """
+    if len(text) > LONGEST_REQUEST:
+        raise InvalidValueError(f"a request has at most {LONGEST_REQUEST} characters")
     try:
         asked = json.loads(text)
     except (ValueError, RecursionError) as error:

@@ -14,7 +14,8 @@ from mplearn.extras import require
 from mplearn_agents.terminal.interrupts import python_interrupts
 
 from .hub import Hub
-from .server import LONGEST_REQUEST, is_loopback, make_app
+from .messages import LONGEST_REQUEST
+from .server import is_loopback, make_app
 from .watching import Watch
 
 

@@ -25,7 +25,6 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from .hub import TICK_S, Client, Hub
 
-LONGEST_REQUEST = 8192  # bytes
 _BETWEEN_REQUESTS_S = 0.02
 _MOST_CLIENTS = 200
 _TYPES = {
@@ -80,8 +79,7 @@ def make_app(hub: Hub, *, token: str = "") -> Starlette:
         try:
             while True:
                 text = await websocket.receive_text()
-                if len(text) <= LONGEST_REQUEST:
-                    hub.ask(client, text)
+                hub.ask(client, text)
                 await asyncio.sleep(_BETWEEN_REQUESTS_S)
         except (WebSocketDisconnect, KeyError):  # KeyError: bytes, which no page of ours sends
             pass

@@ -217,7 +217,7 @@ class Watcher:
         if not block.joins and self._arrivals:
             self._tell(lifelong.end_stream())
             figure.end_stream()
-        self._tell(lifelong.learn_many(block.frames, block.times_s))
+        self._tell(lifelong.learn_many(block.frames))  # dated by the clock
         came = block.arrived_s[np.isfinite(block.arrived_s)]
         now = time.monotonic()
         self._delays.extend((now - came).tolist())

@@ -57,6 +57,20 @@ def test_300_primitives_are_legible(server, shown):
             assert apart, "names must not cover each other"
 
 
+def test_it_rests_while_nothing_moves(shown):
+    """A page that is left open costs a machine next to nothing; touched, it is awake at once."""
+    rate = "Number(document.documentElement.dataset.fps)"
+    shown.mouse.move(200, 200)
+    until(lambda: 0 < shown.evaluate(rate) <= 6, 15, "a few pictures a second")
+    steps = itertools.count()
+
+    def awake():
+        shown.mouse.move(200 + next(steps) % 200, 200)
+        return shown.evaluate(rate) > 6
+
+    until(awake, 15, "as many as can be drawn")
+
+
 def test_the_tree_folds_and_is_searched(shown):
     inner = shown.locator("#tree [data-fold]")
     n, before = inner.count(), rows(shown).count()

@@ -4,6 +4,7 @@ import itertools
 import json
 import struct
 import threading
+import time
 from multiprocessing import Pipe
 
 import numpy as np
@@ -314,6 +315,7 @@ def test_frames_that_cannot_be_learned_cost_nothing_else():
     for each in (block("a", "b"), block("a"), block("a", "b")):
         watcher._try(each)
     assert watcher._lifelong.n_frames == 20
+    assert abs(watcher._lifelong.state().chunk_when - time.time()) < 60  # dated by the clock
     assert any("10 frames were not learned" in str(h.get("text")) for h, _ in kept.posted)
     theirs.close()
 

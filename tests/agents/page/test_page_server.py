@@ -142,6 +142,7 @@ def test_ticks_carry_what_moves_and_every_row_once(server):
         ("[]", "object"),
         ('{"do": 3}', "string"),
         ('{"do": "__init__"}', "nobody knows"),
+        ('{"do": "undo", "by": "' + "x" * 9000 + '"}', "at most 8192"),
     ],
 )
 def test_bad_requests_are_answered_with_the_reason(server, request_, why):

@@ -87,17 +87,18 @@ export class Graph {
     return true;
   }
 
+  // Draw what has changed; return whether it is still finding its place.
   draw() {
     const width = this.svg.clientWidth, height = this.svg.clientHeight;
-    if (!width || !height) return;
+    if (!width || !height) return false;
     if (this.size !== `${width} ${height}`) { this.size = `${width} ${height}`; this.stale = true; }
+    let moved = false;
     if (!this.around) {
       const rounds = this.ids.length > 60 ? 12 : 2;
-      let moved = false;
       for (let k = 0; k < rounds; k++) moved = this.settle(width / height) || moved;
-      if (!moved && !this.stale) return;
-      if (this.ids.length > 60 && this.heat > 0.05 && !this.stale) return; // large ones are drawn when they lie
-    } else if (!this.stale) return;
+      if (!moved && !this.stale) return false;
+      if (this.ids.length > 60 && this.heat > 0.05 && !this.stale) return moved; // large ones are drawn when they lie
+    } else if (!this.stale) return false;
     this.stale = false;
     set(this.svg, { viewBox: `0 0 ${width} ${height}` });
     const size = parseFloat(getComputedStyle(this.svg).fontSize) || 13;
@@ -111,6 +112,7 @@ export class Graph {
     } else if (this.around) this.drawAround(width, height, size);
     else this.drawWhole(width, height, size);
     this.nodes.keep(this.used);
+    return moved;
   }
 
   drawWhole(width, height, size) {

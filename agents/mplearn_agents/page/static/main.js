@@ -29,12 +29,12 @@ const card = new Card(find("#card"), { world, label, ask, choose, pick, text: (t
 // ---- what is heard
 
 function heard(message) {
+  if (message.kind !== "tick" && message.kind !== "status") wake();
   switch (message.kind) {
     case "open": find("#lost").hidden = true; break;
     case "closed": lost(message.code); break;
     case "tick":
-      stage.pose("person", message.person);
-      stage.pose("robot", message.robot);
+      if (stage.pose("person", message.person) + stage.pose("robot", message.robot) + message.n > 0) wake();
       stream.take(message);
       break;
     case "clip": if (message.ref === asked) { stage.show(message); root.dataset.shown = asked; } break;
@@ -310,9 +310,19 @@ function style() {
   });
 }
 
+// While nothing moves, comes or is touched, a few pictures a second do.
+const AWAKE = 2000, IDLE = 250;   // ms
+let awake = performance.now(), painted = 0;
+function wake() { awake = performance.now(); }
+for (const kind of ["pointerdown", "pointermove", "wheel", "keydown", "input", "focusin", "resize"]) {
+  addEventListener(kind, wake, { capture: true, passive: true });
+}
+
 let frames = 0, since = performance.now();
 function draw(now) {
   requestAnimationFrame(draw);
+  if (now - awake > AWAKE && !stage.shown && now - painted < IDLE) return;
+  painted = now;
   frames++;
   if (now - since > 1000) {
     root.dataset.fps = ((1000 * frames) / (now - since)).toFixed(1);
@@ -322,7 +332,7 @@ function draw(now) {
   }
   stage.draw(root.dataset.theme, style());
   stream.draw(style(), label);
-  graph.draw();
+  if (graph.draw()) wake();
   side.coming(world.forecast, (frame) => stream.seconds(frame) - stream.now);
 }
 

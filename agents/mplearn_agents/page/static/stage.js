@@ -27,6 +27,7 @@ const LOOKS = {
     shadow: "rgba(0,0,0,.35)",
   },
 };
+const SEEN = 5e-4; // metres, or in a quaternion: by less nobody sees a figure move from tick to tick
 const LIGHT = [-0.34, 0.44]; // towards the light, on the screen, in radii
 
 export class Stage {
@@ -48,15 +49,19 @@ export class Stage {
     this.figures = { person: person.map(prepared), robot: robot.map(prepared) };
   }
 
-  // Take the latest pose of a figure, 7 numbers a body.
+  // Take the latest pose of a figure, 7 numbers a body; return whether that is to be seen.
   pose(name, poses) {
     const now = performance.now(), known = this.moving[name];
-    if (!poses.length) { delete this.moving[name]; return; }
+    if (!poses.length) { delete this.moving[name]; return Boolean(known); }
     if (known && known.to.length === poses.length) {
+      const moved = poses.some((value, k) => Math.abs(value - known.to[k]) > SEEN);
       known.from = blended(known, now);
       known.to = poses;
       known.at = now;
-    } else this.moving[name] = { from: poses, to: poses, at: now, x: poses[0], y: poses[1] };
+      return moved;
+    }
+    this.moving[name] = { from: poses, to: poses, at: now, x: poses[0], y: poses[1] };
+    return true;
   }
 
   // Show a primitive: the motion itself, with its demonstrations around it.
