@@ -93,13 +93,18 @@ def _leaf_of(structure: Structure, members: Sequence[int], limit: float) -> Node
     A motion must not become a primitive twice.
     """
     bank = structure.memory.bank
+    first, *others = members
+    leaves = [structure.nodes[id] for id in structure.index.near(bank[first], bank)]
+    if not leaves:
+        return None
+    sizes = np.array([len(leaf.members) for leaf in leaves])
+    row = bank.distances(bank[first], [number for leaf in leaves for number in leaf.members])
     best, found = limit, None
-    for id in structure.index.near(bank[members[0]], bank):
-        leaf, far = structure.nodes[id], 0.0
-        for number in members:
-            far = max(far, float(bank.distances(bank[number], leaf.members).max()))
+    for leaf, far in zip(leaves, np.maximum.reduceat(row, np.cumsum(sizes) - sizes), strict=True):
+        for number in others:
             if far > best:
                 break
+            far = max(far, bank.distances(bank[number], leaf.members).max())
         if far <= best:
             best, found = far, leaf
     return found

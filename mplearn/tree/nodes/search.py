@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
+from functools import cache
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -97,8 +98,11 @@ class NodeIndex:
         self.members: list[list[int]] = []
         self._known = np.zeros(0, _KNOWN)
         self._leaf_ids: tuple[int, ...] | None = None
-        n_values = bank.n_channels * config.normalisation.n_points
-        self._of_node = SlotArrays((n_values,), (config.max_exemplars,))  # mean, `nearest_others`
+        self._waves = _slow_waves(config.normalisation.n_points)
+        n_values = bank.n_channels * len(self._waves)
+        n_slow = bank.n_channels * self._waves.shape[1]
+        # mean, `nearest_others`, the mean's slow part
+        self._of_node = SlotArrays((n_values,), (config.max_exemplars,), (n_slow,))
 
     @property
     def ids(self) -> IntArray:
@@ -178,7 +182,8 @@ class NodeIndex:
             others = np.full(self.config.max_exemplars, np.nan)
             if matrix is not None and len(matrix) > 1:
                 others[: len(matrix)] = nearest_others(matrix, self.config.n_nearest)
-            self._of_node.write(int(known["slot"]), (bank.mean_profile(members), others))
+            mean = bank.mean_profile(members)
+            self._of_node.write(int(known["slot"]), (mean, others, self._slow(mean)))
 
     def remeasured(self, nodes: Mapping[int, Node], bank: ExemplarBank) -> None:
         """Take note of new distances in nodes, by id, and of the new models of their exemplars."""
@@ -186,11 +191,11 @@ class NodeIndex:
         for k, id in enumerate(self.ids.tolist()):
             matrix, slot = nodes[id].matrix, int(self._known["slot"][k])
             self._known["diameter"][k] = nodes[id].diameter
-            mean, others = self._of_node.read(slot)
+            mean, others, slow = self._of_node.read(slot)
             if len(matrix) > 1:
                 others = others.copy()
                 others[: len(matrix)] = nearest_others(matrix, n_nearest)
-                self._of_node.write(slot, (mean, others))
+                self._of_node.write(slot, (mean, others, slow))
         self._known["extent"] = _mean_extents(bank, self.members)
 
     def scale(self, but: int | None = None) -> float:
@@ -199,9 +204,13 @@ class NodeIndex:
         It is 0 where there is no leaf.
         """
         chosen = self.leaves & (self.ids != but) if but is not None else self.leaves
-        diameters = np.sort(self._diameters()[chosen])
+        diameters = self._diameters()[chosen]
         n = len(diameters)
-        return float(diameters[(n - 1) // 2] + diameters[n // 2]) / 2 if n else 0.0
+        if not n:
+            return 0.0
+        middle = (n - 1) // 2, n // 2
+        diameters = np.partition(diameters, middle)
+        return float(diameters[middle[0]] + diameters[middle[1]]) / 2
 
     def _diameters(self) -> FloatArray:
         """Return the diameters of the nodes, those of young ones as they will be, shape (n,)."""
@@ -254,16 +263,38 @@ class NodeIndex:
         return found
 
     def _candidates(self, exemplar: Exemplar, bank: ExemplarBank) -> IntArray:
-        """Return the places of the leaves nearest by mean trajectory; of all if that is asked."""
+        """Return the places of the leaves nearest by mean trajectory; of all if that is asked.
+
+        No mean is nearer than its slow part is, which is short: few means are looked at in full.
+        """
         if not self.config.n_candidates:
             return np.flatnonzero(self.leaves)
         if len(self.ids) <= self.config.n_candidates:
             return np.arange(len(self.ids))
-        profile, slots = bank.profile(exemplar), self._known["slot"]
-        nearness, best = np.empty(len(slots)), np.full(self.config.n_candidates, np.inf)
-        for (means, _), rows, here in self._of_node.parted(slots):
-            nearness[here] = _squared_offsets(means, rows, profile, best)
-        return np.sort(np.argsort(nearness, kind="stable")[: self.config.n_candidates])
+        profile, slots, n = bank.profile(exemplar), self._known["slot"], self.config.n_candidates
+        slow = self._slow(profile)
+        nearness, at_least = np.full(len(slots), np.inf), np.empty(len(slots))
+        for (_, _, parts), rows, here in self._of_node.parted(slots):
+            at_least[here] = _all_squared_offsets(parts, rows, slow)
+        best, first = np.full(n, np.inf), np.argpartition(at_least, n)[:n]
+        self._measure(nearness, first, profile, best)
+        most = best[-1] + _ROUNDING * (best[-1] + slow @ slow)
+        near = at_least <= most
+        near[first] = False
+        self._measure(nearness, np.flatnonzero(near), profile, best)
+        seen = np.flatnonzero(np.isfinite(nearness))
+        return np.sort(seen[np.argsort(nearness[seen], kind="stable")[:n]])
+
+    def _measure(
+        self, nearness: FloatArray, places: IntArray, profile: FloatArray, best: FloatArray
+    ) -> None:
+        """Measure how near the means at some places are, as far as they are among the best."""
+        for (means, _, _), rows, here in self._of_node.parted(self._known["slot"][places]):
+            nearness[places[here]] = _squared_offsets(means, rows, profile, best)
+
+    def _slow(self, profile: FloatArray) -> FloatArray:
+        """Return the slow part of a profile, shape (D * P,) to (D * W,)."""
+        return np.asarray((profile.reshape(-1, len(self._waves)) @ self._waves).ravel())
 
     def _compare(self, exemplar: Exemplar, bank: ExemplarBank, places: IntArray) -> Sight:
         row = bank.distances(exemplar, [m for k in places.tolist() for m in self.members[k]])
@@ -355,6 +386,30 @@ def _mean_extents(bank: ExemplarBank, groups: Sequence[Sequence[int]]) -> FloatA
     sizes = np.array([len(group) for group in groups], np.int64)
     extents = bank.extents([number for group in groups for number in group])
     return np.asarray(np.add.reduceat(extents, np.cumsum(sizes) - sizes) / sizes)
+
+
+_N_WAVES = 3  # that motions mostly consist of
+_ROUNDING = 1e-9
+
+
+@cache
+def _slow_waves(n_points: int) -> FloatArray:
+    """Return the slowest cosine waves over some points, orthonormal, shape (P, W) [Ahmed1974]."""
+    n_waves = min(_N_WAVES, n_points)
+    waves = np.cos(np.pi * np.outer(np.arange(n_points) + 0.5, np.arange(n_waves)) / n_points)
+    return np.asarray(waves / np.sqrt((waves**2).sum(axis=0)))
+
+
+@njit(cache=True)
+def _all_squared_offsets(means: FloatArray, rows: IntArray, profile: FloatArray) -> FloatArray:
+    """Return the squared distance of some means (n, F) to a profile (F,), shape (k,)."""
+    out = np.empty(len(rows))
+    for k, row in enumerate(rows):
+        mean, total = means[row], 0.0
+        for f in range(len(profile)):
+            total += (mean[f] - profile[f]) ** 2
+        out[k] = total
+    return out
 
 
 _PART = 64  # values after which it is asked whether the sum is too large already
