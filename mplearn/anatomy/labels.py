@@ -108,12 +108,17 @@ def names_joints(labels: tuple[str, ...]) -> bool:
     """Whether labels are those of joints: hips are named, and no point of the pelvis' skin is."""
     ways = [way for label in labels for way in read_label(label)]
     hips = any(stem in ("hip", "hjc", "upleg") and side for stem, side in ways)
+    return hips and not names_skin(labels)
+
+
+def names_skin(labels: tuple[str, ...]) -> bool:
+    """Whether labels name points of the pelvis' skin, as those of markers do."""
+    ways = [way for label in labels for way in read_label(label)]
     skin = _lookup(SKIN_SIDED)
-    pelvis = any(
+    return any(
         skin.get(stem) in ("iliac_front", "iliac_back", "trochanter") and side
         for stem, side in ways
     )
-    return hips and not pelvis
 
 
 def _lookup(table: dict[str, str]) -> dict[str, str]:

@@ -38,6 +38,22 @@ def left_of_pair(first: Sequence[str], second: Sequence[str]) -> int:
     return (total > 0) - (total < 0)
 
 
+def sides_of(names: Sequence[str]) -> list[int]:
+    """Return 1 for each name that is the left one of a pair, -1 for the right one, 0 for others.
+
+    Example:
+        >>> sides_of(["Hip", "LThigh", "RThigh", "LHand"])
+        [0, 1, -1, 0]
+    """
+    small = [name.lower() for name in names]
+    sides = [0] * len(names)
+    for k, left in enumerate(small):
+        for j, right in enumerate(small):
+            if j != k and _exchanged(left, right):
+                sides[k], sides[j] = 1, -1
+    return sides
+
+
 def _exchanged(left: str, right: str) -> bool:
     """Whether a word for left in one name is a word for right at the same place in the other."""
     for l_word, r_word in _SIDES:

@@ -12,6 +12,8 @@ from ..body import find_marker_set
 from ..errors import BodyError, MPLearnError
 from ..recording import Recording, marker_channels
 from .body_map import BodyMap
+from .bones import with_bones
+from .labels import names_skin, without_shared_prefix
 from .markers import recognise_markers
 from .skeletons import recognise_skeleton
 
@@ -35,11 +37,12 @@ class Bodies:
 
 
 def recognise(recording: Recording, *, names: Mapping[str, str] | None = None) -> BodyMap:
-    """Find the body in a recording of markers, or of joint positions with their skeleton.
+    """Find the body in a recording of markers, or of joint positions with or without a skeleton.
 
     Args:
         recording: Markers [m], or joint positions, best with the joints' axes
-            (`Hints.joint_axes`).
+            (`Hints.joint_axes`). Points without a skeleton that hang together by bones are joints,
+            whatever their names are those of among markers.
         names: Place of the body by point, for what is known better; "" leaves a point out.
 
     Raises:
@@ -56,6 +59,10 @@ def recognise(recording: Recording, *, names: Mapping[str, str] | None = None) -
     """
     if recording.skeleton is not None and recording.is_markers:
         return recognise_skeleton(recording, names)
+    on_skin = recording.is_markers and names_skin(without_shared_prefix(recording.marker_names))
+    hanging = None if names or on_skin else with_bones(recording)
+    if hanging is not None:
+        return recognise_skeleton(hanging)
     return recognise_markers(recording, names)
 
 

@@ -63,6 +63,9 @@ def _draw(args: argparse.Namespace, found: list[Inspection], console: Console) -
 
     if args.no_picture:
         return
+    shown = [each for each in found if each.recording.is_markers]
+    if not shown and args.picture is None:
+        return  # channels alone: there is nothing to draw
     if args.picture is None and find_spec("matplotlib") is None:
         console.print("no picture: it needs pip install 'mplearn[report]'")
         return
@@ -71,8 +74,9 @@ def _draw(args: argparse.Namespace, found: list[Inspection], console: Console) -
 
     path = args.picture or Path(f"{args.data.absolute().name.split('.')[0] or 'takes'}.png")
     path.parent.mkdir(parents=True, exist_ok=True)
-    step = -(-len(found) // _MOST_ROWS)
-    draw(found[::step], path)
+    shown = shown or found
+    step = -(-len(shown) // _MOST_ROWS)
+    draw(shown[::step], path)
     if not args.json:
         more = f" of every {step}th take" if step > 1 else ""
         console.print(f"stick figures{more} written to {path}")

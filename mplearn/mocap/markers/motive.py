@@ -93,7 +93,11 @@ def _block(sheet: Sheet, findings: Findings) -> Block:
     # a name counts only where the column is of the kind that is wanted
     chosen = [cell if keep else "" for cell, keep in zip(above[axes], kept, strict=True)]
     names, columns = marker_columns(name, chosen)
-    left = {n: None for n, k, keep in zip(name, kind, kept, strict=True) if n and not keep and k}
+    left = {
+        n: None
+        for n, k, keep in zip(name, kind, kept, strict=True)
+        if n and not keep and k in _KINDS
+    }
     findings.leave_out(n for n in left if n not in names)
     if wanted == ("bone",):
         findings.note("there are no markers: the positions of bones are read")

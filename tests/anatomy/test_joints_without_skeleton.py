@@ -1,0 +1,93 @@
+"""Joints of a table, of which nobody says what joins them: by the bones they are a person's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from known_person import RATE_HZ, Truth
+from other_formats import limbs_of
+
+from mplearn.anatomy import recognise
+from mplearn.anatomy.bones import with_bones
+from mplearn.errors import BodyError
+from mplearn.recording import Recording, marker_channels
+
+# fmt: off
+JOINTS = (
+    *("Hips", "Spine", "Spine1", "Neck", "Neck_end"),
+    *(f"{s}{j}" for s in ("Left", "Right") for j in ("Shoulder", "Arm", "ForeArm", "Hand")),
+    *(f"{s}{j}" for s in ("Left", "Right") for j in ("UpLeg", "Leg", "Foot", "Toe")),
+)
+_MIDDLE = {
+    "LAFAN1": "Hips Spine Spine1 Neck Head",
+    "Motive": "Hip Ab Chest Neck Head",
+    "Xsens": "Pelvis L5 T8 Neck Head",
+    "CMU": "root lowerback thorax lowerneck head",
+    "Biped": "Pelvis Spine Spine1 Neck Head",
+}
+_SIDED = {
+    "LAFAN1": ("LeftShoulder LeftArm LeftForeArm LeftHand", "LeftUpLeg LeftLeg LeftFoot LeftToe"),
+    "Motive": ("LShoulder LUArm LFArm LHand", "LThigh LShin LFoot LToe"),
+    "Xsens": ("LeftShoulder LeftUpperArm LeftForeArm LeftHand",
+              "LeftUpperLeg LeftLowerLeg LeftFoot LeftToe"),
+    "CMU": ("lclavicle lhumerus lradius lhand", "lfemur ltibia lfoot ltoes"),
+    "Biped": ("L_Clavicle L_UpperArm L_Forearm L_Hand", "L_Thigh L_Calf L_Foot L_Toe0"),
+}
+# fmt: on
+
+
+def names_in(dialect: str) -> list[str]:
+    middle = _MIDDLE[dialect].split()
+    arms, legs = (part.split() for part in _SIDED[dialect])
+    other = {"Left": "Right", "L": "R", "l": "r"}
+    side = next(word for word in other if arms[0].startswith(word))
+
+    def right(names: list[str]) -> list[str]:
+        return [other[side] + name.removeprefix(side) for name in names]
+
+    return [*middle, *arms, *right(arms), *legs, *right(legs)]
+
+
+@pytest.fixture(scope="module")
+def joints(truth: Truth) -> Recording:
+    limbs = limbs_of(truth.body, truth.postures)
+    points = limbs.places[:, [limbs.names.index(joint) for joint in JOINTS]]
+    return Recording(points.reshape(len(points), -1), RATE_HZ, marker_channels(JOINTS), "table")
+
+
+@pytest.mark.parametrize("dialect", _MIDDLE)
+def test_joints_of_any_names_are_the_person(truth: Truth, joints: Recording, dialect: str) -> None:
+    order = np.random.default_rng(1).permutation(len(JOINTS))
+    names = [names_in(dialect)[i] for i in order]
+    frames = joints.markers[:, order].reshape(len(joints), -1)
+    table = replace(joints, frames=np.round(frames, 4), channels=marker_channels(tuple(names)))
+    body = recognise(table)
+    angles, points_mm = truth.errors(body.apply(table))
+    assert np.median(angles) < 3.0 and np.median(points_mm) < 15.0
+    assert np.quantile(np.median(angles, axis=0), 0.9) < 6.0  # a thigh taken for a knee is 30 off
+
+
+def test_bones_are_those_of_the_person(joints: Recording) -> None:
+    hanging = with_bones(joints)
+    assert hanging is not None and hanging.skeleton is not None
+    names, parents = hanging.skeleton.names, hanging.skeleton.parents
+    pairs = {frozenset((names[k], names[p])) for k, p in enumerate(parents) if p >= 0}
+    for a, b in (("UpLeg", "Leg"), ("Leg", "Foot"), ("Foot", "Toe"), ("Arm", "ForeArm")):
+        assert all(frozenset((f"{s}{a}", f"{s}{b}")) in pairs for s in ("Left", "Right"))
+
+
+def test_who_is_mirrored_is_refused(joints: Recording) -> None:
+    mirrored = joints.markers * [1.0, -1.0, 1.0]
+    with pytest.raises(BodyError, match="mirrored"):
+        recognise(replace(joints, frames=mirrored.reshape(len(joints), -1)))
+
+
+def test_what_does_not_hang_together_has_no_bones(truth: Truth, joints: Recording) -> None:
+    assert with_bones(truth.markers) is None  # on skin
+    still = np.repeat(joints.frames[:1], 50, axis=0)
+    assert with_bones(replace(joints, frames=still)) is None  # nobody moves
+    noise = 0.02 * np.random.default_rng(0).normal(size=joints.frames.shape)
+    assert with_bones(replace(joints, frames=joints.frames + noise)) is None
+    assert with_bones(joints.sliced(0, 2)) is None
