@@ -28,6 +28,12 @@ from .tracking_report import TrackingReport as TrackingReport
 Feedback: TypeAlias = Literal["steps", "always", "never"]
 SETTLE_S = 1.0
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+_DIVERGED = (
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+)
+_WILD = 1e3  # no robot is so fast [m/s, rad/s]
 
 
 class Simulation:
@@ -148,7 +154,7 @@ class Simulation:
             self._update_positions()
             if on_frame is not None:
                 on_frame()
-        return assess(self.robot, plan, track.q[: done + 1], track.v[: done + 1], fallen)
+        return self._assess(plan, track, done + 1, fallen)
 
     def _perform_watchful(
         self, plan: Plan, on_frame: Callable[[], None] | None, frame_steps: int, pushes: Pushes
@@ -173,8 +179,8 @@ class Simulation:
         self.data.xfrc_applied[:] = 0.0
         done = int(progress.knot[0])
         known = min(done, n_knots) + 1
-        report = assess(self.robot, plan, track.q[:known], track.v[:known], fallen)
-        if fallen or not progress.awake[0]:
+        report = self._assess(plan, track, known, fallen)
+        if report.fallen or not progress.awake[0]:
             return report
         end = reflexes.arrival(plan, self.data.qpos)
         back = reflexes.return_commands(end, progress.command)
@@ -191,6 +197,23 @@ class Simulation:
             n_steps=int(progress.mind.phase[3]),
             end=end,
         )
+
+    def _assess(self, plan: Plan, track: Track, n: int, fallen: bool) -> TrackingReport:
+        """Compare the first rows of a track with what was planned.
+
+        A simulation diverges where parts are too light for what drives them; MuJoCo then puts the
+        robot back to its zero. That is a fall, with finite numbers.
+        """
+        q, v = track.q[:n], track.v[:n]
+        wild = ~(np.abs(v).max(axis=1) < _WILD) | ~np.isfinite(q).all(axis=1)
+        if wild.any():
+            n = max(2, int(wild.argmax()) + 1)
+            q, v, fallen = q[:n], v[:n], True
+            q[wild[:n]], v[wild[:n]] = q[0], v[0]
+        for each in _DIVERGED:
+            fallen = fallen or self.data.warning[each].number > 0
+            self.data.warning[each].number = 0
+        return assess(self.robot, plan, q, v, bool(fallen))
 
     def soles(self) -> FloatArray:
         """Return the lower corners of both soles, shape (2, 4, 3) [m]."""

@@ -89,7 +89,8 @@ def assess(robot: Robot, plan: Plan, q: FloatArray, v: FloatArray, fallen: bool)
     soles = bearing[1:]
     landed = soles[..., 2].min(axis=2).max(axis=1) < TOUCHES_M
     up = np.where(landed, -1, plan.up[1:n])
-    margin = margins_along(np.ascontiguousarray(soles[..., :2]), up, np.nan_to_num(zmp, nan=np.inf))
+    margin = margins_along(np.ascontiguousarray(soles[..., :2]), up, zmp)
+    margin[~np.isfinite(margin)] = -1.0  # nothing carries, or numbers have lost their meaning
     error = q[1:, 7:] - plan.q[1:n, 7:]
     time = np.arange(1.0, n) * plan.knot_s
     return TrackingReport(

@@ -176,6 +176,27 @@ def test_our_own_humanoid_comes_back_with_actuated_toes():
     assert np.abs(simulation.data.qpos[at]).max() < 1e-3
 
 
+def test_a_simulation_that_diverges_is_a_fall_with_finite_numbers(person, monkeypatch, tmp_path):
+    """A model that says itself how great its torques are keeps its rotors, even if it has none."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes what it warns of into a file there
+    strong = re.sub(
+        r'<joint name="([a-z_]+)"', r'<joint actuatorfrcrange="-200 200" name="\1"', HUMAN.xml
+    )
+    robot = Robot.from_mjcf(strong, "strong", SEGMENTS)
+    hold = Planner(robot).hold(rest_reference(robot), 1.0)
+    for steps in (False, True):
+        simulation = Simulation(robot, body=make_body({"start_rad": 0.05, "steps": steps}))
+        fallen = diverged = 0
+        for draw in range(1, 6):
+            simulation.embody(draw)
+            simulation.reset()
+            report = simulation.perform(hold)
+            assert all(np.isfinite(each).all() for each in report[:4])
+            fallen += report.fallen
+            diverged += not np.ptp(simulation.data.qpos[7:])  # put back to its zero
+        assert fallen >= max(diverged, 3)
+
+
 def test_rotors_of_drives_that_the_model_limits_are_its_own():
     text = biped().replace('name="knee_l"', 'name="knee_l" armature=".3"')
     text = text.replace('name="knee_r"', 'name="knee_r" actuatorfrcrange="-90 90"')
