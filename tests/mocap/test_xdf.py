@@ -46,6 +46,16 @@ def test_millimetres_y_up_and_a_cut_file(tmp_path: Path) -> None:
     assert 0 < len(recording) < 40
 
 
+def test_zeros_and_nines_are_what_was_not_seen(tmp_path: Path) -> None:
+    points = person(40, 6)
+    holed = points.copy()
+    holed[5:9, 2], holed[20:22, 4] = 0.0, -9999.0
+    recording = open_recording(write_xdf(tmp_path / "a.xdf", holed))
+    gone = np.isnan(recording.markers).all(axis=2)
+    assert np.argwhere(gone).tolist() == [*([k, 2] for k in range(5, 9)), [20, 4], [21, 4]]
+    assert recording.markers[~gone] == pytest.approx(points[~gone], abs=1e-6)
+
+
 def test_without_markers(tmp_path: Path) -> None:
     path = write_xdf(tmp_path / "a.xdf")
     for old, new in (
