@@ -89,9 +89,9 @@ class _Cache(FunctionCache):
     def _look(self) -> None:
         """Look at what the kernel is made of; late, for what it calls may be defined after it."""
         if not self._looked:
-            self._looked = True
             file = self._cache_file
             file._source_stamp = (file._source_stamp, fingerprint(self._py_func))
+            self._looked = True
 
 
 def _add(value: Any, found: Any, seen: set[int]) -> None:
