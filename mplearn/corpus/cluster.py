@@ -42,10 +42,21 @@ class RayTasks:
     def submit(self, work: Callable[..., T], *args: Any) -> Future[T]:
         """Have ``work(*args)`` done by one of the cluster's workers."""
         task = self._ray.remote(max_retries=_RETRIES)(work)
-        future: Future[T] = task.remote(*args).future()
+        future: Future[T] = Future()
+        task.remote(*args).future().add_done_callback(lambda done: _pass_on(done, future))
         return future
 
     def close(self) -> None:
         """Leave the cluster, or end the one that was started here."""
         if self._own:
             self._ray.shutdown()
+
+
+def _pass_on(done: Future[T], to: Future[T]) -> None:
+    """Pass on what came of a task; an error of the work as it was raised, without Ray's story."""
+    error = done.exception()
+    if error is None:
+        to.set_result(done.result())
+    else:
+        cause = getattr(error, "cause", None)
+        to.set_exception(cause if isinstance(cause, Exception) else error)

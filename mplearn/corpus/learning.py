@@ -123,7 +123,8 @@ def learn_corpus(
         >>> len(corpus.shards), corpus.progress.learned, len(corpus.learner.snapshot())
         (2, 2, 2)
     """
-    folder, into, reading = Path(folder), Path(into), reading or Reading()
+    folder, into = Path(folder).absolute(), Path(into).absolute()  # workers may be elsewhere
+    reading = reading or Reading()
     found = find_takes(folder)
     takes = [take for take in found.takes if not people or take.person in people]
     if not takes:

@@ -65,14 +65,15 @@ def recognise_corpus(
         RecordingError: There are no recordings.
         LibraryError: There is no such library.
     """
-    known = PrimitiveLibrary.load(Path(library))
+    library, folder = Path(library).absolute(), Path(folder).absolute()  # workers may be elsewhere
+    known = PrimitiveLibrary.load(library)
     observe = "robot" if known.body else "positions" if are_markers(known.channels) else "channels"
     asked = reading or Reading()
     reading = Reading(observe, asked.hints, asked.names)  # type: ignore[arg-type]
     found = find_takes(folder)
     own = executor or (Processes(jobs) if jobs else Here())
     try:
-        done = _all(Path(library), found.takes, reading, own, show)
+        done = _all(library, found.takes, reading, own, show)
     finally:
         if executor is None:
             own.close()

@@ -1,5 +1,6 @@
 """A corpus is the same whatever the workers, and whatever happens to them."""
 
+import contextlib
 import multiprocessing
 import os
 import random
@@ -19,7 +20,17 @@ from corpus_folder import write_take
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mplearn.corpus import Corpus, Progress, Reading, Shard, deal, learn_corpus
+from mplearn.corpus import (
+    Corpus,
+    Progress,
+    Reading,
+    Shard,
+    deal,
+    learn_corpus,
+    recognise_corpus,
+)
+from mplearn.corpus.cluster import _pass_on
+from mplearn.corpus.executors import Here
 from mplearn.corpus.shard import ShardJournal
 from mplearn.errors import CorpusError, InvalidValueError, RecordingError
 from mplearn.merging import merge_learners
@@ -103,6 +114,41 @@ def test_shards_of_one_person_are_merged_first_and_in_any_order(
         assert sum(what.startswith("(") for what in workers.order) == 4  # three, and nobody
         assert not (tmp_path / f"{seed}" / "merged").exists()
     assert len(libraries) == 1
+
+
+class Elsewhere(Here):
+    """Works in another folder, as the machines of a cluster do."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def submit(self, work: Callable[..., Any], *args: Any) -> Future[Any]:
+        with contextlib.chdir(self._folder):
+            return super().submit(work, *args)
+
+
+def test_workers_may_be_elsewhere(
+    folder: Path, alone: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder.parent)
+    workers, into = Elsewhere(tmp_path), Path(os.path.relpath(tmp_path / "s"))
+    corpus = learn_corpus(folder.name, into, executor=workers)
+    assert saved(corpus, tmp_path) == alone
+    library = Path(os.path.relpath(tmp_path / "a.mplearn"))
+    corpus.learner.snapshot().save(library)
+    assert recognise_corpus(library, folder.name, executor=workers).n_takes == 8
+
+
+def test_what_ray_says_of_an_error_is_left_out() -> None:
+    class RayTaskError(RecordingError):
+        cause = RecordingError("no such file")
+
+    plain = OSError("no room")
+    for error, told in ((RayTaskError("a story"), RayTaskError.cause), (plain, plain)):
+        done, to = Future[int](), Future[int]()
+        done.set_exception(error)
+        _pass_on(done, to)
+        assert to.exception() is told
 
 
 def _writer_of(into: Path) -> int:
