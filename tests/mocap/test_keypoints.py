@@ -1,6 +1,7 @@
 """Key points of animals: the same wherever they are, however large, however they are turned."""
 
 import re
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -195,3 +196,20 @@ def test_pictures_that_are_left_out_are_a_gap(tmp_path: Path) -> None:
     take = open_recording(tmp_path / "a_10fps.csv")
     assert len(take) == len(ROWS)
     assert np.flatnonzero(np.isnan(take.frames).all(axis=1)).tolist() == [4, 5, 6, 7, 8]
+
+
+@pytest.mark.parametrize("each", ["track", "node"])
+def test_many_names_far_apart_take_no_memory(tmp_path: Path, each: str) -> None:
+    head = "frame_idx,track,node,x,y,score" if each == "node" else ",".join(SLEAP)
+    n = 2000
+    rows = [
+        f"{50 * k},one,node{k},1,2,0.9" if each == "node" else f"track{k},{50 * k}" + ",1,2,0.9" * 4
+        for k in range(n)
+    ]
+    (tmp_path / "a.csv").write_text("\n".join([head, *rows]) + "\n")
+    tracemalloc.start()
+    with pytest.raises(RecordingError):
+        open_recording(tmp_path / "a.csv")
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 50e6

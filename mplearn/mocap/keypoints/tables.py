@@ -8,7 +8,8 @@ was seen most.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -72,8 +73,12 @@ class DeepLabCutReader(Reader):
         for k in range(1, width):
             points = columns.setdefault(animals[k], {})
             points.setdefault(parts[k] if k < len(parts) else "", {})[coords[k].lower()] = k
+        findings = Findings(self.format)
+        rate_hz = _rate(path, hints, findings)
         tracks = {animal: _points(path, table, points) for animal, points in columns.items()}
-        return _recording(path, tracks, hints, Findings(self.format))
+        seen = {each: int(np.isfinite(track[0]).sum()) for each, track in tracks.items()}
+        most = _seen_most(seen, findings)
+        return _recording(path, tracks[most], most, rate_hz, findings)
 
 
 class SLEAPReader(Reader):
@@ -174,29 +179,31 @@ def _flat(path: Path, hints: Hints, findings: Findings) -> Recording:
     table = numbers(path, [[row[k] for k in used] for row in body], len(used), lines)
     at = table[:, 0] if head.frame is not None else np.arange(len(table), dtype=np.float64)
     values = table[:, 1:] if head.frame is not None else table
-    place = dict(zip(own, range(len(own)), strict=True))
-    who = np.array([row[head.track] if head.track is not None else "" for row in body])
-    first, last = _span(path, at)
-    tracks = {}
-    for track in dict.fromkeys(who.tolist()):
-        rows_of = who == track
-        if head.node is None:
-            whole = np.full((last - first + 1, values.shape[1]), np.nan)
-            whole[at[rows_of].astype(np.int64) - first] = values[rows_of]
-            points = {p: {c: place[f"{p} {c}"] for c in each} for p, each in head.points.items()}
-        else:
-            nodes = np.array([row[head.node] for row in body])
-            known = list(dict.fromkeys(nodes[rows_of].tolist()))
-            whole = np.full((last - first + 1, len(known) * values.shape[1]), np.nan)
-            points = {}
-            for j, node in enumerate(known):
-                one, begin = rows_of & (nodes == node), j * values.shape[1]
-                whole[at[one].astype(np.int64) - first, begin : begin + values.shape[1]] = values[
-                    one
-                ]
-                points[node] = {c: begin + k for c, k in place.items()}
-        tracks[track] = _points(path, whole, points)
-    return _recording(path, tracks, hints, findings)
+    who = [row[head.track] if head.track is not None else "" for row in body]
+    seen: Counter[str] = Counter()
+    for track, n_values in zip(who, np.isfinite(values).sum(axis=1).tolist(), strict=True):
+        seen[track] += n_values
+    rate_hz = _rate(path, hints, findings)
+    most = _seen_most(seen, findings)
+    rows_of = np.array([track == most for track in who])
+    first, last = _span(path, at[rows_of])
+    frames = at[rows_of].astype(np.int64) - first
+    width = values.shape[1]
+    if head.node is None:
+        place = dict(zip(own, range(width), strict=True))
+        points = {p: {c: place[f"{p} {c}"] for c in each} for p, each in head.points.items()}
+        begin = np.zeros(len(frames), dtype=np.int64)
+    else:
+        nodes = [row[head.node] for row, is_of in zip(body, rows_of, strict=True) if is_of]
+        known = {node: width * j for j, node in enumerate(dict.fromkeys(nodes))}
+        points = {n: {c: j + k for k, c in enumerate(own)} for n, j in known.items()}
+        begin = np.array([known[node] for node in nodes], dtype=np.int64)
+    n_columns = max(len(points) if head.node is not None else 1, 1) * width
+    if (last - first + 1) * n_columns > 10 * values.size + 100_000:
+        raise bad_file(path, "hardly any points in most frames", "most points in each")
+    whole = np.full((last - first + 1, n_columns), np.nan)
+    whole[frames[:, None], begin[:, None] + np.arange(width)] = values[rows_of]
+    return _recording(path, _points(path, whole, points), most, rate_hz, findings)
 
 
 def _first_rows(path: Path) -> list[list[str]]:
@@ -229,7 +236,7 @@ def _coords_row(rows: list[list[str]]) -> int | None:
 def _span(path: Path, at: FloatArray) -> tuple[int, int]:
     """Return the first and the last of some frames' numbers."""
     whole = len(at) and np.isfinite(at).all() and (at == np.rint(at)).all()
-    if not whole or at.min() < 0 or at.max() > 1e15 or np.ptp(at) > 100 * len(at) + 1000:
+    if not whole or at.min() < 0 or at.max() > 1e15 or np.ptp(at) > 10 * len(at) + 1000:
         raise bad_file(path, "no frames, or numbers far apart", "frames one after the other")
     return int(at.min()), int(at.max())
 
@@ -263,7 +270,16 @@ def _points(path: Path, values: FloatArray, columns: dict[str, dict[str, int]]) 
     return points, tuple(whole), likely
 
 
-def _recording(path: Path, tracks: dict[str, Track], hints: Hints, findings: Findings) -> Recording:
+def _seen_most(seen: Mapping[str, int], findings: Findings) -> str:
+    """Return the animal that was seen most, and tell which others there are."""
+    most = max(seen, key=lambda each: seen[each])
+    if len(seen) > 1:
+        findings.note(f"of {len(seen)} animals the one that was seen most: {most}")
+        findings.leave_out(each for each in seen if each != most)
+    return most
+
+
+def _rate(path: Path, hints: Hints, findings: Findings) -> float:
     rate_hz = hints.rate_hz or rate_beside(path, findings)
     if rate_hz is None:
         rate_hz = USUAL_HZ
@@ -271,13 +287,13 @@ def _recording(path: Path, tracks: dict[str, Track], hints: Hints, findings: Fin
             f"the file does not say how many pictures there are a second: taken as {USUAL_HZ:g}; "
             f"{option('rate_hz')} settles it"
         )
-    seen = {name: int(np.isfinite(track[0]).all(axis=2).sum()) for name, track in tracks.items()}
-    name = max(seen, key=lambda each: seen[each])
-    if len(tracks) > 1:
-        others = [each for each in tracks if each != name]
-        findings.note(f"of {len(tracks)} animals the one that was seen most: {name}")
-        findings.leave_out(others)
-    points, names, likelihood = tracks[name]
+    return rate_hz
+
+
+def _recording(
+    path: Path, track: Track, name: str, rate_hz: float, findings: Findings
+) -> Recording:
+    points, names, likelihood = track
     try:
         frames, channels, length = seen_from_the_body(points, names, rate_hz, likelihood)
     except RecordingError as error:
