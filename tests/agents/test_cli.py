@@ -46,6 +46,17 @@ def test_perform_walks(library_file, capsys):
     assert "3 primitives in" in capsys.readouterr().out
 
 
+def test_perform_shows_primitives_and_survives_a_push(library_file, capsys):
+    push = ["--push", "36", "--towards", "forward-left"]
+    assert main(["perform", str(library_file), "--show", "hold", "BAR", *push]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert [line.split()[1].rstrip(",") for line in said[:3]] == ["hold", "BAR", "hold"]
+    assert "steps" in said[0] and "steps" not in said[2] and "1 primitives in" in said[3]
+    assert said[3].endswith("0 falls")
+    assert "--push pushes what" in refused(capsys, "perform", library_file, "--push", "9")
+    assert "jump" in refused(capsys, "perform", library_file, "--show", "jump")
+
+
 def test_perform_writes_a_film(renderer, library_file, tmp_path):
     # in a process of its own: MuJoCo chooses its graphics library when it is imported
     video = tmp_path / "walk.mp4"

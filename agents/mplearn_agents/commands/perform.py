@@ -14,8 +14,10 @@ if TYPE_CHECKING:
     import gymnasium
 
     from mplearn_agents.policies import Policy
+    from mplearn_agents.walk import WalkResult
+    from mplearn_envs.robot import Robot
 
-HELP = "Let the robot walk the graph of a library, or do a task."
+HELP = "Let the robot walk the graph of a library, do a task, or show primitives, pushed or not."
 EXAMPLE = "mplearn perform my.mplearn --steps 20 --video walk.mp4"
 _GOAL = "path"
 _CUT_OFF = {"overshoot": math.inf, "slowest": 0.05}  # what is shown where not all can be
@@ -24,6 +26,8 @@ _CUT_OFF = {"overshoot": math.inf, "slowest": 0.05}  # what is shown where not a
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     from mplearn_agents.policies import POLICIES
+    from mplearn_agents.showing import STAND
+    from mplearn_envs.experiments.survival import DIRECTIONS
     from mplearn_envs.robot import ROBOTS
 
     parser.add_argument(
@@ -34,7 +38,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--policy", choices=[*POLICIES, _GOAL], default="random", help="who chooses what comes next"
     )
     who.add_argument("--agent", type=Path, metavar="FOLDER", help="an agent of `mplearn train`")
+    who.add_argument(
+        "--show",
+        nargs="+",
+        metavar="NAME",
+        help="perform these primitives (ids or names), one after another, whatever the graph says; "
+        f"{STAND!r} is to stand",
+    )
     parser.add_argument("--goal", help=f"id or name of the primitive that --policy {_GOAL} goes to")
+    parser.add_argument(
+        "--push",
+        type=positive,
+        metavar="NS",
+        help="with --show: push the robot at the chest amid each, by so many N s; it takes steps",
+    )
+    parser.add_argument(
+        "--towards",
+        choices=[direction.replace(" ", "-") for direction in DIRECTIONS],
+        default=DIRECTIONS[0],
+        help=f"where it is pushed (default: {DIRECTIONS[0]})",
+    )
     parser.add_argument("--task", help="task (default: the agent's, or free)")
     parser.add_argument(
         "--dynamics", choices=["simulated", "kinematic"], default="simulated", help="how it moves"
@@ -83,6 +106,29 @@ def run(args: argparse.Namespace) -> None:
                 "a film needs an off-screen renderer, and none works here; install libegl1 and "
                 "libgl1-mesa-dri, or libosmesa6 (or leave --video out)"
             )
+    if args.push is not None and args.show is None:
+        raise InvalidValueError("--push pushes what is performed by --show")
+    result, robot = _walked(args) if args.show is None else _shown(args)
+    for k, step in enumerate(result.steps, start=1):
+        print(f"{k:4d}  {step.name:24s} {step.duration_s:6.2f} s{'  FELL' if step.fallen else ''}")
+    print(
+        f"{len(result.primitives)} primitives in {result.duration_s:.1f} s of the robot's time, "
+        f"{result.falls} falls"
+    )
+    if result.successes is not None and result.episodes:
+        print(f"{result.successes} of {result.episodes} episodes succeeded")
+    if args.video:
+        from mplearn_agents.film import film, with_captions
+        from mplearn_agents.video import write_video
+
+        names = [step.name for step in result.steps]
+        pictures = with_captions(film(result, robot.xml, balance=args.balance), result, names)
+        n_pictures = write_video(args.video, pictures, result.rate_hz)
+        print(f"film of {n_pictures} pictures written to {args.video}")
+
+
+def _walked(args: argparse.Namespace) -> tuple[WalkResult, Robot]:
+    """Let the robot walk; return what came of it, and the robot."""
     import gymnasium
 
     import mplearn_envs  # noqa: F401  (registers the environment)
@@ -121,24 +167,21 @@ def run(args: argparse.Namespace) -> None:
     policy = _policy(args, env)
     record = args.video is not None
     result = walk(env, policy, args.steps, args.seed, episodes=args.episodes, record=record)
-    for k, step in enumerate(result.steps, start=1):
-        print(f"{k:4d}  {step.name:24s} {step.duration_s:6.2f} s{'  FELL' if step.fallen else ''}")
-    print(
-        f"{len(result.primitives)} primitives in {result.duration_s:.1f} s of the robot's time, "
-        f"{result.falls} falls"
-    )
-    if result.successes is not None and result.episodes:
-        print(f"{result.successes} of {result.episodes} episodes succeeded")
-    if args.video:
-        from mplearn_agents.film import film, with_captions
-        from mplearn_agents.video import write_video
-
-        robot = env.unwrapped.robot  # type: ignore[attr-defined]
-        names = [step.name for step in result.steps]
-        pictures = with_captions(film(result, robot.xml, balance=args.balance), result, names)
-        n_pictures = write_video(args.video, pictures, result.rate_hz)
-        print(f"film of {n_pictures} pictures written to {args.video}")
+    robot: Robot = env.unwrapped.robot  # type: ignore[attr-defined]
     env.close()
+    return result, robot
+
+
+def _shown(args: argparse.Namespace) -> tuple[WalkResult, Robot]:
+    """Let the robot show primitives; return what came of it, and the robot."""
+    from mplearn_agents.showing import Push, show
+    from mplearn_envs.data.library_source import LibrarySource
+    from mplearn_envs.robot import make_robot
+
+    robot, library = make_robot(args.robot), LibrarySource(args.library).now()
+    push = None if args.push is None else Push(args.push, args.towards.replace("-", " "))
+    wanted = [primitive_key(name) for name in args.show]
+    return show(library, robot, wanted, speed=args.speed, push=push), robot
 
 
 def _policy(args: argparse.Namespace, env: gymnasium.Env[Any, Any]) -> Policy:

@@ -45,6 +45,8 @@ _TOUCHES_M = 0.006
 _PROBE_S = 1e-3
 _COG, _TURN = COG.start, ORIENTATION.start  # rows of the Jacobian
 _FORGETS, _OWED = 0.97, 0.4  # a period; share of the torque limit
+_WRONG = 0.25  # share of a velocity's gain by which a servo may be wrong
+_STILL = 0.5  # (rad/s)^2: from slower joints less is learned
 _NEAR_LIMIT = 0.2  # share of the way to a joint's limit in one period
 
 
@@ -67,7 +69,8 @@ class BodyLaw(NamedTuple):
         rise: And upwards [m/s^2].
         ahead: Which share of its acceleration a foot on its way is given ahead.
         watch: How much of what a joint's velocity misses in a period is made up for by torque in
-            the leg on its way, and in one that stands, shape (2,) [N m s/rad].
+            the leg on its way [N m s/rad].
+        learns: How fast a joint learns by which share of its velocity's gain its servo is wrong.
     """
 
     stiffness: FloatArray
@@ -83,7 +86,8 @@ class BodyLaw(NamedTuple):
     drop: float
     rise: float
     ahead: float
-    watch: FloatArray
+    watch: float
+    learns: float
 
 
 class Upper(NamedTuple):
@@ -271,8 +275,9 @@ def command_legs(
         needed: Generalised forces that make it without the ground's, same layout.
         period_s: Control period [s].
         command: Commands of all servos, shape (n,) [rad], in which the legs' are written.
-        owed: Of each joint, the velocity wanted for now [rad/s] and the torque by which what the
-            robot believes of itself is wrong [N m], shape (2, n); brought up to date.
+        owed: Of each joint, the velocity wanted for now [rad/s], the torque by which what the
+            robot believes of itself is wrong [N m], and the share of the velocity's gain by which
+            it is, shape (3, n); brought up to date.
     """
     stance, swings = robot.stance, swinging(mind)
     points, sides = np.empty((8, 3)), np.empty(8, np.int64)
@@ -299,10 +304,15 @@ def command_legs(
                 turning = cross(points[p] + now.cog - now.pose.anchor[j], forces[p])
                 for i in range(3):
                     torque -= now.pose.axis[j, i] * turning[i]
-        watch = law.watch[0 if stance.leg_side[k] == swings else 1]
-        owed[1, j] = _FORGETS * owed[1, j] + watch * (owed[0, j] - now.v[6 + j])
+        v = now.v[6 + j]
+        missed = owed[0, j] - v
+        watch = law.watch if stance.leg_side[k] == swings else 0.0
+        owed[1, j] = _FORGETS * owed[1, j] + watch * missed
         owed[1, j] = min(max(owed[1, j], -_OWED * law.torque[j]), _OWED * law.torque[j])
-        torque = min(max(torque + owed[1, j], -law.torque[j]), law.torque[j])
+        owed[2, j] += law.learns * missed * v / (v * v + _STILL)
+        owed[2, j] = min(max(owed[2, j], -_WRONG), _WRONG)
+        torque += owed[1, j] + owed[2, j] * law.damping[j] * v
+        torque = min(max(torque, -law.torque[j]), law.torque[j])
         angle = now.q[7 + j]
         rate = now.v[6 + j] + period_s * change[6 + j]
         rate = max(rate, _NEAR_LIMIT * (law.limits[j, 0] - angle) / period_s)

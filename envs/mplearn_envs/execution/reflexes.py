@@ -55,7 +55,8 @@ _TUNED: dict[str, Any] = {  # on pushes at the chest of the humanoid
     "drop": 3.0,
     "rise": 8.0,
     "ahead": 0.0,
-    "watch": np.array([60.0, 0.0]),
+    "watch": 60.0,
+    "learns": 0.05,
 }
 
 
@@ -175,6 +176,7 @@ class Reflexes:
                     "rise",
                     "ahead",
                     "watch",
+                    "learns",
                 )
             ),
         )
@@ -248,7 +250,7 @@ class Progress(NamedTuple):
         mind: What stepping remembers.
         awake: 1 once the robot balances by steps, shape (1,).
         command: What the servos got last, shape (n,) [rad].
-        owed: What joints miss, see `command_legs`, shape (2, n).
+        owed: What joints miss, see `command_legs`, shape (3, n).
         late: Commands that have not reached the servos yet, shape (lag, n) [rad].
     """
 
@@ -268,7 +270,7 @@ def new_progress(command: FloatArray, lag: int) -> Progress:
         lag: By how many control periods commands come late.
     """
     late = np.repeat(command[None], lag, axis=0)
-    owed = np.zeros((2, len(command)))
+    owed = np.zeros((3, len(command)))
     knot, awake = np.zeros((2, 1), np.int64)
     return Progress(knot, new_mind(), awake, command.copy(), owed, late)
 

@@ -3,6 +3,7 @@
 import numpy as np
 from standing_library import standing_library
 
+from mplearn_envs.execution.reflexes import _TUNED
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.experiments import (
     learned_table,
@@ -12,6 +13,7 @@ from mplearn_envs.experiments import (
     walk_table,
 )
 from mplearn_envs.experiments.model_error import disturb
+from mplearn_envs.experiments.survival import pushed
 from mplearn_envs.robot import humanoid
 
 
@@ -45,6 +47,15 @@ def test_the_model_error_is_what_was_asked_for():
         share = after[before > 0] / before[before > 0] - 1.0
         assert 0.0 < np.abs(share).max() <= 0.1
     assert wrong.actuator_biasprm[0, 1] == -wrong.actuator_gainprm[0, 0]
+
+
+def test_who_learns_how_wrong_his_servos_are_survives_more_pushes(monkeypatch):
+    """Of 16 pushes amid primitives, masses, gains and friction wrong by 10 %."""
+    library, survived = standing_library(), []
+    for learns in (0.0, _TUNED["learns"]):
+        monkeypatch.setitem(_TUNED, "learns", learns)
+        survived.append(sum(each.survived for each in pushed(library, 36.0, 2, error=0.1)))
+    assert survived[1] >= survived[0] + 2
 
 
 def test_pushes_are_survived_up_to_a_limit():
