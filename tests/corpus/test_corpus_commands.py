@@ -61,6 +61,10 @@ def test_a_folder_is_recognised_by_processes_as_by_one(
     said = capsys.readouterr()
     assert "segments recognised in 8 takes" in said.out
     assert "left out: ben/broken" in said.err
+    asked = ["recognise", str(tmp_path / "a.mplearn"), str(folder / "d.csv")]
+    assert main([*asked, "--to", str(tmp_path / "d.csv")]) == 0
+    assert "recognised in 1 take; written to" in capsys.readouterr().out
+    assert [row.take for row in read_segments(tmp_path / "d.csv")].count("d") > 0
     known = [row for row in alone.table if row.primitive is not None]
     assert len(known) > 0.7 * len(alone.table)
 

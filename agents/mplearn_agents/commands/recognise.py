@@ -52,6 +52,7 @@ def run(args: argparse.Namespace) -> None:
     from mplearn.library import PrimitiveLibrary
     from mplearn.tables import SegmentTable, format_of, recognise_recording, write_segments
     from mplearn_agents.terminal.console import new_table, open_console
+    from mplearn_agents.terminal.inert import printable
 
     if args.to is not None:
         format_of(args.to)
@@ -100,7 +101,9 @@ def run(args: argparse.Namespace) -> None:
     console = open_console()
     console.print(table)
     known = sum(each.primitive is not None for each in found)
-    console.print(f"{known} of {len(found)} segments recognised in {len(recordings)} takes")
+    takes = "1 take" if len(recordings) == 1 else f"{len(recordings)} takes"
+    written = "" if args.to is None else f"; written to {printable(str(args.to))}"
+    console.print(f"{known} of {len(found)} segments recognised in {takes}{written}", markup=False)
 
 
 def _read(
