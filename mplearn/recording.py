@@ -17,7 +17,7 @@ from .errors import InvalidValueError, RecordingError
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
 BoolArray: TypeAlias = NDArray[np.bool_]
-Cause: TypeAlias = Literal["", "rest", "dip", "turn", "return", "state", "length", "end"]
+Cause: TypeAlias = Literal["", "rest", "dip", "turn", "return", "state", "length", "end", "known"]
 CAUSES: tuple[Cause, ...] = get_args(Cause)
 
 
@@ -35,7 +35,8 @@ class Segment:
             speed falls far between two peaks; ``"turn"``, the main motion turns round and the
             posture comes back; ``"return"``, the posture comes back, whatever moves; ``"state"``,
             the density of the motion changes; ``"length"``, the segment was too long to go on;
-            ``"end"``, that of the stream; empty where not known.
+            ``"end"``, that of the stream; ``"known"``, the speed falls, or the motion turns round,
+            too little for a boundary as yet, but a known motion ends there; empty where not known.
 
     Example:
         >>> Segment(100, 180, cause="rest").length_frames

@@ -27,6 +27,8 @@ class ModelStack(NamedTuple):
         log_stay: Shape (M, N).
         log_next: Shape (M, N).
         n_states: States that are not padding, shape (M,).
+        scales: -1 / (2 variance), shape (M, N, D).
+        norms: Sums of ``log_norms`` over the channels, shape (M, N).
     """
 
     means: FloatArray
@@ -35,6 +37,8 @@ class ModelStack(NamedTuple):
     log_stay: FloatArray
     log_next: FloatArray
     n_states: IntArray
+    scales: FloatArray
+    norms: FloatArray
 
     @classmethod
     def of(cls, models: Sequence[LeftRightHMM]) -> ModelStack:
@@ -46,17 +50,37 @@ class ModelStack(NamedTuple):
         widths = sorted({model.n_channels for model in models})
         if len(widths) != 1:
             raise ModelError(f"models must share one number of channels, not {widths}")
-        n_states = np.array([model.n_states for model in models], dtype=np.int64)
-        shape = (len(models), int(n_states.max()), widths[0])
-        means, variances, log_norms = np.zeros(shape), np.ones(shape), np.zeros(shape)
-        log_stay, log_next = np.zeros(shape[:2]), np.full(shape[:2], -np.inf)
+        stack = cls.room(len(models), max(model.n_states for model in models), widths[0])
         for m, model in enumerate(models):
-            means[m, : model.n_states] = model.means
-            variances[m, : model.n_states] = model.variances
-            log_norms[m, : model.n_states] = model.log_norms
-            log_stay[m, : model.n_states] = model.log_stay
-            log_next[m, : model.n_states] = model.log_next
-        return cls(means, variances, log_norms, log_stay, log_next, n_states)
+            stack.put(m, model)
+        return stack
+
+    @classmethod
+    def room(cls, n_models: int, n_states: int, n_channels: int) -> ModelStack:
+        """Return a stack with room for models of at most so many states."""
+        shape = (n_models, n_states, n_channels)
+        return cls(
+            np.zeros(shape),
+            np.ones(shape),
+            np.zeros(shape),
+            np.zeros(shape[:2]),
+            np.full(shape[:2], -np.inf),
+            np.zeros(n_models, np.int64),
+            np.full(shape, -0.5),
+            np.zeros(shape[:2]),
+        )
+
+    def put(self, row: int, model: LeftRightHMM) -> None:
+        """Write a model into a row."""
+        n = model.n_states
+        self.means[row, :n] = model.means
+        self.variances[row, :n] = model.variances
+        self.log_norms[row, :n] = model.log_norms
+        self.log_stay[row, :n] = model.log_stay
+        self.log_next[row, :n] = model.log_next
+        self.n_states[row] = n
+        self.scales[row, :n] = -0.5 / model.variances
+        self.norms[row, :n] = model.log_norms.sum(axis=1)
 
     @property
     def n_models(self) -> int:

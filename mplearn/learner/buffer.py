@@ -58,6 +58,11 @@ class FrameBuffer:
         self._frames[self._offset + self._count] = frame
         self._count += 1
 
+    @property
+    def held(self) -> FloatArray:
+        """All frames that are held, shape (n, D), until the next one comes; not to be written."""
+        return self._frames[self._offset : self._offset + self._count]
+
     def take(self, start: int, end: int) -> FloatArray:
         """Return a copy of the frames [start, end), shape (end - start, D)."""
         if not self.first <= start < end <= self.end:
@@ -76,8 +81,7 @@ class FrameBuffer:
 
     def state(self) -> BufferState:
         """Return what the buffer holds."""
-        held = self._frames[self._offset : self._offset + self._count]
-        return BufferState(self.first, held.copy())
+        return BufferState(self.first, self.held.copy())
 
     def load_state(self, state: BufferState) -> None:
         """Resume from what `state` returned.
@@ -95,5 +99,5 @@ class FrameBuffer:
         """Move the frames to the front, into a larger array only where they fill half of this."""
         room = len(self._frames) * (2 if self._count > len(self._frames) // 2 else 1)
         frames = np.empty((room, self.n_channels))
-        frames[: self._count] = self._frames[self._offset : self._offset + self._count]
+        frames[: self._count] = self.held
         self._frames, self._offset = frames, 0

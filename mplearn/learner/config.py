@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from ..errors import InvalidValueError
 from ..people import PeopleConfig
-from ..state import fields_of, from_plain
+from ..state import fields_of, from_plain, newer
 from ..tree import TreeConfig
 
 LOWEST_HZ, HIGHEST_HZ = 20.0, 250.0
@@ -41,6 +41,9 @@ class LearnerConfig:
         observe: What markers become: ``"robot"``, joint angles of the robot; or ``"markers"``:
             they are learned as positions.
         segmenter: Name of the segmenter, one of `mplearn.segmentation.SEGMENTERS`.
+        scaffolding: Whether known primitives help to cut what comes ([Kulic2012], end of 2.1):
+            where a motion under way is one of them, a boundary is less likely inside it, and
+            likelier at its end.
         tree: How primitives are formed.
         people: What makes motions of different people one primitive.
         longest_pause_s: Two primitives with a longer pause between them do not count as
@@ -59,6 +62,7 @@ class LearnerConfig:
     rate_hz: float = 100.0
     observe: Literal["robot", "markers"] = "robot"
     segmenter: str = "kohlmorgen-lemm"
+    scaffolding: bool = newer(True, absent=False)
     tree: TreeConfig = field(default_factory=TreeConfig)
     people: PeopleConfig = field(default_factory=PeopleConfig)
     longest_pause_s: float = 2.0

@@ -42,6 +42,7 @@ from .events import (
     SegmentClosed,
 )
 from .foresight import NextMotion
+from .known_motions import KnownMotions
 from .learner_state import FILES, LearnerState
 from .reversal import Known, LearnerEdit
 from .shown_once import with_shown_once
@@ -114,6 +115,7 @@ class MotionLearner:
         self._absurd = AbsurdFrames(len(config.channels), config.rate_hz)
         self._paused = False
         self._looking: Recogniser | None = None
+        self._under_way = KnownMotions(width, config.rate_hz)
 
     @property
     def person(self) -> int:
@@ -322,7 +324,7 @@ class MotionLearner:
         nearest = {} if back.nearest is None else back.nearest.by_number()
         segments = back.segments.by_number()
         self.chain.exchange(segments, nearest, found.heirs, dict(found.moved))
-        self._looking = None
+        self._look_anew()
         frozen = self._snapshots.frozen
         for each in edit.frozen_after:
             frozen.pop(each.primitive.id, None)
@@ -331,9 +333,14 @@ class MotionLearner:
             del frozen[id]
         return found
 
+    def _look_anew(self) -> None:
+        """What is known was changed by hand."""
+        self._looking = None
+        self._under_way.forget()
+
     def _edited(self, change: Change) -> Change:
         self.chain.revise(change)
-        self._looking = None
+        self._look_anew()
         return change
 
     # ---- what was learned
@@ -574,6 +581,7 @@ class MotionLearner:
     def _begin_stream(self) -> None:
         self._stream_start = self.n_frames
         self._buffer = FrameBuffer(self._buffer.n_channels)
+        self._under_way.forget()
         self.chain.broken()
 
     def _learn(self, features: FloatArray) -> list[Event]:
@@ -586,7 +594,18 @@ class MotionLearner:
             self.n_frames += 1
             for segment in segments:
                 events.extend(self._close(segment))
+            if self.config.scaffolding:
+                self._scaffold(bool(segments))
         return events
+
+    def _scaffold(self, begins: bool) -> None:
+        """Tell the segmenter, now and then, how surely the motion that goes on is at its end."""
+        if begins:
+            self._under_way.forget()
+            self._segmenter.scaffold()
+        elif self._under_way.looks_at(len(self._buffer)) and self.person in self.tree.people:
+            ending = self._under_way.ending(self.tree.of(self.person), self._buffer.held)
+            self._segmenter.scaffold(ending=ending)
 
     def _close(self, segment: Segment) -> list[Event]:
         """Learn from a segment that the segmenter closed."""

@@ -137,7 +137,7 @@ def step_direction(
     if near_turn(m.valley_frame, r, trail):
         hysteresis = max(hysteresis, r.hysteresis)
     start, mode = m.start, m.mode
-    n = watch(m, p, s, min(0.95, hysteresis * ready), watched.speeds, out)
+    n = watch(m, p, s, hysteresis, ready, watched.speeds, out)
     if m.start != start or m.mode != mode:
         drop_candidate(m.start, t, smooth.weights, trail)
     elif m.mode != STILL:

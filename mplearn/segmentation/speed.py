@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import InvalidValueError
 from ..maths.compiling import njit
-from ..recording import FloatArray
+from ..recording import CAUSES, FloatArray
 from .base import check_positive, check_share, frames_of
 from .kernels import Smooth, all_finite, smooth_velocity
 
@@ -58,6 +58,7 @@ class ZeroVelocityConfig:
 
 MOVING, STILL, OPENING = 0, 1, 2
 REST, DIP, TURN, RETURN, CHANGE, LENGTH = range(1, 7)  # places in `CAUSES`
+KNOWN = CAUSES.index("known")
 
 CUT = np.dtype(
     [

@@ -124,7 +124,11 @@ class SpeedSegmenter(Segmenter):
         """Tell the segmenter what is known about the motion now; see `Segmenter.scaffold`."""
         if not 0.0 <= ending <= 1.0:
             raise InvalidValueError(f"ending must lie in [0, 1], not {ending}")
-        counts = np.ones(self.n_channels) if weights is None else np.asarray(weights, np.float64)
+        if weights is None:
+            self._arrays["state"]["ending"] = ending
+            self._arrays["weights"][:] = 1.0
+            return
+        counts = np.asarray(weights, np.float64)
         if counts.shape != (self.n_channels,):
             raise InvalidValueError(
                 f"weights must have shape ({self.n_channels},), not {counts.shape}"

@@ -22,7 +22,7 @@ from ..maths.compiling import njit
 from ..recording import FloatArray
 from .base import check_positive, check_share, frames_of
 from .kernels import Smooth, distance
-from .speed import MOVING, RETURN, TURN, close, running_speed
+from .speed import KNOWN, MOVING, RETURN, TURN, close, running_speed
 from .watch import begin
 
 AXIS_STEPS_HZ = 100.0  # steps of the power method that finds the axis [1/s]
@@ -255,8 +255,8 @@ def look_for_turn(
     k = trail.turning[0]
     weights, t = smooth.weights, m.frames - 1
     far, away = _stretch(t, weights, trail)
-    least = max(q.reach_s * k.pace, q.reach_running_s * running_speed(m)) / ready
-    left = 1.0 - q.back / ready
+    alone = max(q.reach_s * k.pace, q.reach_running_s * running_speed(m))
+    least, left = alone / ready, 1.0 - q.back / ready
     if (
         k.far > least
         and far < k.far - q.zigzag * min(k.far, q.zigzag_s * k.pace)
@@ -268,10 +268,14 @@ def look_for_turn(
         k.apart = distance(trail.anchor_place, trail.before_place, weights)
         away = distance(smooth.place, trail.anchor_place, weights)
     n = 0
-    if k.candidate >= 0 and distance(smooth.place, trail.before_place, weights) < left * k.apart:
-        sure = 1.0 - least / max(k.apart, least)
-        n = _close_both(m, p, q, k.before, k.candidate, sure, TURN, out)
-        k.candidate = -1
+    if k.candidate >= 0:
+        still_apart = distance(smooth.place, trail.before_place, weights)
+        if still_apart < left * k.apart:
+            sure = 1.0 - least / max(k.apart, least)
+            known = k.apart <= alone or still_apart >= (1.0 - q.back) * k.apart
+            cause = KNOWN if known and ready > 1.0 else TURN
+            n = _close_both(m, p, q, k.before, k.candidate, sure, cause, out)
+            k.candidate = -1
     if (
         n == 0
         and k.away > least
@@ -281,6 +285,8 @@ def look_for_turn(
         end, cause = k.away_frame, RETURN
         if abs(k.far_frame - end) <= q.tolerance and k.far_frame - m.start >= q.shortest:
             end, cause = k.far_frame, TURN
+        if ready > 1.0 and (k.away <= alone or away >= (1.0 - q.back) * k.away):
+            cause = KNOWN
         n = _close_both(m, p, q, k.anchor, end, 1.0 - least / k.away, cause, out)
         drop_candidate(end, t, weights, trail)
     if n > 0:

@@ -10,7 +10,9 @@ from typing import Any
 
 from ..maths.compiling import njit
 from ..recording import FloatArray
-from .speed import DIP, LENGTH, MOVING, OPENING, REST, STILL, close, running_speed
+from .speed import DIP, KNOWN, LENGTH, MOVING, OPENING, REST, STILL, close, running_speed
+
+_MOST = 0.95  # share of the peaks that a minimum lies below at least, whatever is known
 
 
 @njit(cache=True)
@@ -52,7 +54,14 @@ def begin(m: Any, speeds: FloatArray) -> None:
 
 @njit(cache=True)
 def _watch_motion(
-    m: Any, p: Any, s: float, low: float, hysteresis: float, speeds: FloatArray, out: Any
+    m: Any,
+    p: Any,
+    s: float,
+    low: float,
+    hysteresis: float,
+    ready: float,
+    speeds: FloatArray,
+    out: Any,
 ) -> int:
     """Look for the reversal or the pause that ends a motion."""
     t = m.frames - 1
@@ -68,6 +77,9 @@ def _watch_motion(
     elif s < low and m.dip_frame < 0:
         m.dip_frame = t
     n = 0
+    if m.dip_frame >= 0:  # a pause may be beginning, which must not be cut before it is one
+        ready = min(ready, 1.0)
+    share = min(_MOST, hysteresis * ready)
     if m.dip_frame >= 0 and t - m.dip_frame >= p.still:
         if m.dip_frame - m.start >= p.shortest:
             n = close(m, p, m.dip_frame, 1.0 - m.valley / low, False, REST, out, 0)
@@ -75,11 +87,12 @@ def _watch_motion(
         m.rest = 0.5 * low
         m.rest_frames = p.still
         m.dip_frame = -1
-    elif m.valley < hysteresis * m.peak and s >= max(m.valley / hysteresis, low):
+    elif m.valley < share * m.peak and s >= max(m.valley / share, low):
         if m.valley_frame - m.start >= p.shortest:
-            sure = 1.0 - m.valley / (hysteresis * m.peak)
-            level = max(m.valley / hysteresis, low)
-            n = close(m, p, _dip_middle(m, level, speeds), sure, False, DIP, out, 0)
+            sure = 1.0 - m.valley / (share * m.peak)
+            middle = _dip_middle(m, max(m.valley / share, low), speeds)
+            cause = DIP if m.valley < hysteresis * m.peak else KNOWN
+            n = close(m, p, middle, sure, False, cause, out, 0)
             m.mode = MOVING
         m.valley = s
         m.valley_frame = t
@@ -107,14 +120,17 @@ def _watch_pause(m: Any, p: Any, s: float, low: float, out: Any) -> int:
 
 
 @njit(cache=True)
-def watch(m: Any, p: Any, s: float, hysteresis: float, speeds: FloatArray, out: Any) -> int:
+def watch(
+    m: Any, p: Any, s: float, hysteresis: float, ready: float, speeds: FloatArray, out: Any
+) -> int:
     """Judge speed `s` of the frame that `take_speed` has counted.
 
     Args:
         m: The state, a record of `STATE`.
         p: The settings, a record of `SETTINGS`.
         s: Speed.
-        hysteresis: A minimum is a reversal if it lies below this share of the peaks around it.
+        hysteresis: A minimum is a reversal if it lies below this share of the peaks around it,
+        ready: times how much likelier a boundary is than without knowledge.
         speeds: The speeds before it, a ring.
         out: Receives what closes, of `CUT`.
 
@@ -126,7 +142,7 @@ def watch(m: Any, p: Any, s: float, hysteresis: float, speeds: FloatArray, out: 
     if m.mode != MOVING:
         n = _watch_pause(m, p, s, low, out)
     if n == 0 and m.mode != STILL:
-        n = _watch_motion(m, p, s, low, hysteresis, speeds, out)
+        n = _watch_motion(m, p, s, low, hysteresis, ready, speeds, out)
     if n == 0 and m.frames - 1 - m.start >= p.longest:
         end = m.frames - 1
         if m.mode != STILL and m.valley_frame - m.start >= p.shortest:

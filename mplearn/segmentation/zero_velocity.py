@@ -24,7 +24,7 @@ def _step(frame: FloatArray, watched: Watched, hysteresis: float, out: Any) -> i
     if s < 0.0:
         return -1
     m, p = watched.state[0], watched.settings[0]
-    return int(watch(m, p, s, min(0.95, hysteresis * readiness(m, p)), watched.speeds, out))
+    return int(watch(m, p, s, hysteresis, readiness(m, p), watched.speeds, out))
 
 
 class ZeroVelocity(SpeedSegmenter):

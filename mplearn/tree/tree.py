@@ -201,6 +201,12 @@ class PrimitiveTree:
         """Ids of the primitives, in the order of their birth."""
         return self._structure.index.leaf_ids
 
+    @property
+    def members(self) -> list[list[int]]:
+        """Numbers of the exemplars of each of the `leaves`; other ones are another list."""
+        index = self._structure.index
+        return [group for group, leaf in zip(index.members, index.leaves, strict=True) if leaf]
+
     def nearest_others(self) -> FloatArray:
         """Return how far each exemplar of each of the `leaves` is from the nearest others of it.
 

@@ -28,7 +28,8 @@ def build_default() -> PrimitiveLibrary:
     script = markov_script(N_MOTIONS, np.random.default_rng(SEED), balance=BALANCE)
     demonstration = demonstrate(script, SEED)
     recording = demonstration.recording
-    learner = MotionLearner(LearnerConfig(recording.channels, recording.rate_hz))
+    config = LearnerConfig(recording.channels, recording.rate_hz, scaffolding=False)  # v0's
+    learner = MotionLearner(config)
     votes: defaultdict[int, Counter[str]] = defaultdict(Counter)
     for event in (*learner.learn_many(recording.frames), *learner.end_stream()):
         if isinstance(event, (Recognised, PrimitiveBorn)):
