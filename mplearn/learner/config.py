@@ -62,7 +62,7 @@ class LearnerConfig:
     rate_hz: float = 100.0
     observe: Literal["robot", "markers"] = "robot"
     segmenter: str = "kohlmorgen-lemm"
-    scaffolding: bool = newer(True, absent=False)
+    scaffolding: bool = newer(False, absent=False)
     tree: TreeConfig = field(default_factory=TreeConfig)
     people: PeopleConfig = field(default_factory=PeopleConfig)
     longest_pause_s: float = 2.0

@@ -96,7 +96,8 @@ def test_of_many_those_are_followed_that_start_nearest() -> None:
 def test_what_a_person_changes_counts_at_once_and_resumes_bit_for_bit(
     features: Recording,
 ) -> None:
-    learner = MotionLearner(LearnerConfig(features.channels, features.rate_hz))
+    config = LearnerConfig(features.channels, features.rate_hz, scaffolding=True)
+    learner = MotionLearner(config)
     at = 4520  # in the middle of a known motion
     learner.learn_many(features.frames[:at])
     learner.remove(learner.tree.leaves[1])
