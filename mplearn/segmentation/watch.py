@@ -102,11 +102,11 @@ def _watch_motion(
 
 
 @njit(cache=True)
-def _watch_pause(m: Any, p: Any, s: float, low: float, out: Any) -> int:
+def _watch_pause(m: Any, p: Any, s: float, low: float, speeds: FloatArray, out: Any) -> int:
     """Look for the rise that ends a pause."""
     t = m.frames - 1
-    if m.mode == OPENING:  # no motion has been seen yet: the rest itself is the only measure
-        low = 2.0 * m.rest
+    if m.mode == OPENING or low < m.rest:
+        low = 2.0 * m.rest  # no motion was seen yet, or long ago: the rest itself is the measure
     if s <= low or m.mode == OPENING:
         m.rest_frames += 1
         m.rest += (s - m.rest) / m.rest_frames
@@ -114,7 +114,12 @@ def _watch_pause(m: Any, p: Any, s: float, low: float, out: Any) -> int:
         m.dip_frame = -1
     elif m.dip_frame < 0:
         m.dip_frame = t
-    if s <= max(2.0 * low, 4.0 * m.rest) or m.dip_frame - m.start < p.still:
+    if s <= max(2.0 * low, 4.0 * m.rest):
+        return 0
+    if m.dip_frame - m.start < p.still:
+        if m.mode == STILL:  # the pause was closed for its length just now: this is a motion
+            m.mode = MOVING
+            begin(m, speeds)
         return 0
     n = close(m, p, m.dip_frame, 1.0 - low / s, True, REST, out, 0)
     m.mode = MOVING
@@ -142,7 +147,7 @@ def watch(
     low = p.still_share * running_speed(m)
     n = 0
     if m.mode != MOVING:
-        n = _watch_pause(m, p, s, low, out)
+        n = _watch_pause(m, p, s, low, speeds, out)
     if n == 0 and m.mode != STILL:
         n = _watch_motion(m, p, s, low, hysteresis, ready, speeds, out)
     if n == 0 and m.frames - 1 - m.start >= p.longest:

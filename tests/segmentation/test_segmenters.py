@@ -164,3 +164,26 @@ def test_wrong_arguments_are_named(name, n_channels, rate_hz):
 def test_an_unknown_segmenter_is_named():
     with pytest.raises(InvalidValueError, match="'zero'"):
         make_segmenter("zero", 3, 100.0)
+
+
+@every_segmenter
+@pytest.mark.parametrize("noise", [0.008, 0.012])
+@pytest.mark.parametrize("extra", [0, 150])
+def test_motion_after_a_long_rest_is_motion(name, noise, extra):
+    """However long nobody moved, and wherever the pause was last closed for its length."""
+    at_s = np.arange(600) / 20.0
+    motions = np.sin(2 * np.pi * at_s[:, None] / 1.6 + np.array([0.0, 0.3, 0.0, 0.3]))
+    rng = np.random.default_rng(1)
+    rest = motions[-1] + noise * rng.normal(size=(15 * 60 * 20 + extra, 4))
+    stream = np.concatenate([motions, rest, motions, rest, motions])
+    segments = make_segmenter(name, 4, 20.0).segment(stream)
+
+    def moving(first):
+        end = first + len(motions) + 40
+        return sum(not s.still and first <= s.start and s.end <= end for s in segments)
+
+    shown = moving(0)
+    assert shown >= 15
+    least = 1 if name == "kohlmorgen-lemm-posture" else 0.8 * shown  # postures of rest are many
+    for k in (1, 2):
+        assert moving(k * (len(motions) + len(rest)) - 20) >= least
