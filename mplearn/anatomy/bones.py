@@ -2,9 +2,10 @@
 
 Tables of joints' places do not say which bones join them. Where all of them hang together by bones
 that do not stretch, while most pairs come nearer and go apart, that tree is the skeleton: the
-shortest of those that span the joints. Markers on skin do not hang together so. Names tell left
-from right: no bone joins the two (feet that stand keep their distance as well as bones do), and
-limbs part from the middle.
+shortest of those that span the joints. Markers on skin do not hang together so; where somebody
+hardly moves all of them seem to, and how much two vary grows with how far they are apart, while
+bones vary far less than anything else. Names tell left from right: no bone joins the two (feet that
+stand keep their distance as well as bones do), and limbs part from the middle.
 """
 
 from __future__ import annotations
@@ -17,11 +18,12 @@ from ..recording import FloatArray, Recording, Skeleton, marker_channels
 from .name_hints import sides_of
 
 FEWEST, MOST = 12, 200  # joints of a person, as tables have them
-SOME_FRAMES = 120  # of a recording are looked at
+FEWEST_FRAMES, SOME_FRAMES = 30, 120  # of a recording are looked at
 ALL = 0.9  # of the points hang together; the rest is held in a hand
 STRETCH, STRETCH_M = 0.005, 0.002  # by which a bone may vary: of its length, and [m]
 PARTING = 1.5  # how much longer a bone counts that leads from the middle to one side
 MOVING = 0.5  # of the pairs of joints are no bones, and vary
+CLEARLY, CLEARLY_M = 10.0, 0.0005  # times as much as any bone, which varies by so much anyway [m]
 
 
 def with_bones(recording: Recording) -> Recording | None:
@@ -42,13 +44,14 @@ def with_bones(recording: Recording) -> Recording | None:
         return None
     points = recording.markers
     known = points[np.isfinite(points).all(axis=(1, 2))]
-    known = known[:: max(1, len(known) // SOME_FRAMES)]
+    known = known[:: -(-len(known) // SOME_FRAMES) or 1]
     n_points = points.shape[1]
-    if not FEWEST <= n_points <= MOST or len(known) < 3:
+    if not FEWEST <= n_points <= MOST or len(known) < FEWEST_FRAMES:
         return None
-    apart = np.sqrt(((known[:, :, None] - known[:, None]) ** 2).sum(axis=-1))  # (t, N, N)
-    length = np.median(apart, axis=0)
-    rigid = np.ptp(apart, axis=0) <= STRETCH * length + STRETCH_M
+    along = known.transpose(2, 0, 1)  # (3, t, N)
+    apart = np.sqrt(sum((x[:, :, None] - x[:, None]) ** 2 for x in along))  # (t, N, N)
+    length, varies = np.median(apart, axis=0), np.ptp(apart, axis=0)
+    rigid = varies <= STRETCH * length + STRETCH_M
     if rigid.mean() > 1.0 - MOVING:
         return None
     sides = np.array(sides_of(recording.marker_names))
@@ -56,6 +59,9 @@ def with_bones(recording: Recording) -> Recording | None:
     parting = np.where(np.abs(sides[:, None]) != np.abs(sides), PARTING, 1.0)
     order, parents = _shortest_tree(np.where(rigid, parting * length, np.inf))
     if len(order) < max(FEWEST, ALL * n_points):
+        return None
+    bones = varies[order[1:], [order[p] for p in parents[1:]]]
+    if np.median(varies) < CLEARLY * max(bones.max(), CLEARLY_M):
         return None
     names = tuple(recording.marker_names[i] for i in order)
     at = known[0, order]

@@ -90,4 +90,12 @@ def test_what_does_not_hang_together_has_no_bones(truth: Truth, joints: Recordin
     assert with_bones(replace(joints, frames=still)) is None  # nobody moves
     noise = 0.02 * np.random.default_rng(0).normal(size=joints.frames.shape)
     assert with_bones(replace(joints, frames=joints.frames + noise)) is None
-    assert with_bones(joints.sliced(0, 2)) is None
+    assert with_bones(joints.sliced(0, 20)) is None
+
+
+def test_markers_of_who_hardly_moves_are_on_skin(truth: Truth) -> None:
+    """Who breathes and sways: what is near keeps its distance to 2 mm, and what is far does not."""
+    t = np.arange(500)[:, None, None] / RATE_HZ
+    strain = 1.0 + [0.006, 0.006, 0.004] * np.sin(2 * np.pi * t / [3.0, 4.0, 5.0])
+    markers = truth.markers.markers[:1] * strain
+    assert with_bones(replace(truth.markers, frames=markers.reshape(len(t), -1))) is None
