@@ -103,6 +103,7 @@ def _add(value: Any, found: Any, seen: set[int]) -> None:
         if id(value) not in seen:
             seen.add(id(value))
             _add_code(value.__code__, value.__globals__, found, seen)
+            _add(value.__defaults__ or (), found, seen)
             for cell in value.__closure__ or ():
                 _add(cell.cell_contents, found, seen)
     elif isinstance(value, tuple):

@@ -26,8 +26,8 @@ SHIFT = ({shift},)
 FACTOR = {factor}
 
 @njit(cache=True)
-def inner(x):
-    return FACTOR * x{more}
+def inner(x, plus={plus}):
+    return FACTOR * x + plus{more}
 """
 
 
@@ -37,9 +37,9 @@ def outer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "caller.py").write_text(CALLER)
 
-    def load(shift: float = 1.0, factor: float = 2.0, more: str = "") -> Any:
+    def load(shift: float = 1.0, factor: float = 2.0, more: str = "", plus: float = 0.0) -> Any:
         called = tmp_path / "called.py"
-        text = CALLED.format(shift=shift, factor=factor, more=more)
+        text = CALLED.format(shift=shift, factor=factor, more=more, plus=plus)
         if not called.exists() or called.read_text() != text:
             called.write_text(text)
             os.utime(called, ns=(0, called.stat().st_mtime_ns + 10**9))
@@ -60,6 +60,7 @@ def test_a_kernel_is_compiled_again_where_what_it_calls_or_takes_has_changed(out
         ({"more": " - 1.0"}, 6.0),  # the text of a kernel two calls away
         ({"factor": 5.0}, 16.0),  # a constant of it
         ({"shift": 4.0}, 10.0),  # a constant from its file
+        ({"plus": 2.0}, 9.0),  # what it takes for an argument that is left out
         ({}, 7.0),
     ):
         renewed = outer(**changed)
