@@ -14,13 +14,14 @@ from mplearn.recording import FloatArray
 from .compiling import read_model
 from .drives import JointGroup
 from .feet import LEVEL, SOLES, foot_points
+from .unframe import without_frames
 
 _HALF_SOLE_M = 0.01
 _ROTOR_S2 = 5e-4  # rotor inertia by torque limit [kg m^2 / (N m)], about as the humanoid's
 
 
 def read_spec(source: str | Path, name: str) -> Any:
-    """Return a model's ``MjSpec`` with orientations as quaternions and absolute places of files.
+    """Return a model's ``MjSpec`` without frames, with quaternions and absolute places of files.
 
     Raises:
         RobotError: There is no such file, or it does not compile.
@@ -38,7 +39,7 @@ def read_spec(source: str | Path, name: str) -> Any:
         spec.meshdir = str((folder / spec.meshdir).resolve())
         spec.texturedir = str((folder / spec.texturedir).resolve())
         spec.compile()
-        return mujoco.MjSpec.from_string(spec.to_xml())
+        return without_frames(mujoco.MjSpec.from_string(spec.to_xml()))
     except ValueError as error:
         raise RobotError(f"the MJCF of robot {name!r} does not compile: {error}") from error
 

@@ -7,6 +7,7 @@ it has some.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from math import radians
@@ -47,16 +48,28 @@ def described(
             + (f"; unknown roles: {unknown}, there are {ROLES}" if unknown else "")
         )
     spec = read_spec(source, name)
-    bodies, hinges = ({each.name for each in part} for part in (spec.bodies, spec.joints))
+    bodies = {body.name for body in spec.bodies[1:]}
+    hinges = {joint.name for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_HINGE}
     for body in segments.values():
         if body not in bodies:
             raise RobotError(f"robot {name!r} has no body {body!r}; it has {sorted(bodies)}")
-    for hinge in attention:
+    for body, n in Counter(segments[role] for role in NEEDED_ROLES).items():
+        if n > 1:
+            roles = [role for role in NEEDED_ROLES if segments[role] == body]
+            raise RobotError(f"robot {name!r}: {body!r} cannot be all of {roles}")
+    for hinge, angle in attention.items():
         if hinge not in hinges:
             raise RobotError(f"robot {name!r} has no hinge {hinge!r}; it has {sorted(hinges)}")
+        if not isinstance(angle, (int, float, np.number)):
+            raise RobotError(f"robot {name!r}: {hinge!r} must be at an angle [rad], not {angle!r}")
     _require_humanoid(compiled(spec, name), segments, name)
     take_out_drives(spec)
-    rooted = rerooted(spec, segments, attention, name)
+    try:
+        rooted = rerooted(spec, segments, attention, name)
+    except ValueError as error:
+        raise RobotError(
+            f"the MJCF of robot {name!r} does not compile alone, without its drives: {error}"
+        ) from error
     spec = rooted.spec
     feet = (segments["foot_l"], segments["foot_r"])
     add_soles(spec, feet, name)
@@ -105,13 +118,20 @@ def _require_humanoid(model: mujoco.MjModel, segments: Mapping[str, str], name: 
         for thigh in (segments["thigh_l"], segments["thigh_r"])
         if pelvis not in way_up(model, model.body(thigh).id)
     ]
+    if not model.body(root).name:
+        found.append("the body that hangs on nothing has no name")
     for j in range(model.njnt):
-        if int(model.jnt_type[j]) in kinds:
-            kind = kinds[int(model.jnt_type[j])]
-            found.append(f"{model.joint(j).name!r} is a {kind} joint, no hinge")
+        kind, body = int(model.jnt_type[j]), int(model.jnt_bodyid[j])
+        if kind in kinds:
+            found.append(f"{model.joint(j).name!r} is a {kinds[kind]} joint, no hinge")
+        elif body in own and kind == mujoco.mjtJoint.mjJNT_HINGE:
+            if not model.joint(j).name:
+                found.append(f"a hinge of {model.body(body).name!r} has no name")
+            if body == root:
+                found.append(f"{model.joint(j).name!r} ties {model.body(root).name!r} to the world")
     for side in "lr":
         shank, foot = segments[f"shank_{side}"], segments[f"foot_{side}"]
-        if foot != shank and not _hinges_above(model, foot, shank):
+        if not _hinges_above(model, foot, shank):
             found.append(
                 f"there is no ankle, a hinge from {shank!r} to {foot!r}: that foot is a part of "
                 "the shank, and cannot stay flat on the floor when the leg leans"

@@ -43,7 +43,7 @@ class Origin:
     """The model that a re-rooted robot came from, for those who have it.
 
     Attributes:
-        xml: Its MJCF text, as it was but floating, without drives.
+        xml: Its MJCF text, as it was but floating, alone and without drives.
         base: The body by which it floats.
         offset: Where that body's origin is there, in the frame of our body of that name, shape (3,)
             [m].
@@ -118,7 +118,7 @@ def rerooted(
     pelvis = model.body(segments["pelvis"]).id
     root = int(model.body_rootid[pelvis])
     angle, limits = _attention(model, attention, name)
-    old, hinges, soles = _stood(model, segments, angle, limits)
+    old, hinges, soles = _stood(model, segments, angle, limits, name)
     new = _our_frames(model, segments, old, hinges, soles)
     path = way_up(model, pelvis)[::-1]
     owner = np.array(model.jnt_bodyid)  # the body that a joint moves, in the new tree
@@ -126,7 +126,8 @@ def rerooted(
     for parent, child in pairwise(path):
         owner[model.jnt_bodyid == child] = parent
     for side in "lr":
-        flip[_knee_that_flips(model, segments[f"shank_{side}"], hinges, name)] = True
+        shank, thigh = (segments[f"{role}_{side}"] for role in ("shank", "thigh"))
+        flip[_knee_that_flips(model, shank, thigh, hinges, name)] = True
     turned = np.isin(model.jnt_bodyid, path[1:])  # parent and child change places
     _write(spec, model, old, new, hinges, owner, flip, turned)
     spec = _nested(spec, model, new, path)
@@ -135,18 +136,17 @@ def rerooted(
     same = (old.turn.inv() * new.turn).magnitude() < 1e-4
     same &= np.linalg.norm(old.place - new.place, axis=1) < 1e-6
     robot = sorted(below(model, root))
-    turn, place = new.locally(root, old.turn[root], old.place[root])
-    origin = Origin(
-        _floating(was, model.body(root).name),
-        model.body(root).name,
-        tuple(place.tolist()),
-        tuple(turn.as_quat(scalar_first=True).tolist()),
-    )
+    origin = None
+    if len(path) > 1 or not same[robot].all():
+        turn, place = new.locally(root, old.turn[root], old.place[root])
+        base = model.body(root).name
+        quat = turn.as_quat(scalar_first=True)
+        origin = Origin(_floating(was, base), base, tuple(place.tolist()), tuple(quat.tolist()))
     return Rooted(
         spec,
         {names[j]: float(angle[j]) for j in own if angle[j]},
         tuple(names[j] for j in own if flip[j]),
-        None if len(path) == 1 and same[robot].all() else origin,
+        origin,
     )
 
 
@@ -174,11 +174,18 @@ def _attention(
 
 
 def _stood(
-    model: mujoco.MjModel, segments: Mapping[str, str], angle: FloatArray, limits: FloatArray
+    model: mujoco.MjModel,
+    segments: Mapping[str, str],
+    angle: FloatArray,
+    limits: FloatArray,
+    name: str,
 ) -> tuple[_Frames, _Hinges, list[FloatArray]]:
     """Return where all is at attention, in a world whose x axis is ahead and whose z axis is up.
 
     The last are the points around the left and the right foot, shape (P, 3) each.
+
+    Raises:
+        RobotError: Hips and ankles do not say where ahead and up are.
     """
     data = mujoco.MjData(model)
     data.qpos[:] = model.qpos0
@@ -193,7 +200,10 @@ def _stood(
     up = 0.5 * (hips[0] + hips[1] - ankles[0] - ankles[1])
     ahead = np.cross(left, up)
     axes = np.array([ahead, np.cross(up, ahead), up])
-    upright = Rotation.from_matrix(axes / np.linalg.norm(axes, axis=1, keepdims=True))
+    lengths = np.linalg.norm(axes, axis=1, keepdims=True)
+    if lengths.min() < 1e-9:
+        raise RobotError(f"robot {name!r}: its hips and ankles are in one line at attention")
+    upright = Rotation.from_matrix(axes / lengths)
     off = (_EXCHANGES.inv() * upright).magnitude()
     world = _EXCHANGES[int(off.argmin())] if off.min() < _ASKEW_RAD else upright
     turn = world * Rotation.from_quat(data.xquat, scalar_first=True)
@@ -238,16 +248,20 @@ def _our_frames(
     return _Frames(Rotation.concatenate(turns), places)
 
 
-def _knee_that_flips(model: mujoco.MjModel, shank: str, hinges: _Hinges, name: str) -> list[int]:
-    """Return the hinge of a shank if it counts negative when flexed, else nothing.
+def _knee_that_flips(
+    model: mujoco.MjModel, shank: str, thigh: str, hinges: _Hinges, name: str
+) -> list[int]:
+    """Return the hinge from a thigh to its shank if it counts negative when flexed, else nothing.
 
     Raises:
         RobotError: It does not turn about the line through the hips, or bends ahead.
     """
-    body = model.body(shank).id
-    if model.body_jntnum[body] != 1:
+    way = way_up(model, model.body(shank).id)
+    leg = way[: way.index(model.body(thigh).id)] if model.body(thigh).id in way else []
+    knees = [j for j in range(model.njnt) if model.jnt_bodyid[j] in leg]
+    if len(knees) != 1:
         return []
-    knee = int(model.body_jntadr[body])
+    knee = knees[0]
     hinge, aside = model.joint(knee).name, float(hinges.axis[knee, 1])
     if abs(aside) < _SIDEWAYS:
         raise RobotError(
@@ -361,9 +375,12 @@ def _name_classes(element: ET.Element, inherited: str | None) -> None:
 
 
 def _floating(xml: str, base: str) -> str:
-    """Return a model's text in which one of its bodies floats."""
+    """Return a model's text in which one of its bodies floats, and nothing else lies about."""
     spec = mujoco.MjSpec.from_string(xml)
     body = spec.body(base)
+    for other in list(spec.worldbody.bodies):
+        if other.parent.name == "world" and other.name != base:
+            spec.delete(other)
     if not any(joint.type == mujoco.mjtJoint.mjJNT_FREE for joint in body.joints):
         body.add_freejoint()
     return str(spec.to_xml())

@@ -347,9 +347,95 @@ def test_a_model_that_lies_in_another_frame_and_bends_its_knees_the_other_way_is
     robot = Robot.from_mjcf(other, "biped", BIPED_SEGMENTS)
     assert robot.flipped == ("knee_l", "knee_r") and robot.origin is None
     np.testing.assert_allclose(robot.position_limits, plain.position_limits, atol=1e-6)
-    a, b = reference_robot(robot), reference_robot(plain)
+    same_robot(robot, plain)
+
+
+def same_robot(one, other):
+    a, b = reference_robot(one), reference_robot(other)
     for field in ("rest", "corners", "inertia"):
         np.testing.assert_allclose(getattr(a, field), getattr(b, field), atol=1e-5)
+
+
+def framed():
+    """The biped with a thigh, a shape and a knee's axis in frames, one of them in another."""
+    text = biped().replace(
+        "<worldbody>",
+        """<default><default class="d"><joint damping="1"/>
+      </default></default><worldbody>""",
+    )
+    for found, instead in (
+        ('<body name="thigh_l" pos="0 0.1 -.1">', """<frame pos=".3 0 0" euler="0 0 90"><frame
+         childclass="d" pos="0 .3 0"><body name="thigh_l" pos=".1 0 -.1" euler="0 0 -90">"""),
+        ('<body name="thigh_r"', '</frame></frame><body name="thigh_r"'),
+        ("""<geom name="box_r" type="box" size=".1 .05 .02"
+      pos=".03 0 -.04"/>""", """<frame pos=".03 0 0" euler="0 0 90"><geom name="box_r" type="box"
+      size=".05 .1 .02" pos="0 0 -.04"/></frame>"""),
+        ('<joint name="knee_r" axis="0 1 0" range="-5 150"/>', """<frame euler="0 0 90"><joint
+         name="knee_r" axis="1 0 0" range="-5 150"/></frame>"""),
+    ):  # fmt: skip
+        assert text.count(found) == 1
+        text = text.replace(found, instead)
+    return text
+
+
+def test_frames_say_where_things_are_and_of_which_class():
+    robot = Robot.from_mjcf(framed(), "framed", BIPED_SEGMENTS)
+    same_robot(robot, Robot.from_mjcf(biped(), "biped", BIPED_SEGMENTS))
+    model = mujoco.MjModel.from_xml_string(robot.xml)
+    damping = {side: model.dof_damping[model.joint(f"knee_{side}").dofadr[0]] for side in "lr"}
+    assert damping == {"l": 1.0, "r": 0.0}
+
+
+def test_a_knee_on_a_link_of_its_own_flexes_the_same_way():
+    text = biped()
+    for s in "lr":
+        knee = f'<joint name="knee_{s}" axis="0 1 0" range="-5 150"/>'
+        counts_back = knee.replace("0 1 0", "0 -1 0").replace("-5 150", "-150 5")
+        link = f'<body name="link_{s}" pos="0 0 -.3"><geom size=".01" mass="1e-6"/>{counts_back}'
+        text = text.replace(knee, "")
+        text = text.replace(
+            f'<body name="shank_{s}" pos="0 0 -.3">', f'{link}<body name="shank_{s}">'
+        )
+        text = re.sub(rf'(<joint name="tilt_{s}"[^>]*/></body>\s*</body>)', r"\1</body>", text)
+    robot = Robot.from_mjcf(text, "linked", BIPED_SEGMENTS)
+    assert robot.flipped == ("knee_l", "knee_r")
+    same_robot(robot, Robot.from_mjcf(biped(), "biped", BIPED_SEGMENTS))
+
+
+DEEP = biped().replace('<body name="trunk" pos="0 0 1"><freejoint/>', """
+    <body name="top" pos="0 0 1.2"><freejoint/><geom size=".05" mass="3"/>
+    <body name="trunk" pos="0 0 -.2"><joint name="waist" axis="0 0 1" range="-45 45"/>
+    """).replace("</body></worldbody>", """</body></body>
+    <body name="ball"><freejoint/><geom size=".1"/></body></worldbody>""")  # fmt: skip
+
+
+def test_what_lies_about_in_the_world_of_a_rerooted_robot_is_left_out():
+    robot = Robot.from_mjcf(DEEP, "deep", BIPED_SEGMENTS)
+    assert robot.origin.base == "top"
+    own = in_own_terms(robot, np.array([reference_robot(robot).rest]))
+    assert own.joint_names[0] == "waist" and "ball" not in robot.origin.xml
+    assert own.root_pos[0, 2] == pytest.approx(reference_robot(robot).rest[2] + 0.2, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "change", "problem"),
+    [
+        (biped(), {"foot_l": "foot_r"}, r"'foot_r' cannot be all of \['foot_l', 'foot_r'\]"),
+        (biped(), {"pelvis": "world"}, "no body 'world'"),
+        (biped().replace(' name="roll_l"', ""), {}, "a hinge of 'thigh_l' has no name"),
+        (DEEP.replace(' name="top"', ""), {}, "the body that hangs on nothing has no name"),
+        (biped().replace("<freejoint/>", '<joint name="base"/>'), {}, "'base' ties 'trunk' to the"),
+    ],
+)
+def test_what_a_model_lacks_is_said(text, change, problem):
+    with pytest.raises(RobotError, match=problem):
+        Robot.from_mjcf(text, "x", BIPED_SEGMENTS | change)
+
+
+@pytest.mark.parametrize("angle", ["a", None, float("nan"), 9.0])
+def test_angles_at_attention_are_numbers_within_the_limits(angle):
+    with pytest.raises(RobotError, match="'knee_l'"):
+        Robot.from_mjcf(biped(), "x", BIPED_SEGMENTS, attention={"knee_l": angle})
 
 
 def test_a_knee_that_is_never_quite_straight_stands_nearly_so():
