@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mplearn.errors import RobotError
+from mplearn.errors import InvalidValueError, RobotError
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import FloatArray
 from mplearn_envs.execution.bodies import Body
@@ -33,11 +33,23 @@ class Push:
 
     Attributes:
         impulse_ns: Over 0.1 s [N s].
-        direction: Where to, one of `mplearn_envs.experiments.survival.DIRECTIONS`.
+        direction: Where to, one of `mplearn_envs.experiments.survival.DIRECTIONS`, as the robot
+            looks at the start.
+
+    Raises:
+        InvalidValueError: The impulse is not positive and finite, or there is no such direction.
     """
 
     impulse_ns: float
     direction: str = DIRECTIONS[0]
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.impulse_ns < np.inf:
+            raise InvalidValueError(f"impulse_ns must be positive, not {self.impulse_ns!r}")
+        if self.direction not in DIRECTIONS:
+            raise InvalidValueError(
+                f"direction must be one of {DIRECTIONS}, not {self.direction!r}"
+            )
 
 
 def show(

@@ -51,10 +51,14 @@ def test_perform_shows_primitives_and_survives_a_push(library_file, capsys):
     assert main(["perform", str(library_file), "--show", "hold", "BAR", *push]) == 0
     said = capsys.readouterr().out.splitlines()
     assert [line.split()[1].rstrip(",") for line in said[:3]] == ["hold", "BAR", "hold"]
-    assert "steps" in said[0] and "steps" not in said[2] and "1 primitives in" in said[3]
+    assert "steps" in said[0] and "steps" not in said[2] and "1 primitive in" in said[3]
     assert said[3].endswith("0 falls")
     assert "--push pushes what" in refused(capsys, "perform", library_file, "--push", "9")
     assert "jump" in refused(capsys, "perform", library_file, "--show", "jump")
+    show = ("perform", library_file, "--show", "BAR")
+    assert "give --push" in refused(capsys, *show, "--towards", "left")
+    said = refused(capsys, *show, "--steps", "3", "--upper-body")
+    assert "takes no --steps, --upper-body" in said
 
 
 def test_perform_writes_a_film(renderer, library_file, tmp_path):

@@ -192,6 +192,19 @@ def test_an_agent_chooses_the_speed_with_the_primitive(folder, config):
         replace(config, speeds=())
 
 
+def test_a_training_says_all_of_its_environment():
+    given = {"body": "harsh", "actions": {"illegal": "raise"}}
+    config = TrainingConfig("goal", speeds=(1.0, 0.5), discount=0.9, environment=given)
+    assert config.options == {
+        "task": "goal",
+        "dynamics": "kinematic",
+        "discount": 0.9,
+        "body": "harsh",
+        "actions": {"illegal": "raise", "speeds": (1.0, 0.5)},
+    }
+    assert given["actions"] == {"illegal": "raise"}
+
+
 def embedded(observation, env, slots):
     """Return an observation as an environment with more slots would show it."""
     out = {key: np.asarray(value) for key, value in observation.items()}

@@ -21,6 +21,14 @@ HELP = "Let the robot walk the graph of a library, do a task, or show primitives
 EXAMPLE = "mplearn perform my.mplearn --steps 20 --video walk.mp4"
 _GOAL = "path"
 _CUT_OFF = {"overshoot": math.inf, "slowest": 0.05}  # what is shown where not all can be
+_OF_WALKS: dict[str, Any] = {  # what --show does not take, and its defaults
+    "task": None,
+    "dynamics": "simulated",
+    "steps": 20,
+    "episodes": None,
+    "seed": 0,
+    "upper_body": False,
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -55,18 +63,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--towards",
         choices=[direction.replace(" ", "-") for direction in DIRECTIONS],
-        default=DIRECTIONS[0],
-        help=f"where it is pushed (default: {DIRECTIONS[0]})",
+        help=f"with --push: where to, as it looks at the start (default: {DIRECTIONS[0]})",
     )
     parser.add_argument("--task", help="task (default: the agent's, or free)")
     parser.add_argument(
-        "--dynamics", choices=["simulated", "kinematic"], default="simulated", help="how it moves"
+        "--dynamics",
+        choices=["simulated", "kinematic"],
+        help=f"how it moves (default: {_OF_WALKS['dynamics']})",
     )
     parser.add_argument(
-        "--steps", type=whole(1, noun="step"), default=20, help="how many primitives (default: 20)"
+        "--steps",
+        type=whole(1, noun="step"),
+        help=f"how many primitives (default: {_OF_WALKS['steps']})",
     )
     parser.add_argument("--episodes", type=count, help="how many episodes, instead of --steps")
-    parser.add_argument("--seed", type=seed, default=0, help="seed of the walk (default: 0)")
+    parser.add_argument("--seed", type=seed, help=f"of the walk (default: {_OF_WALKS['seed']})")
     parser.add_argument(
         "--speed", type=positive, default=0.5, help="share of the human's speed (default: 0.5)"
     )
@@ -76,11 +87,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="show only arms, head and the trunk's turn, standing: the default where the robot can "
         "perform none of the motions whole",
     )
+    parser.set_defaults(**_OF_WALKS)
     parser.add_argument(
         "--robot",
-        default="humanoid",
         metavar="ROBOT",
-        help=f"one of {', '.join(ROBOTS)} (default: humanoid), or FILE.toml that describes one",
+        help=f"one of {', '.join(ROBOTS)}, or FILE.toml that describes one (default: the agent's, "
+        "or humanoid)",
     )
     parser.add_argument("--video", type=Path, metavar="FILE.mp4", help="write a film of it")
     parser.add_argument(
@@ -108,12 +120,21 @@ def run(args: argparse.Namespace) -> None:
             )
     if args.push is not None and args.show is None:
         raise InvalidValueError("--push pushes what is performed by --show")
+    if args.towards is not None and args.push is None:
+        raise InvalidValueError("--towards says where --push pushes: give --push, too")
+    if args.show is not None:
+        walks = [name for name, usual in _OF_WALKS.items() if getattr(args, name) != usual]
+        if walks:
+            options = ", ".join(f"--{name.replace('_', '-')}" for name in walks)
+            raise InvalidValueError(
+                f"--show performs each primitive once, whole, in simulation; it takes no {options}"
+            )
     result, robot = _walked(args) if args.show is None else _shown(args)
     for k, step in enumerate(result.steps, start=1):
         print(f"{k:4d}  {step.name:24s} {step.duration_s:6.2f} s{'  FELL' if step.fallen else ''}")
     print(
-        f"{len(result.primitives)} primitives in {result.duration_s:.1f} s of the robot's time, "
-        f"{result.falls} falls"
+        f"{_counted(len(result.primitives), 'primitive')} in {result.duration_s:.1f} s of the "
+        f"robot's time, {_counted(result.falls, 'fall')}"
     )
     if result.successes is not None and result.episodes:
         print(f"{result.successes} of {result.episodes} episodes succeeded")
@@ -125,6 +146,10 @@ def run(args: argparse.Namespace) -> None:
         pictures = with_captions(film(result, robot.xml, balance=args.balance), result, names)
         n_pictures = write_video(args.video, pictures, result.rate_hz)
         print(f"film of {n_pictures} pictures written to {args.video}")
+
+
+def _counted(n: int, noun: str) -> str:
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
 
 
 def _walked(args: argparse.Namespace) -> tuple[WalkResult, Robot]:
@@ -140,20 +165,19 @@ def _walked(args: argparse.Namespace) -> tuple[WalkResult, Robot]:
     trained = TrainingConfig(task="free")
     if args.agent is not None:
         trained, *_ = TrainingConfig.load(args.agent / CONFIG)
-    options: dict[str, Any] = {
-        "library": args.library or trained.library,
+    options = trained.options | {
         "task": args.task or trained.task,
         "dynamics": args.dynamics,
-        "robot": make_robot(args.robot),
-        "actions": {"speeds": trained.speeds},
         "disable_env_checker": True,
     }
-    name = f"mplearn/PrimitiveHumanoid-{trained.env}"
-    if trained.env == "v1":
-        if options.pop("library") is not None:
+    if args.robot is not None:
+        options["robot"] = make_robot(args.robot)
+    if args.library is not None:
+        if trained.env == "v1":
             raise InvalidValueError("the agent was trained on v1, which has its own library")
-        options |= trained.environment
-    whole: dict[str, Any] = {"speed": args.speed}
+        options["library"] = args.library
+    name = f"mplearn/PrimitiveHumanoid-{trained.env}"
+    whole: dict[str, Any] = options.pop("motion", {}) | {"speed": args.speed}
     standing = whole | {"upper_body": True, "feasibility": _CUT_OFF}
     env = gymnasium.make(name, motion=standing if args.upper_body else whole, **options)
     repertoire = env.unwrapped.repertoire  # type: ignore[attr-defined]
@@ -178,8 +202,9 @@ def _shown(args: argparse.Namespace) -> tuple[WalkResult, Robot]:
     from mplearn_envs.data.library_source import LibrarySource
     from mplearn_envs.robot import make_robot
 
-    robot, library = make_robot(args.robot), LibrarySource(args.library).now()
-    push = None if args.push is None else Push(args.push, args.towards.replace("-", " "))
+    robot, library = make_robot(args.robot or "humanoid"), LibrarySource(args.library).now()
+    towards = {} if args.towards is None else {"direction": args.towards.replace("-", " ")}
+    push = None if args.push is None else Push(args.push, **towards)
     wanted = [primitive_key(name) for name in args.show]
     return show(library, robot, wanted, speed=args.speed, push=push), robot
 

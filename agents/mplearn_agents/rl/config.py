@@ -99,6 +99,17 @@ class TrainingConfig:
         if self.algorithm == "dqn" and self.n_envs not in (None, 1):
             raise InvalidValueError(f"dqn learns from 1 environment at once, not {self.n_envs}")
 
+    @property
+    def options(self) -> dict[str, Any]:
+        """Arguments of the environment that it learns from, beside its name."""
+        out: dict[str, Any] = {"task": self.task, "dynamics": self.dynamics}
+        given = {"library": self.library, "discount": self.discount}
+        out |= {name: value for name, value in given.items() if value is not None}
+        out |= self.environment
+        if self.speeds != USUAL_SPEED:
+            out["actions"] = {**out.get("actions", {}), "speeds": self.speeds}
+        return out
+
     def save(self, path: Path, slots: Mapping[int, int], ends: Mapping[int, Ends]) -> None:
         """Write this as JSON, with the slot and the ends of each primitive that the agent knows."""
         values = {"version": VERSION, **asdict(self)}

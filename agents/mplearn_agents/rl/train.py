@@ -18,7 +18,7 @@ import numpy as np
 from mplearn.errors import InvalidValueError
 from mplearn.extras import require
 
-from .config import USUAL_SPEED, TrainingConfig
+from .config import TrainingConfig
 from .encoding import measure_scaling
 from .projection import ProjectIllegal
 from .trained import CONFIG, POLICY, TrainedPolicy, ends_of
@@ -33,19 +33,8 @@ def make_environment(config: TrainingConfig) -> gymnasium.Env[Any, Any]:
     """Return an environment of a training, with illegal actions as the environment has them."""
     import mplearn_envs  # noqa: F401  (registers the environment)
 
-    options: dict[str, Any] = {"task": config.task, "dynamics": config.dynamics}
-    if config.env == "v0":
-        options["library"] = config.library
-    if config.discount is not None:
-        options["discount"] = config.discount
-    options |= config.environment
-    if config.speeds != USUAL_SPEED:
-        options["actions"] = {**options.get("actions", {}), "speeds": config.speeds}
-    return gymnasium.make(
-        f"mplearn/PrimitiveHumanoid-{config.env}",
-        disable_env_checker=True,
-        **options,
-    )
+    name = f"mplearn/PrimitiveHumanoid-{config.env}"
+    return gymnasium.make(name, disable_env_checker=True, **config.options)
 
 
 def train(

@@ -192,7 +192,7 @@ class Simulation:
                 on_frame()
         self._update_positions()
         return report._replace(
-            fallen=has_fallen(self.data.qpos, end.q, FALL_DROP_M),
+            fallen=self._diverged() or has_fallen(self.data.qpos, end.q, FALL_DROP_M),
             duration_s=done * plan.knot_s + len(back) * reflexes.law.period_s,
             n_steps=int(progress.mind.phase[3]),
             end=end,
@@ -210,10 +210,16 @@ class Simulation:
             n = max(2, int(wild.argmax()) + 1)
             q, v, fallen = q[:n], v[:n], True
             q[wild[:n]], v[wild[:n]] = q[0], v[0]
+        fallen = self._diverged() or fallen
+        return assess(self.robot, plan, q, v, fallen)
+
+    def _diverged(self) -> bool:
+        """Return whether MuJoCo put the robot back to its zero since this was asked last."""
+        found = False
         for each in _DIVERGED:
-            fallen = fallen or self.data.warning[each].number > 0
+            found |= bool(self.data.warning[each].number)
             self.data.warning[each].number = 0
-        return assess(self.robot, plan, q, v, bool(fallen))
+        return found
 
     def soles(self) -> FloatArray:
         """Return the lower corners of both soles, shape (2, 4, 3) [m]."""

@@ -76,6 +76,28 @@ def test_pictures_change_nothing(robot, planner, simulation):
         assert np.array_equal(one, other)
 
 
+def test_a_simulation_that_diverges_on_the_way_back_is_a_fall_of_that_time(
+    robot, planner, simulation, monkeypatch, tmp_path
+):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes what it warns of into a file there
+    plan, frames = planner.hold(rest_reference(robot), 0.6), []
+
+    def last_but_two():
+        frames.append(None)
+        if len(frames) == n - 2:
+            simulation.data.qvel[:] = np.inf
+
+    n = 0
+    for fallen in (False, True):
+        simulation.reset()
+        frames.clear()
+        report = simulation.perform(plan, last_but_two, 10, _push(simulation, 1.0, 30.0))
+        assert report.end is not None and report.fallen == fallen
+        n = len(frames)
+    simulation.reset()
+    assert not simulation.perform(plan).fallen
+
+
 def test_who_takes_no_steps_cannot_be_pushed(robot, planner):
     simulation = Simulation(robot)
     simulation.reset()
