@@ -194,7 +194,7 @@ def test_an_agent_chooses_the_speed_with_the_primitive(folder, config):
 
 def test_a_training_says_all_of_its_environment():
     given = {"body": "harsh", "actions": {"illegal": "raise"}}
-    config = TrainingConfig("goal", speeds=(1.0, 0.5), discount=0.9, environment=given)
+    config = TrainingConfig(task="goal", speeds=(1.0, 0.5), discount=0.9, environment=given)
     assert config.options == {
         "task": "goal",
         "dynamics": "kinematic",

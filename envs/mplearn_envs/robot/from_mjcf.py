@@ -7,7 +7,6 @@ it has some.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from math import radians
@@ -53,10 +52,6 @@ def described(
     for body in segments.values():
         if body not in bodies:
             raise RobotError(f"robot {name!r} has no body {body!r}; it has {sorted(bodies)}")
-    for body, n in Counter(segments[role] for role in NEEDED_ROLES).items():
-        if n > 1:
-            roles = [role for role in NEEDED_ROLES if segments[role] == body]
-            raise RobotError(f"robot {name!r}: {body!r} cannot be all of {roles}")
     for hinge, angle in attention.items():
         if hinge not in hinges:
             raise RobotError(f"robot {name!r} has no hinge {hinge!r}; it has {sorted(hinges)}")
@@ -113,6 +108,10 @@ def _require_humanoid(model: mujoco.MjModel, segments: Mapping[str, str], name: 
     for role, body in segments.items():
         if model.body(body).id not in own:
             found.append(f"{body!r} ({role}) is no part of {model.body(root).name!r}")
+    for body in dict.fromkeys(segments[role] for role in NEEDED_ROLES):
+        roles = [role for role in NEEDED_ROLES if segments[role] == body]
+        if len(roles) > 1 and roles not in (["shank_l", "foot_l"], ["shank_r", "foot_r"]):
+            found.append(f"{body!r} cannot be all of {roles}")
     found += [
         f"{thigh!r} does not hang on {segments['pelvis']!r}"
         for thigh in (segments["thigh_l"], segments["thigh_r"])
@@ -120,18 +119,17 @@ def _require_humanoid(model: mujoco.MjModel, segments: Mapping[str, str], name: 
     ]
     if not model.body(root).name:
         found.append("the body that hangs on nothing has no name")
-    for j in range(model.njnt):
-        kind, body = int(model.jnt_type[j]), int(model.jnt_bodyid[j])
+    for j in np.flatnonzero(np.isin(model.jnt_bodyid, list(own))):
+        joint, kind, owner = model.joint(j).name, int(model.jnt_type[j]), int(model.jnt_bodyid[j])
         if kind in kinds:
-            found.append(f"{model.joint(j).name!r} is a {kinds[kind]} joint, no hinge")
-        elif body in own and kind == mujoco.mjtJoint.mjJNT_HINGE:
-            if not model.joint(j).name:
-                found.append(f"a hinge of {model.body(body).name!r} has no name")
-            if body == root:
-                found.append(f"{model.joint(j).name!r} ties {model.body(root).name!r} to the world")
+            found.append(f"{joint!r} is a {kinds[kind]} joint, no hinge")
+        elif kind == mujoco.mjtJoint.mjJNT_HINGE and not joint:
+            found.append(f"a hinge of {model.body(owner).name!r} has no name")
+        elif kind == mujoco.mjtJoint.mjJNT_HINGE and owner == root:
+            found.append(f"{joint!r} ties {model.body(root).name!r} to the world")
     for side in "lr":
         shank, foot = segments[f"shank_{side}"], segments[f"foot_{side}"]
-        if not _hinges_above(model, foot, shank):
+        if foot != shank and not _hinges_above(model, foot, shank):
             found.append(
                 f"there is no ankle, a hinge from {shank!r} to {foot!r}: that foot is a part of "
                 "the shank, and cannot stay flat on the floor when the leg leans"

@@ -58,7 +58,8 @@ def _lift(parent: ET.Element) -> None:
             _lift(child)
             k += 1
             continue
-        kind = child.get("childclass")
-        for own in child if kind is not None else ():
-            own.attrib.setdefault("childclass" if own.tag in ("body", "frame") else "class", kind)
+        if (kind := child.get("childclass")) is not None:
+            for own in child:
+                nests = own.tag in ("body", "frame")
+                own.attrib.setdefault("childclass" if nests else "class", kind)
         parent[k : k + 1] = list(child)

@@ -386,27 +386,32 @@ def test_frames_say_where_things_are_and_of_which_class():
     assert damping == {"l": 1.0, "r": 0.0}
 
 
-def test_a_knee_on_a_link_of_its_own_flexes_the_same_way():
-    text = biped()
+def linked(sign):
+    """The biped with knees on links of their own, whose hinges count positive or negative."""
+    text, limits = biped(), {1: "-5 150", -1: "-150 5"}[sign]
     for s in "lr":
-        knee = f'<joint name="knee_{s}" axis="0 1 0" range="-5 150"/>'
-        counts_back = knee.replace("0 1 0", "0 -1 0").replace("-5 150", "-150 5")
-        link = f'<body name="link_{s}" pos="0 0 -.3"><geom size=".01" mass="1e-6"/>{counts_back}'
-        text = text.replace(knee, "")
+        knee = f'<joint name="knee_{s}" axis="0 {sign} 0" range="{limits}"/>'
+        link = f'<body name="link_{s}" pos="0 0 -.3"><geom size=".01" mass="1e-3"/>{knee}'
+        text = text.replace(f'<joint name="knee_{s}" axis="0 1 0" range="-5 150"/>', "")
         text = text.replace(
             f'<body name="shank_{s}" pos="0 0 -.3">', f'{link}<body name="shank_{s}">'
         )
         text = re.sub(rf'(<joint name="tilt_{s}"[^>]*/></body>\s*</body>)', r"\1</body>", text)
-    robot = Robot.from_mjcf(text, "linked", BIPED_SEGMENTS)
-    assert robot.flipped == ("knee_l", "knee_r")
-    same_robot(robot, Robot.from_mjcf(biped(), "biped", BIPED_SEGMENTS))
+    return Robot.from_mjcf(text, "linked", BIPED_SEGMENTS)
+
+
+def test_a_knee_on_a_link_of_its_own_flexes_the_same_way():
+    one, other = linked(1), linked(-1)
+    assert one.flipped == () and other.flipped == ("knee_l", "knee_r")
+    np.testing.assert_allclose(one.position_limits, other.position_limits, atol=1e-6)
+    same_robot(one, other)
 
 
 DEEP = biped().replace('<body name="trunk" pos="0 0 1"><freejoint/>', """
     <body name="top" pos="0 0 1.2"><freejoint/><geom size=".05" mass="3"/>
     <body name="trunk" pos="0 0 -.2"><joint name="waist" axis="0 0 1" range="-45 45"/>
     """).replace("</body></worldbody>", """</body></body>
-    <body name="ball"><freejoint/><geom size=".1"/></body></worldbody>""")  # fmt: skip
+    <body name="ball"><joint type="ball"/><geom size=".1"/></body></worldbody>""")  # fmt: skip
 
 
 def test_what_lies_about_in_the_world_of_a_rerooted_robot_is_left_out():
