@@ -112,9 +112,9 @@ def foreknowledge_robot():
 
 
 def test_people_of_a_split_come_and_their_ways_differ(env):
+    people = {env.reset(seed=seed)[1]["person"] for seed in range(40)}
     with pytest.raises(InvalidValueError, match=r"\('person', 'target'\) here, not \['people'\]"):
         env.reset(options={"people": 7})
-    people = {env.reset(seed=seed)[1]["person"] for seed in range(40)}
     assert people == set(SPLITS["train"])
     test = make(people="test")
     assert {test.reset(seed=seed)[1]["person"] for seed in range(20)} == set(SPLITS["test"])
