@@ -65,6 +65,13 @@ def _watch_motion(
 ) -> int:
     """Look for the reversal or the pause that ends a motion."""
     t = m.frames - 1
+    if s > m.peak:
+        m.peak = s
+        m.valley = s
+        m.valley_frame = t
+    elif s < m.valley:
+        m.valley = s
+        m.valley_frame = t
     if s >= 1.5 * low:
         m.dip_frame = -1
     elif s < low and m.dip_frame < 0:
@@ -73,14 +80,6 @@ def _watch_motion(
     if m.dip_frame >= 0:  # a pause may be beginning, which must not be cut before it is one
         ready = min(ready, 1.0)
     share = min(_MOST, hysteresis * ready)
-    passed = m.valley < share * m.peak and s >= max(m.valley / share, low)  # the last valley
-    if s > m.peak and not passed:
-        m.peak = s
-        m.valley = s
-        m.valley_frame = t
-    elif s < m.valley:
-        m.valley = s
-        m.valley_frame = t
     if m.dip_frame >= 0 and t - m.dip_frame >= p.still:
         if m.dip_frame - m.start >= p.shortest:
             n = close(m, p, m.dip_frame, 1.0 - m.valley / low, False, REST, out, 0)
@@ -88,14 +87,13 @@ def _watch_motion(
         m.rest = 0.5 * low
         m.rest_frames = p.still
         m.dip_frame = -1
-    elif passed:
+    elif m.valley < share * m.peak and s >= max(m.valley / share, low):
         if m.valley_frame - m.start >= p.shortest:
             sure = 1.0 - m.valley / (share * m.peak)
             middle = _dip_middle(m, max(m.valley / share, low), speeds)
             cause = DIP if m.valley < hysteresis * m.peak else KNOWN
             n = close(m, p, middle, sure, False, cause, out, 0)
             m.mode = MOVING
-        m.peak = max(m.peak, s)
         m.valley = s
         m.valley_frame = t
     return n

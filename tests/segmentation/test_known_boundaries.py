@@ -156,18 +156,3 @@ def test_boundaries_of_people_no_setting_was_chosen_on(name, person):
     score = score_boundaries(segments, session.labels, 100.0)
     assert score.f1 >= 0.9
     assert score.median_delay_s <= 0.2
-
-
-@both
-@pytest.mark.parametrize("rate_hz", [20.0, 24.0, 30.0, 60.0, 250.0])
-def test_a_dip_before_a_sudden_start_is_a_boundary_at_any_rate(name, rate_hz):
-    """At few frames a second the speed is past the last peak in the frame after the dip."""
-    t = np.arange(0, 3.0, 1 / rate_hz)
-    slow, fast = (
-        0.5 * np.sin(np.pi * np.minimum(t, 1.0) / 1.0) ** 2,
-        40.0 * np.clip(t - 1.06, 0, 0.12),
-    )
-    speed = np.maximum(slow + 0.02, fast * (t < 2.4))
-    frames = np.cumsum(speed)[:, None] / rate_hz * np.array([[1.0, 0.6, -0.4]])
-    ends = [s.end / rate_hz for s in make_segmenter(name, 3, rate_hz).segment(frames)]
-    assert any(abs(end - 0.97) < 0.06 for end in ends)
