@@ -9,7 +9,7 @@ from ..errors import InvalidValueError
 from ..learner import LearnerConfig, LearnerState, MotionLearner
 from ..learner.chain import Chain
 from .graphs import merge_graphs
-from .people import merge_many
+from .people import merged_people
 from .watching import merge_watching
 
 
@@ -96,7 +96,7 @@ def _merged(learners: Iterable[MotionLearner]) -> tuple[MotionLearner, bool]:
         if first.watching is not None and other.watching is not None:
             own |= merge_watching(first.watching, other.watching)
         people.append(own)
-    merged = merge_many([each.tree for each in all_of_them], people)
+    merged = merged_people([each.tree for each in all_of_them], people)
     graph = merge_graphs(
         (each.graph, {id: new_id[id] for id in each.graph.ids})
         for each, new_id in zip(all_of_them, merged.new_ids, strict=True)

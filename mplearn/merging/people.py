@@ -17,48 +17,6 @@ from .trees import merge_trees
 
 
 class MergedPeople(NamedTuple):
-    """Two trees of several people as one.
-
-    Attributes:
-        tree: The tree, which goes on learning.
-        first: Its id of each primitive of the first tree; most keep theirs.
-        second: Its id of each primitive of the second.
-        new_number: How much its numbers of the second tree's segments are larger than they were.
-        placed: Segments that neither tree had placed, and the primitive that each is in now.
-        moved: Other segments that changed their primitive, unlike most of it; `ROOT` for none.
-    """
-
-    tree: PeopleTree
-    first: dict[int, int]
-    second: dict[int, int]
-    new_number: int
-    placed: dict[int, int]
-    moved: dict[int, int]
-
-
-def merge_people(first: PeopleTree, second: PeopleTree, people: Mapping[int, int]) -> MergedPeople:
-    """Merge two trees of several people; neither changes.
-
-    The trees of a person whom both know become one (`merge_trees`); then it is found again which
-    leaves are one primitive. That depends on the order of the two only for the names of primitives.
-
-    Args:
-        first: One tree.
-        second: The other.
-        people: Number in the first of each person of the second, who may be new to the first.
-
-    Raises:
-        InvalidValueError: The trees have other rules, channels or rates.
-    """
-    own = {person: person for person in first.people}
-    merged = merge_many([first.copy(), second.copy()], [own, people])
-    mine, theirs = merged.new_ids
-    return MergedPeople(
-        merged.tree, mine, theirs, merged.new_numbers[1], merged.placed, merged.moved
-    )
-
-
-class MergedMany(NamedTuple):
     """Trees of several people as one.
 
     Attributes:
@@ -76,11 +34,11 @@ class MergedMany(NamedTuple):
     moved: dict[int, int]
 
 
-def merge_many(trees: Sequence[PeopleTree], people: Sequence[Mapping[int, int]]) -> MergedMany:
-    """Merge trees of several people, all of which are used up; see `merge_people`.
+def merge_people(trees: Sequence[PeopleTree], people: Sequence[Mapping[int, int]]) -> MergedPeople:
+    """Merge trees of several people; none changes.
 
-    The trees of each person are merged at once, and it is found once which leaves are one
-    primitive.
+    The trees of each person are merged at once (`merge_trees`), and it is found once which leaves
+    are one primitive. That depends on the order of the trees only for the names of primitives.
 
     Args:
         trees: The trees, at least one.
@@ -90,12 +48,17 @@ def merge_many(trees: Sequence[PeopleTree], people: Sequence[Mapping[int, int]])
     Raises:
         InvalidValueError: The trees have other rules, channels or rates.
     """
+    return merged_people([tree.copy() for tree in trees], people)
+
+
+def merged_people(trees: Sequence[PeopleTree], people: Sequence[Mapping[int, int]]) -> MergedPeople:
+    """Return what `merge_people` makes of some trees, all of which are used up."""
     first = trees[0]
     seen = [k for k, tree in enumerate(trees) if tree.n_seen or k == 0]
     everyone = {people[k][person] for k in seen for person in trees[k].people}
     some = [trees[k] for k in seen]
     if len(seen) == 1:
-        merged = MergedMany(first, ({id: id for id in first.leaves},), (0,), {}, {})
+        merged = MergedPeople(first, ({id: id for id in first.leaves},), (0,), {}, {})
     elif len(everyone) == 1:
         merged = _of_one_person(some)
     else:
@@ -109,17 +72,17 @@ def merge_many(trees: Sequence[PeopleTree], people: Sequence[Mapping[int, int]])
     )
 
 
-def _of_one_person(trees: Sequence[PeopleTree]) -> MergedMany:
+def _of_one_person(trees: Sequence[PeopleTree]) -> MergedPeople:
     first, leaves = trees[0], [tree.leaves for tree in trees]
     joined = merge_trees([tree.of(tree.people[0]) for tree in trees])
     first.adopt({first.people[0]: joined.tree}, sum(tree.n_seen for tree in trees))
     new_ids = tuple(
         {id: new_id[id] for id in own} for own, new_id in zip(leaves, joined.new_ids, strict=True)
     )
-    return MergedMany(first, new_ids, joined.new_numbers, dict(joined.change.moved), {})
+    return MergedPeople(first, new_ids, joined.new_numbers, dict(joined.change.moved), {})
 
 
-def _of_several(trees: Sequence[PeopleTree], people: Sequence[Mapping[int, int]]) -> MergedMany:
+def _of_several(trees: Sequence[PeopleTree], people: Sequence[Mapping[int, int]]) -> MergedPeople:
     leaves = [tree.leaves for tree in trees]
     parts = []
     ids = numbers = 0
@@ -154,7 +117,7 @@ def _of_several(trees: Sequence[PeopleTree], people: Sequence[Mapping[int, int]]
     heirs, moved = _regrouped(sharing, origins)
     trees[0].adopt(sharing.trees, sharing.n_seen)
     homes = {leaf.key: leaf.primitive for leaf in sharing.leaves}
-    return MergedMany(
+    return MergedPeople(
         trees[0],
         tuple(
             {id: heirs[id + part.ids] for id in own}

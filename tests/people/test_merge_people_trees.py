@@ -39,9 +39,14 @@ def shards():
 FORTH, BACK = {1: 1, 0: 2}, {1: 1, 0: 2}  # the first of each is new to the other
 
 
+def merged(one, two, people):
+    """Merge two trees, given the number in the first of each person of the second."""
+    return merge_people([one, two], [{person: person for person in one.people}, people])
+
+
 def meanings(united, one, two):
     """The motion of each primitive, by what it holds."""
-    shows = one.shows | {n + united.new_number: motion for n, motion in two.shows.items()}
+    shows = one.shows | {n + united.new_numbers[1]: motion for n, motion in two.shows.items()}
     held = {
         id: Counter(shows[n] for n in united.tree.node(id).members) for id in united.tree.leaves
     }
@@ -50,7 +55,7 @@ def meanings(united, one, two):
 
 def test_who_is_in_both_has_one_tree_and_each_motion_one_primitive(shards):
     one, two, _ = shards
-    united = merge_people(one.tree, two.tree, FORTH)
+    united = merged(one.tree, two.tree, FORTH)
     tree = united.tree
     assert tree.people == (0, 1, 2)
     assert tree.n_seen == one.tree.n_seen + two.tree.n_seen
@@ -65,10 +70,10 @@ def test_who_is_in_both_has_one_tree_and_each_motion_one_primitive(shards):
 
 def test_primitives_keep_their_names_and_their_meaning(shards):
     one, two, _ = shards
-    united = merge_people(one.tree, two.tree, FORTH)
+    united = merged(one.tree, two.tree, FORTH)
     names = meanings(united, one, two)
-    assert united.first == {id: id for id in one.tree.leaves}
-    for shard, new_id in ((one, united.first), (two, united.second)):
+    assert united.new_ids[0] == {id: id for id in one.tree.leaves}
+    for shard, new_id in zip((one, two), united.new_ids, strict=True):
         assert set(new_id) == set(shard.tree.leaves)
         for old, new in new_id.items():
             shown = Counter(shard.shows[n] for n in shard.tree.node(old).members)
@@ -77,7 +82,7 @@ def test_primitives_keep_their_names_and_their_meaning(shards):
 
 def test_the_order_of_the_two_changes_names_only(shards):
     one, two, _ = shards
-    forth, back = merge_people(one.tree, two.tree, FORTH), merge_people(two.tree, one.tree, BACK)
+    forth, back = merged(one.tree, two.tree, FORTH), merged(two.tree, one.tree, BACK)
 
     def content(united, first, second, people):
         return {
@@ -94,7 +99,7 @@ def test_the_order_of_the_two_changes_names_only(shards):
 
 def test_a_united_tree_goes_on_and_is_kept(shards):
     one, two, teacher = shards
-    tree = merge_people(one.tree, two.tree, FORTH).tree
+    tree = merged(one.tree, two.tree, FORTH).tree
     again = PeopleTree(QUICK, D, 100.0, people=RULES)
     again.load_state(tree.state())
     before, known = tree.n_seen, tree.leaves
@@ -112,7 +117,7 @@ def test_a_united_tree_goes_on_and_is_kept(shards):
 def test_people_who_are_strangers_are_kept_apart_and_yet_share(shards):
     one, two, _ = shards
     before = one.tree.state(), two.tree.state()
-    tree = merge_people(one.tree, two.tree, {0: 2, 1: 3}).tree
+    tree = merged(one.tree, two.tree, {0: 2, 1: 3}).tree
     assert tree.people == (0, 1, 2, 3) or tree.people == (0, 1, 3, 2)
     assert len(tree.leaves) == N_MOTIONS
     sound(tree)
@@ -127,7 +132,7 @@ def test_what_a_person_said_holds_in_the_union(shards):
     tree.merge(first, second)
     id = next(id for id in tree.leaves if id != first)
     tree.split(id)
-    united = merge_people(one.tree, tree, {1: 3, 0: 2}).tree
+    united = merged(one.tree, tree, {1: 3, 0: 2}).tree
     sound(united)
     keys = [{each.key for each in united.sharing().leaves_of(id)} for id in united.leaves]
     assert sum(len({key for key in group if key[0] in (2, 3)}) > 1 for group in keys) == len(
@@ -139,8 +144,8 @@ def test_nothing_learned_adds_nothing(shards):
     one, _, _ = shards
     empty = PeopleTree(QUICK, D, 100.0, people=RULES)
     for united in (
-        merge_people(one.tree, empty, {0: 0}),
-        merge_people(empty, one.tree, {0: 0, 1: 1}),
+        merged(one.tree, empty, {0: 0}),
+        merged(empty, one.tree, {0: 0, 1: 1}),
     ):
         assert len(united.tree.leaves) == len(one.tree.leaves)
         assert united.tree.n_seen == one.tree.n_seen

@@ -28,7 +28,7 @@ def shards():
 
 def united(shards):
     (one, shown), (two, also) = shards
-    tree, *_, new_number, _, _ = merge_people(one, two, {0: 1})
+    tree, _, (_, new_number), *_ = merge_people([one, two], [{0: 0}, {0: 1}])
     return tree, shown | {n + new_number: motion for n, motion in also.items()}
 
 

@@ -93,7 +93,7 @@ class SLEAPReader(Reader):
         if not rows or "z" in map(str.lower, rows[0]):
             return False
         head = _Head.of(rows[0])
-        return head.is_sleap and bool(head.points or head.node is not None)
+        return head.is_sleap and bool(head.points)
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read the track that was seen most; see `Reader.read`."""
@@ -127,7 +127,8 @@ class _Head:
     """What the names in the first row of a table say.
 
     Attributes:
-        points: Columns of each point, by its name and by ``x``, ``y``, ... in small letters.
+        points: Columns of each point, by its name and by ``x``, ``y``, ... in small letters; where
+            a row is one point, those of a point without a name.
         frame: Column of the frames' numbers; None where there is none.
         track: Column that tells animals apart; None where there is none.
         node: Column of the points' names where a row is one point; None where it is not.
@@ -155,55 +156,75 @@ class _Head:
             if match and match[2].lower() in _COORDS and match[1].lower() not in _TRACKS:
                 points.setdefault(match[1], {})[match[2].lower()] = k
         if node is not None:
-            points = {}
+            points = {"": {name: names.index(name) for name in names if name in _COORDS}}
         return cls(points, column(_FRAMES), column(_TRACKS), node, "frame_idx" in names)
+
+    @property
+    def coords(self) -> dict[tuple[str, str], int]:
+        """The column of each coordinate of each point."""
+        return {(p, c): k for p, each in self.points.items() for c, k in each.items()}
 
 
 def _flat(path: Path, hints: Hints, findings: Findings) -> Recording:
     """Read a table with one row of names."""
-    rows = _rows(path)
-    head = _Head.of(rows[0][1]) if rows else None
-    if head is None or not (head.points or head.node is not None) or len(rows) < 2:
-        raise bad_file(path, "no rows of key points", "names of columns, then a row for each frame")
-    width = len(rows[0][1])
-    for n, row in rows[1:]:
-        if len(row) != width:
-            raise bad_file(path, f"line {n} has {len(row)} columns", f"{width}, as the names")
-    body, lines = [row for _, row in rows[1:]], [n for n, _ in rows[1:]]
-    if head.node is not None:
-        names = [name.lower() for name in rows[0][1]]
-        own = {each: names.index(each) for each in names if each in _COORDS}
-    else:
-        own = {f"{p} {c}": k for p, each in head.points.items() for c, k in each.items()}
-    used = [*([] if head.frame is None else [head.frame]), *own.values()]
-    table = numbers(path, [[row[k] for k in used] for row in body], len(used), lines)
-    at = table[:, 0] if head.frame is not None else np.arange(len(table), dtype=np.float64)
-    values = table[:, 1:] if head.frame is not None else table
+    head, lines, body = _named_rows(path)
+    coords = head.coords
+    used = [*([] if head.frame is None else [head.frame]), *coords.values()]
+    values = numbers(path, [[row[k] for k in used] for row in body], len(used), lines)
+    at = np.arange(len(values), dtype=np.float64)
+    if head.frame is not None:
+        at, values = values[:, 0], values[:, 1:]
     who = [row[head.track] if head.track is not None else "" for row in body]
     seen: Counter[str] = Counter()
     for track, n_values in zip(who, np.isfinite(values).sum(axis=1).tolist(), strict=True):
         seen[track] += n_values
     rate_hz = _rate(path, hints, findings)
     most = _seen_most(seen, findings)
-    rows_of = np.array([track == most for track in who])
-    first, last = _span(path, at[rows_of])
-    frames = at[rows_of].astype(np.int64) - first
-    width = values.shape[1]
-    if head.node is None:
-        place = dict(zip(own, range(width), strict=True))
-        points = {p: {c: place[f"{p} {c}"] for c in each} for p, each in head.points.items()}
-        begin = np.zeros(len(frames), dtype=np.int64)
-    else:
-        nodes = [row[head.node] for row, is_of in zip(body, rows_of, strict=True) if is_of]
-        known = {node: width * j for j, node in enumerate(dict.fromkeys(nodes))}
-        points = {n: {c: j + k for k, c in enumerate(own)} for n, j in known.items()}
-        begin = np.array([known[node] for node in nodes], dtype=np.int64)
-    n_columns = max(len(points) if head.node is not None else 1, 1) * width
-    if (last - first + 1) * n_columns > 10 * values.size + 100_000:
+    own = [k for k, track in enumerate(who) if track == most]
+    nodes = [body[k][head.node] for k in own] if head.node is not None else [""] * len(own)
+    table, place = _by_node(path, at[own], values[own], nodes, 10 * values.size + 100_000)
+    points: dict[str, dict[str, int]] = {}
+    for node, begin in place.items():
+        for k, (point, coord) in enumerate(coords):
+            points.setdefault(point or node, {})[coord] = begin + k
+    return _recording(path, _points(path, table, points), most, rate_hz, findings)
+
+
+def _named_rows(path: Path) -> tuple[_Head, list[int], list[list[str]]]:
+    """Return what the first row says, and the numbers and cells of all others."""
+    rows = _rows(path)
+    head = _Head.of(rows[0][1]) if rows else None
+    if head is None or not head.coords or len(rows) < 2:
+        raise bad_file(path, "no rows of key points", "names of columns, then a row for each frame")
+    width = len(rows[0][1])
+    for n, row in rows[1:]:
+        if len(row) != width:
+            raise bad_file(path, f"line {n} has {len(row)} columns", f"{width}, as the names")
+    return head, [n for n, _ in rows[1:]], [row for _, row in rows[1:]]
+
+
+def _by_node(
+    path: Path, at: FloatArray, values: FloatArray, nodes: list[str], most: int
+) -> tuple[FloatArray, dict[str, int]]:
+    """Return a table with a row for each frame, and the first column of each node in it.
+
+    Args:
+        path: The file, for errors.
+        at: The frame of each row, shape (R,).
+        values: The rows, shape (R, K).
+        nodes: The node that each is of.
+        most: Numbers that the table may hold.
+    """
+    first, last = _span(path, at)
+    n_values = values.shape[1]
+    place = {node: n_values * j for j, node in enumerate(dict.fromkeys(nodes))}
+    n_frames, n_columns = last - first + 1, n_values * len(place)
+    if n_frames * n_columns > most:
         raise bad_file(path, "hardly any points in most frames", "most points in each")
-    whole = np.full((last - first + 1, n_columns), np.nan)
-    whole[frames[:, None], begin[:, None] + np.arange(width)] = values[rows_of]
-    return _recording(path, _points(path, whole, points), most, rate_hz, findings)
+    table = np.full((n_frames, n_columns), np.nan)
+    begin = np.array([place[node] for node in nodes], dtype=np.int64)
+    table[(at - first).astype(np.int64)[:, None], begin[:, None] + np.arange(n_values)] = values
+    return table, place
 
 
 def _first_rows(path: Path) -> list[list[str]]:
