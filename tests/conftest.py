@@ -1,6 +1,10 @@
 import pytest
+from hypothesis import settings
 
 from mplearn_envs.rendering.backend import choose_backend
+
+settings.register_profile("untimed", deadline=None)  # no time is right on every machine
+settings.load_profile("untimed")
 
 CAN_DRAW = choose_backend()  # before anything imports mujoco, which reads MUJOCO_GL then
 

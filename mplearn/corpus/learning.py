@@ -23,7 +23,7 @@ from ..learner import LearnerConfig, MotionLearner
 from ..learner.learner_state import FILES
 from ..merging import merged_learner, merged_state
 from ..mocap import TakeFiles, find_takes
-from ..state import to_plain
+from ..state import from_plain, to_plain
 from ..store import learner_of
 from .dealing import SHARD_TAKES, Shard, deal
 from .executors import Executor, Here, Processes
@@ -165,7 +165,7 @@ def _planned(
     if path.exists():
         try:
             kept = json.loads(path.read_text(encoding="utf-8"))
-            usual, config = (LearnerConfig.from_dict(kept[key]) for key in ("usual", "config"))
+            usual, config = (from_plain(LearnerConfig, kept[key]) for key in ("usual", "config"))
             dealt = tuple(Shard(str(who), tuple(names)) for who, names in kept["shards"])
         except (ValueError, KeyError, TypeError, MPLearnError) as error:
             raise InvalidValueError(f"{path} is damaged, or of something else: {error}") from error

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from ..errors import InvalidValueError
 from ..people import PeopleConfig
-from ..state import fields_of, from_plain, newer
+from ..state import from_settings, newer, to_settings
 from ..tree import TreeConfig
 
 LOWEST_HZ, HIGHEST_HZ = 20.0, 250.0
@@ -62,7 +62,7 @@ class LearnerConfig:
     rate_hz: float = 100.0
     observe: Literal["robot", "markers"] = "robot"
     segmenter: str = "kohlmorgen-lemm"
-    scaffolding: bool = newer(False, absent=False)
+    scaffolding: bool = newer(True, absent=False)
     tree: TreeConfig = field(default_factory=TreeConfig)
     people: PeopleConfig = field(default_factory=PeopleConfig)
     longest_pause_s: float = 2.0
@@ -90,8 +90,8 @@ class LearnerConfig:
         Raises:
             StateError: A setting is not known, or has no such value; its place says which.
         """
-        return from_plain(cls, dict(settings))
+        return from_settings(cls, dict(settings))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the configuration as plain values, which JSON can hold."""
-        return fields_of(self)
+        return to_settings(self)

@@ -23,6 +23,8 @@ from .fields import require as require
 from .fields import require_no_cycle as require_no_cycle
 from .fields import saved_as as saved_as
 from .files import FileFormat as FileFormat
+from .settings import from_settings as from_settings
+from .settings import to_settings as to_settings
 from .structure import from_plain as from_plain
 from .structure import validated as validated
 from .structure import within as within

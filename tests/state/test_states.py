@@ -1,6 +1,7 @@
 """States as plain values, bytes and files, and back: nothing is lost, what is wrong is named."""
 
-from dataclasses import dataclass, field, replace
+import json
+from dataclasses import dataclass, field, fields, replace
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -258,3 +259,19 @@ def test_a_field_with_a_new_name_keeps_the_old_one_in_files():
     assert caught.value.place == "normalisation.head"
     with pytest.raises(StateError, match="'normalisation' twice, also as 'form'"):
         from_plain(TreeConfig, plain | {"form": {}})
+
+
+@pytest.mark.parametrize("tree", [{}, {"normalisation": {"head": 0.1}}, {"form": {"head": 0.1}}])
+def test_settings_that_are_not_named_take_their_default_at_any_depth(tree):
+    config = LearnerConfig.from_dict({"channels": ["a"], "tree": tree})
+    head = 0.1 if tree else NormalisationConfig().head
+    assert config.tree == TreeConfig(normalisation=NormalisationConfig(head=head))
+    assert config.scaffolding == LearnerConfig(("a",)).scaffolding
+
+
+def test_all_settings_survive_a_way_through_json():
+    config = LearnerConfig(("a",), tree=TreeConfig.printed(), scaffolding=False)
+    assert LearnerConfig.from_dict(json.loads(json.dumps(config.to_dict()))) == config
+    for name in ("scaffolding", "tree", "people"):
+        assert name in config.to_dict()
+    assert set(config.to_dict()["tree"]) == {each.name for each in fields(TreeConfig)}

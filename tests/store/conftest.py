@@ -22,7 +22,17 @@ def motions() -> Recording:
 @pytest.fixture(scope="session")
 def taught(motions: Recording) -> MotionLearner:
     """What was learned of two thirds of them; to be copied, not changed."""
-    learner = MotionLearner(LearnerConfig(motions.channels, motions.rate_hz))
+    return learned(motions)
+
+
+@pytest.fixture(scope="session")
+def taught_unaided(motions: Recording) -> MotionLearner:
+    """The same where what is known does not help to cut: an edit changes no later segment."""
+    return learned(motions, scaffolding=False)
+
+
+def learned(motions: Recording, **settings: bool) -> MotionLearner:
+    learner = MotionLearner(LearnerConfig(motions.channels, motions.rate_hz, **settings))
     learner.learn_many(motions.frames[: two_thirds(motions)])
     return learner
 

@@ -91,10 +91,10 @@ def test_undo_restores_the_library_to_the_bit_and_redo_does_it_again(
 
 @pytest.mark.parametrize("command", [Merge(1, 2), Split(1), Split(3)], ids=str)
 def test_what_was_learned_since_stays_when_a_command_is_undone(
-    taught: MotionLearner, later: FloatArray, command: Command
+    taught_unaided: MotionLearner, later: FloatArray, command: Command
 ) -> None:
-    life, untouched = life_of(taught), life_of(taught)
-    n_before = taught.tree.n_seen
+    life, untouched = life_of(taught_unaided), life_of(taught_unaided)
+    n_before = taught_unaided.tree.n_seen
     life.execute(command)
     for each in (life, untouched):
         each.learn_many(later)
