@@ -11,9 +11,9 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -39,6 +39,7 @@ NAMES = {
     "BAU": "bend return",
 }
 MOST_REPEATS = 20
+PATIENCE_S = 600.0  # for what comes later on a busy machine, but comes
 ARMS, BENDS = ("BAR", "BAL"), ("BAD", "BAU")
 SEQUENCE = (*ARMS, *BENDS, *BENDS, *ARMS, *ARMS, *BENDS, *ARMS, *BENDS, *BENDS, *ARMS)
 
@@ -85,7 +86,7 @@ def live(*options: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
         process.stdout.close()
 
 
-def until(check: Callable[[], Any], timeout_s: float = 60.0, what: str = "") -> Any:
+def until(check: Callable[[], Any], timeout_s: float = PATIENCE_S, what: str = "") -> Any:
     """Return what ``check`` returns as soon as that is something."""
     end = time.monotonic() + timeout_s
     while True:
@@ -97,25 +98,17 @@ def until(check: Callable[[], Any], timeout_s: float = 60.0, what: str = "") -> 
         time.sleep(0.03)
 
 
-def free_port() -> int:
-    """Return a port that nobody uses."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 class Teacher:
     """Stands before the cameras and looks at the page.
 
     Args:
         page: The page.
-        port: Where the frames go.
         speed: Times as fast as a person.
         seed: Of everything random.
     """
 
-    def __init__(self, page: Any, port: int, speed: float, seed: int = 0) -> None:
-        self.page, self.port, self.speed = page, port, speed
+    def __init__(self, page: Any, speed: float, seed: int = 0) -> None:
+        self.page, self.speed = page, speed
         self.demonstrator = Demonstrator(seed=seed)
         self.shown: list[str] = []
         self.truth: list[LabelledSegment] = []
@@ -134,16 +127,33 @@ class Teacher:
         sure, young = (*numbers, 0, 0)[:2]
         return sure, young
 
+    def listening(self) -> str | None:
+        """Return where frames go, as soon as the page says that they are waited for."""
+        state = self.page.locator("#state").inner_text()
+        found = re.fullmatch(r"(ndjson:\S+) — waiting for frames", state)
+        return found and str(found[1])
+
+    def followed(self, n_frames: int) -> bool:
+        """Return whether the page says that so many frames were learned from."""
+        return int(self.page.locator("html").get_attribute("data-frames") or 0) >= n_frames
+
     def standing(self) -> bool:
         """Return whether the page shows the robot."""
         return self.page.locator("html").get_attribute("data-figures") == "there"
 
-    def teach(self, script: Iterator[str]) -> None:
-        """Perform a script, which may look at the page between its motions."""
+    def teach(self, script: Iterator[str], to: str) -> None:
+        """Perform a script, which may look at the page between its motions.
+
+        Each motion begins when the page has followed the last one, however busy the machine is.
+
+        Args:
+            script: Names of what is performed.
+            to: Where the frames go.
+        """
         demonstrator = self.demonstrator
         stream = Stream(demonstrator.channels, demonstrator.rate_hz, unit_m=1.0, up="z")
         n = 0
-        with open_sender(f"ndjson:127.0.0.1:{self.port}") as sender:
+        with open_sender(to) as sender:
             due = time.monotonic()
             for block in demonstrator.blocks(script):
                 frames = block.markers.reshape(len(block.markers), -1)
@@ -155,6 +165,7 @@ class Teacher:
                     n += len(part)
                     due = max(due + len(part) / demonstrator.rate_hz / self.speed, time.monotonic())
                     self.page.wait_for_timeout(max(0.0, 1000 * (due - time.monotonic())))
+                until(lambda n=n: self.followed(n), what=f"{n} frames are learned from")
 
     def script(self, picture: Callable[[str], None]) -> Iterator[str]:
         """Yield what is shown: each pair until the page says that it is learned, then sequences."""
@@ -193,7 +204,7 @@ class Teacher:
         self.page.keyboard.insert_text(name)
         self.page.keyboard.press("Enter")
         row = self.page.locator(f'#tree [data-id="{id}"] text.name', has_text=name)
-        row.wait_for(timeout=10_000)
+        row.wait_for(timeout=1000 * PATIENCE_S)
         self.page.keyboard.press("Escape")
 
 
@@ -216,19 +227,16 @@ def session(
         theme: Light or dark.
         end: What else is done on the page at the end.
     """
-    port = free_port()
-    with live(f"ndjson:{port}") as (url, _):
+    with live("ndjson:0") as (url, _):
         page = opened.new_page(viewport={"width": size[0], "height": size[1]})
         page.add_init_script(f"localStorage.theme ||= '{theme}'")
-        teacher = Teacher(page, port, speed)
+        teacher = Teacher(page, speed)
         page.goto(url)
-        state = page.locator("#state")
-        until(lambda: "waiting" in state.inner_text(), 120, "the learner waits for frames")
-        until(teacher.standing, 120, "the robot stands there")
+        to = until(teacher.listening, what="the learner waits for frames")
+        until(teacher.standing, what="the robot stands there")
         picture(page, "begin")
-        teacher.teach(teacher.script(lambda name: picture(page, name)))
-        until(lambda: len(teacher.meanings()) >= 4 or teacher.learned()[0] >= 4, 20)
-        page.wait_for_timeout(1500)
+        teacher.teach(teacher.script(lambda name: picture(page, name)), to)
+        until(lambda: len(teacher.meanings()) >= 4, what="four primitives")
         meanings = teacher.meanings()
         for id, label in meanings.items():
             teacher.name(id, NAMES[label])
@@ -236,7 +244,7 @@ def session(
         picture(page, "learned")
         page.keyboard.press("w")
         root = page.locator("html")
-        until(lambda: root.get_attribute("data-robot"), 120, "the robot walks")
+        until(lambda: root.get_attribute("data-robot"), what="the robot walks")
         page.wait_for_timeout(1500)
         picture(page, "walk")
         end(page)
@@ -274,8 +282,8 @@ def main() -> None:
         page.keyboard.press("x")
         page.locator("#tree .row").first.click()
         root = page.locator("html")
-        until(lambda: root.get_attribute("data-shown"), 60, "the figure")
-        until(lambda: root.get_attribute("data-robot"), 60, "the robot performs it")
+        until(lambda: root.get_attribute("data-shown"), what="the figure")
+        until(lambda: root.get_attribute("data-robot"), what="the robot performs it")
         page.wait_for_timeout(700)
         picture(page, "click")
         page.keyboard.press("Escape")

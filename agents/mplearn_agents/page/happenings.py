@@ -86,7 +86,8 @@ def _why(placement: Placement) -> str:
     if placement.nearest is None or not math.isfinite(placement.ratio):
         why = "nothing is known to compare it with"
     elif placement.ratio > 1.0:
-        why = f"nearest is {{{placement.nearest}}}, {placement.ratio:.1f} times as far as allowed"
+        times = f"{max(placement.ratio, 1.01):.{2 if placement.ratio < 1.1 else 1}f}"
+        why = f"nearest is {{{placement.nearest}}}, {times} times as far as allowed"
     else:
         why = f"it is near {{{placement.nearest}}}, but not surely of it"
     return why + ("; it came before, and waits" if placement.like is not None else "")

@@ -342,7 +342,7 @@ class Watcher:
         lifelong = self._lifelong
         return {
             "kind": "status",
-            "source": self._settings.source,
+            "source": self._settings.source if self._source is None else self._source.name,
             "state": self._state,
             "rate_hz": round(sum(n for _, n in recent[1:]) / span, 1) if span > 0 else 0.0,
             "delay_ms": round(1e3 * delays[len(delays) // 2], 1) if delays else None,
@@ -350,7 +350,7 @@ class Watcher:
             "behind_s": round(self._behind_s(), 1),
             "lost": tally.get("lost", 0),
             "faults": {name: n for name, n in tally.items() if n and name != "frames"},
-            "frames": tally.get("frames", 0),
+            "frames": 0 if lifelong is None else lifelong.n_frames,
             "person": None if lifelong is None else lifelong.learner.person + 1,
             "people": 0 if lifelong is None else len(lifelong.learner.tree.people),
             "store": self._settings.store,

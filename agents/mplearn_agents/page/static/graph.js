@@ -4,6 +4,7 @@ import { Keyed, make, set, shortened, write } from "./tree.js";
 
 const WHOLE_MOST = 40;      // primitives up to which the whole graph is shown by itself
 const LABELS_MOST = 44;     // edges up to which each has its probability beside it
+const NAMED_MOST = 90;      // primitives up to which each has its name below it
 const AROUND_MOST = 9;      // primitives in a column
 
 export class Graph {
@@ -118,7 +119,8 @@ export class Graph {
   drawWhole(width, height, size) {
     const n = this.ids.length, r = Math.max(5, Math.min(1.05 * size, 0.24 * Math.sqrt((width * height) / (n * 6))));
     const loops = this.edges.some((e) => e[0] === e[1]); // they rise above their primitive
-    const margin = { x: 4.2 * size, y: (loops ? 3.6 : 2) * size };
+    const named = n <= NAMED_MOST;
+    const margin = named ? { x: 4.2 * size, y: (loops ? 3.6 : 2) * size } : { x: 2 * size, y: 3 * r + size };
     const xs = this.ids.map((id) => this.places.get(id).x), ys = this.ids.map((id) => this.places.get(id).y);
     const box = { x: Math.min(...xs), y: Math.min(...ys), w: Math.max(Math.max(...xs) - Math.min(...xs), 0.25), h: Math.max(Math.max(...ys) - Math.min(...ys), 0.25) };
     const place = (id) => {
@@ -134,9 +136,24 @@ export class Graph {
       const lit = edge[0] === this.marks.present, dim = this.dims(edge[0], edge[1]);
       this.edge(at.get(edge[0]), at.get(edge[1]), r, edge, { lit, dim, bent: pairs.has(`${edge[1]} ${edge[0]}`), label: (labels || lit) && !dim, size });
     }
-    for (const id of this.ids) this.node(id, at.get(id), r, size, n > 60 ? 8 : 18, n <= 90 || this.near(id), width);
+    for (const id of this.ids) this.node(id, at.get(id), r, size, n > 60 ? 8 : 18, named, width);
     uncovered(texts, [...at.values()].flatMap(({ x, y }) => [
       { x: x - r, y: y - r, w: 2 * r, h: 2 * r }, { x: x - 1.2 * size, y: y + r, w: 2.4 * size, h: 1.3 * size }]), size);
+    if (!named) this.over(at, r, size);
+  }
+
+  // Among many, write the names of those near the present and the chosen one, above all others.
+  over(at, r, size) {
+    const { present, chosen } = this.marks, taken = [];
+    const first = (id) => (id === chosen || id === present ? 0 : 1);
+    for (const id of this.ids.filter((id) => this.near(id)).sort((a, b) => first(a) - first(b))) {
+      const { x, y } = at.get(id), words = shortened(this.primitives.get(id).name, 18), w = 0.6 * size * words.length;
+      if (taken.some((t) => Math.abs(t.x - x) < (t.w + w) / 2 && Math.abs(t.y - y) < 1.2 * size)) continue;
+      taken.push({ x, y, w });
+      const text = make("text", { class: `over${id === present ? " lit" : ""}`, x: f(x), y: f(y + r + 1.05 * size) });
+      text.textContent = words;
+      this.texts.append(text);
+    }
   }
 
   // Is a pair out of what a chosen primitive is about?
@@ -158,12 +175,12 @@ export class Graph {
     const before = this.edges.filter((e) => e[1] === id && e[0] !== id).sort((a, b) => b[2] - a[2]);
     for (const edge of before) if (follows.has(edge[0])) back.set(edge[0], edge);
     const itself = this.edges.find((e) => e[0] === id && e[1] === id);
-    const top = 1.8 * size, most = Math.max(1, Math.min(AROUND_MOST, Math.floor((height - top) / (2.9 * size))));
+    const top = 2.1 * size, most = Math.max(1, Math.min(AROUND_MOST, Math.floor((height - top) / (2.9 * size))));
     const r = 0.95 * size, centre = { x: width / 2, y: (height + top) / 2 - 0.6 * size };
-    const draw = (edge, from, to, bent) => this.edge(from, to, r, edge, { lit: edge[0] === this.marks.present, dim: false, bent, label: true, size });
+    const draw = (edge, from, to, bent) => this.edge(from, to, r, edge, { lit: edge[0] === this.marks.present, dim: false, bent, label: true, size, late: edge[0] === id });
     const column = (list, x, end, head) => {
       const shown = list.slice(0, most), step = Math.min((height - top) / Math.max(shown.length, 1), 5 * size);
-      const text = make("text", { class: "head", x, y: size });
+      const text = make("text", { class: "head", x, y: 1.4 * size });
       text.textContent = list.length > shown.length ? `${head}: ${shown.length} of ${list.length}` : head;
       this.texts.append(text);
       shown.forEach((edge, k) => {
@@ -180,7 +197,7 @@ export class Graph {
     this.node(id, centre, 1.4 * r, size, 24, true, width);
   }
 
-  edge(from, to, r, [source, target, count, p], { lit, dim, bent, label, size }) {
+  edge(from, to, r, [source, target, count, p], { lit, dim, bent, label, size, late = false }) {
     const dx = to.x - from.x, dy = to.y - from.y, length = Math.hypot(dx, dy);
     const kind = `${lit ? " lit" : ""}${dim ? " dim" : ""}`;
     const weight = Math.max(0.8, 0.28 * r * (0.12 + p)), opacity = 0.25 + 0.6 * p;
@@ -198,7 +215,8 @@ export class Graph {
       tip = { x: to.x - way.x * (r + 2), y: to.y - way.y * (r + 2) };
       const sx = from.x + out.x * (r + 1), sy = from.y + out.y * (r + 1);
       d = `M${f(sx)} ${f(sy)}Q${f(cx)} ${f(cy)} ${f(tip.x - way.x * head)} ${f(tip.y - way.y * head)}`;
-      middle = { x: 0.3 * sx + 0.5 * cx + 0.2 * tip.x, y: 0.3 * sy + 0.5 * cy + 0.2 * tip.y };
+      const near = late ? 0.22 : 0.3; // names lie at the middle of what is around one: away from it
+      middle = { x: near * sx + 0.5 * cx + (0.5 - near) * tip.x, y: near * sy + 0.5 * cy + (0.5 - near) * tip.y };
     }
     const path = make("path", { class: `edge${kind}`, d, "stroke-width": f(weight) });
     if (!dim) path.setAttribute("stroke-opacity", f(lit ? 0.95 : opacity));

@@ -262,8 +262,10 @@ function words(c, text, x, y, width, size, family, weight) {
   const parts = text.split(" ");
   let first = parts.shift();
   while (parts.length > 1 && c.measureText(`${first} ${parts[0]}`).width <= width) first += ` ${parts.shift()}`;
+  let rest = parts.join(" ");
+  while (parts.length > 1 && c.measureText(rest).width > width) { parts.shift(); rest = parts.join(" "); } // its end tells more
   c.fillText(clipped(c, first, width), x, y - 0.55 * size);
-  c.fillText(clipped(c, parts.join(" "), width), x, y + 0.5 * size);
+  c.fillText(clipped(c, rest, width), x, y + 0.5 * size);
 }
 
 function line(c, x1, y1, x2, y2, colour, width) {
