@@ -24,6 +24,10 @@ _ACROSS = ("hip", "iliac_front", "iliac_back", "trochanter", "acromion", "should
 MIRRORED = -0.3  # mean cosine between ahead by the sides' names and ahead by the landmarks
 
 
+class MirroredError(BodyError):
+    """Left and right are exchanged: one axis is turned round, or names are."""
+
+
 def check_facing(name: str, at: Mapping[str, FloatArray]) -> None:
     """Refuse a person whose left and right are exchanged.
 
@@ -32,7 +36,7 @@ def check_facing(name: str, at: Mapping[str, FloatArray]) -> None:
         at: Where each landmark is in some frames, shape (T, 3) [m], z up; NaN where missing.
 
     Raises:
-        BodyError: Feet, face and pelvis point backwards if left is where the names say.
+        MirroredError: Feet, face and pelvis point backwards if left is where the names say.
     """
     across = [
         at[f"{place}_l"] - at[f"{place}_r"]
@@ -53,7 +57,7 @@ def check_facing(name: str, at: Mapping[str, FloatArray]) -> None:
         if len(each):
             cosines.append(float(np.median(each)))
     if cosines and np.mean(cosines) < MIRRORED:
-        raise BodyError(
+        raise MirroredError(
             f"{name!r} is mirrored: with left and right as the labels say, feet and face point "
             f"backwards; is an axis turned round, or are the labels exchanged? {option('names')} "
             "says which marker sits where"

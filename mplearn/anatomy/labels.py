@@ -6,12 +6,28 @@
 from __future__ import annotations
 
 import re
-from itertools import takewhile
-from typing import NamedTuple
+from itertools import chain, takewhile
+from typing import Literal, NamedTuple
 
-from .synonyms import JOINTS_MIDDLE, JOINTS_SIDED, SKIN_MIDDLE, SKIN_SIDED
+from .synonyms import (
+    BONES_MIDDLE,
+    BONES_SIDED,
+    JOINTS_MIDDLE,
+    JOINTS_SIDED,
+    SKIN_MIDDLE,
+    SKIN_SIDED,
+)
 
+_MARKS = "_.:- "  # between the words of a label
 CUT = 4  # letters that some files keep of a label
+_PELVIS = frozenset(("iliac_front", "iliac_back", "trochanter"))
+_LIMBS = frozenset(("elbow", "hip", "knee"))  # called by others where joints are called as bones
+Naming = Literal["skin", "joints", "bones"]
+_TABLES: dict[Naming, tuple[dict[str, str], dict[str, str]]] = {
+    "skin": (SKIN_SIDED, SKIN_MIDDLE),
+    "joints": (JOINTS_SIDED, JOINTS_MIDDLE),
+    "bones": (BONES_SIDED, BONES_MIDDLE),
+}
 
 
 class Label(NamedTuple):
@@ -59,25 +75,24 @@ def without_shared_prefix(labels: tuple[str, ...]) -> tuple[str, ...]:
         return labels
     pairs = takewhile(lambda pair: pair[0] == pair[1], zip(min(labels), max(labels), strict=False))
     shared = "".join(letter for letter, _ in pairs)
-    start = shared[: shared.rfind("_") + 1]
-    words = {word for word in start.lower().split("_") if word}
+    start = shared[: max(shared.rfind(mark) for mark in _MARKS) + 1]
+    words = set(re.split(f"[{re.escape(_MARKS)}]+", start.lower()))
     named = [label[len(start) :] for label in labels]
     if words & {"l", "r", "left", "right"}:
         return labels
     return tuple(named) if all(name[:1].isalpha() for name in named) else labels
 
 
-def landmarks_of(labels: tuple[str, ...], *, centres: bool) -> dict[str, tuple[str, ...]]:
+def landmarks_of(labels: tuple[str, ...], naming: Naming) -> dict[str, tuple[str, ...]]:
     """Return the landmarks that each label may name, mostly one; labels of none are left out.
 
     Where labels were cut to four letters, a label may begin the names of several landmarks.
 
     Args:
         labels: Names of markers.
-        centres: Whether ``LKnee`` is the joint, as pose estimators have it, not a marker beside it.
+        naming: How they are named; see `naming_of`.
     """
-    sided = _lookup(JOINTS_SIDED if centres else SKIN_SIDED)
-    middle = _lookup(JOINTS_MIDDLE if centres else SKIN_MIDDLE)
+    sided, middle = map(_lookup, _TABLES[naming])
     cut = max(map(len, labels), default=0) <= CUT
     found: dict[str, tuple[str, ...]] = {}
     for label in labels:
@@ -85,41 +100,53 @@ def landmarks_of(labels: tuple[str, ...], *, centres: bool) -> dict[str, tuple[s
         ways.sort(key=lambda way: bool(way[1]))  # "Rear" is no right ear
         exact = [_sided(table[stem], side) for stem, side, table in ways if stem in table]
         if exact and not (cut and len(label) == CUT and not label.isalnum()):
-            found[label] = (exact[0],)
+            found[label] = exact[0]
         elif cut:
             begun = [
-                (len(known), _sided(name, side))
+                (len(known), _sided(names, side))
                 for stem, side, table in ways
                 if len(stem) >= 2
-                for known, name in table.items()
+                for known, names in table.items()
                 if known.startswith(stem)
             ]
             if begun:  # the shortest name first: "To" is a toe rather than "ToeTip"
                 begun.sort(key=lambda found: found[0])
-                found[label] = tuple(dict.fromkeys(name for _, name in begun))
+                found[label] = tuple(dict.fromkeys(chain(*(names for _, names in begun))))
     return found
 
 
-def _sided(name: str, side: str) -> str:
-    return f"{name}_{side}" if side else name
+def _sided(names: tuple[str, ...], side: str) -> tuple[str, ...]:
+    return tuple(f"{name}_{side}" for name in names) if side else names
 
 
-def names_joints(labels: tuple[str, ...]) -> bool:
-    """Whether labels are those of joints: hips are named, and no point of the pelvis' skin is."""
-    ways = [way for label in labels for way in read_label(label)]
-    hips = any(stem in ("hip", "hjc", "upleg") and side for stem, side in ways)
-    return hips and not names_skin(labels)
+def naming_of(labels: tuple[str, ...]) -> Naming:
+    """Return how labels are named, by what they tell of the pelvis and of the limbs.
+
+    ``"skin"``: as markers, ``LASI``; ``"joints"``: as pose estimators have them, ``LHip``,
+    ``LElbow``; ``"bones"``: joints that are called after the bone below, ``LeftUpLeg``,
+    ``LeftForeArm``.
+    """
+    if names_skin(labels):
+        return "skin"
+    stems = {stem for label in labels for stem, side in read_label(label) if side}
+    joints, bones = _lookup(JOINTS_SIDED), _lookup(BONES_SIDED)
+    called_joints = any(joints.get(stem, ("",))[0] in _LIMBS for stem in stems - bones.keys())
+    called_bones = {bones[stem][0] for stem in stems & bones.keys()}
+    if called_bones >= _LIMBS and not called_joints:
+        return "bones"
+    return "joints" if stems & {"hip", "hjc", "upleg"} else "skin"
 
 
 def names_skin(labels: tuple[str, ...]) -> bool:
     """Whether labels name points of the pelvis' skin, as those of markers do."""
     ways = [way for label in labels for way in read_label(label)]
     skin = _lookup(SKIN_SIDED)
-    return any(
-        skin.get(stem) in ("iliac_front", "iliac_back", "trochanter") and side
-        for stem, side in ways
-    )
+    return any(side and not _PELVIS.isdisjoint(skin.get(stem, ())) for stem, side in ways)
 
 
-def _lookup(table: dict[str, str]) -> dict[str, str]:
-    return {stem: name for name, stems in table.items() for stem in stems.split()}
+def _lookup(table: dict[str, str]) -> dict[str, tuple[str, ...]]:
+    found: dict[str, tuple[str, ...]] = {}
+    for name, stems in table.items():
+        for stem in stems.split():
+            found[stem] = (*found.get(stem, ()), name)
+    return found

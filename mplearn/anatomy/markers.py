@@ -8,7 +8,7 @@ What lies where its landmark cannot be is left out.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from ..mocap.options import option
 from ..recording import FloatArray, Recording
 from .body_map import BodyMap
 from .facing import check_facing
-from .labels import landmarks_of, names_joints, without_shared_prefix
+from .labels import landmarks_of, naming_of, without_shared_prefix
 
 SOME_FRAMES = 120  # of a recording are looked at
 TRUNK, FEWEST_ON_TRUNK = ("pelvis", "abdomen", "chest", "clavicle_l", "clavicle_r"), 4
@@ -29,6 +29,10 @@ ODD_BY_JOINT = 1.25  # the same for markers of two segments that a joint joins
 ODD_M = 0.06  # and how much
 LEVEL = 0.15  # of the stature: as high as its landmark, at most so far off
 FLAT_NECK = 0.03  # of the stature: a neck no higher above the shoulders is their middle
+FLAT_PELVIS = 0.012  # of the stature: a pelvis farther from the middle of the hips is not that
+HEADS = (0.4, 1.7)  # how far the middle of the skull is on the way to a head: to its top, or base
+MANY = 1000  # more than the landmarks that a label may mean
+SHOULDERS, HIPS = ("shoulder_l", "shoulder_r"), ("hip_l", "hip_r")
 
 
 def recognise_markers(recording: Recording, names: Mapping[str, str] | None = None) -> BodyMap:
@@ -54,22 +58,24 @@ def recognise_markers(recording: Recording, names: Mapping[str, str] | None = No
             return _map(labels, known, known_set=True)
     heights = _heights(labels, some)
     plain = without_shared_prefix(rest)
-    read = landmarks_of(plain, centres=names_joints(plain))
+    naming = naming_of(plain)
+    read = landmarks_of(plain, naming)
     pairs = zip(rest, plain, strict=True)
     candidates = {label: read[short] for label, short in pairs if short in read}
     found = {label: place for label, place in names.items() if place and label in labels}
-    taken = set(found.values())
-    for label in sorted(candidates, key=lambda label: (label not in seen, len(candidates[label]))):
-        free = [place for place in candidates[label] if place not in taken]
-        if len(candidates[label]) > 1:
+    at = {label: some[:, i] for i, label in enumerate(labels)}
+    for label in _settled_first(candidates, naming, seen):
+        free = [place for place in candidates[label] if place not in found.values()]
+        if naming == "skin" and len(candidates[label]) > 1:
             free = [p for p in free if abs(_level(p) - heights.get(label, 0.5)) < LEVEL]
         if free:
-            found[label] = free[0]
-            taken.add(free[0])
+            found[label] = _of_the_toes(free, label, found, at)
     warnings: list[str] = []
     _warn_of_others(found, labels, warnings)
-    _drop_middle_of_shoulders(found, labels, some)
-    _drop_odd(found, labels, some, names, warnings)
+    _drop_middles(found, at)
+    skull = None if naming == "skin" or "skull" in names.values() else _share_of_head(found, at)
+    sure = set(names) | {label for label, place in found.items() if place == "skull" and skull}
+    _drop_odd(found, at, sure, warnings)
     if sum(label in seen for label in found) < FEWEST:
         raise BodyError(
             f"the markers of {recording.name!r} belong to no known set, and of their labels "
@@ -84,10 +90,8 @@ def recognise_markers(recording: Recording, names: Mapping[str, str] | None = No
             f"and shoulders, and how the trunk stands cannot be told from fewer than "
             f"{FEWEST_ON_TRUNK}; {option('names')} says which marker sits where"
         )
-    check_facing(
-        recording.name, {place: some[:, labels.index(label)] for label, place in found.items()}
-    )
-    return _map(labels, found, warnings=tuple(warnings))
+    check_facing(recording.name, {place: at[label] for label, place in found.items()})
+    return _map(labels, found, skull=skull, warnings=tuple(warnings))
 
 
 def _of_known_set(labels: tuple[str, ...]) -> dict[str, str] | None:
@@ -110,20 +114,29 @@ def _map(
     found: Mapping[str, str],
     *,
     known_set: bool = False,
+    skull: float | None = None,
     warnings: tuple[str, ...] = (),
 ) -> BodyMap:
     points = tuple(label for label in labels if label in found)
-    share = len(points) / max(1, len(labels))
+    places = tuple(found[label] for label in points)
+    parts: dict[str, tuple[str, ...]] = {
+        place: (label,) for place, label in zip(places, points, strict=True)
+    }
+    weights = np.eye(len(points))
+    if skull is not None and "skull" in places:
+        row, shoulders = places.index("skull"), [places.index(place) for place in SHOULDERS]
+        weights[row, [row, *shoulders]] = [skull, *(2 * [0.5 * (1.0 - skull)])]
+        parts["skull"] += tuple(points[k] for k in shoulders)
     return BodyMap(
         points=points,
-        places=tuple(found[label] for label in points),
-        weights=np.eye(len(points)),
+        places=places,
+        weights=weights,
         turn=np.eye(3),
         factor=1.0,
-        parts=tuple((found[label], (label,)) for label in points),
+        parts=tuple(parts.items()),
         left_out=tuple(label for label in labels if label not in found),
         stature_m=float("nan"),
-        confidence=1.0 if known_set else 0.5 + 0.5 * share,
+        confidence=1.0 if known_set else 0.5 + 0.5 * len(points) / max(1, len(labels)),
         warnings=warnings,
     )
 
@@ -172,24 +185,90 @@ def _warn_of_others(found: Mapping[str, str], labels: tuple[str, ...], warnings:
         )
 
 
-def _drop_middle_of_shoulders(
-    found: dict[str, str], labels: tuple[str, ...], some: FloatArray
-) -> None:
-    """Leave out a neck that lies between the shoulders: pose estimators call their middle so."""
-    at = {place: some[:, labels.index(label)] for label, place in found.items()}
-    if not {"neck", "shoulder_l", "shoulder_r"} <= at.keys():
-        return
-    middle = 0.5 * (at["shoulder_l"] + at["shoulder_r"])
-    off = np.linalg.norm(at["neck"] - middle, axis=1)
-    if np.nanmedian(off) < FLAT_NECK * 1.75:
-        del found[next(label for label, place in found.items() if place == "neck")]
+def _settled_first(
+    candidates: Mapping[str, tuple[str, ...]], naming: str, seen: Collection[str]
+) -> list[str]:
+    """Return labels in the order in which they choose: those that mean one landmark first.
+
+    Of joints, ``foot``, which is the ankle where nothing else is, chooses before ``toe``.
+    """
+
+    def rank(label: str) -> tuple[bool, int]:
+        count = len(candidates[label])
+        return label not in seen, -count if naming != "skin" and count > 1 else count - MANY
+
+    return sorted(candidates, key=rank)
+
+
+def _of_the_toes(
+    free: Sequence[str], label: str, found: Mapping[str, str], at: Mapping[str, FloatArray]
+) -> str:
+    """Return the first place, or of ball and tip of the toes the one as far from the ankle."""
+    side = free[0][-2:]
+    toes, leg = (f"ball{side}", f"toe_tip{side}"), (f"ankle{side}", f"knee{side}")
+    label_of = {place: label for label, place in found.items()}
+    if tuple(free) != toes or not label_of.keys() >= set(leg):
+        return free[0]
+    ankle, knee = (at[label_of[place]] for place in leg)
+    share = _apart(at[label], ankle) / _apart(ankle, knee)
+    if not np.isfinite(share):
+        return free[0]
+    usual = {toe: _usual(toe, leg[0]) / _usual(*leg) for toe in toes}
+    return min(toes, key=lambda toe: abs(np.log(usual[toe] / max(share, 1e-3))))
+
+
+def _share_of_head(found: Mapping[str, str], at: Mapping[str, FloatArray]) -> float | None:
+    """Return how far the skull's middle is on the way from the shoulders to what is called head.
+
+    That may be the top of the neck as well as of the head. None where that cannot be told, or no
+    head lies so.
+    """
+    where = {place: at[label] for label, place in found.items()}
+    if not where.keys() >= {"skull", *SHOULDERS, *HIPS}:
+        return None
+    shoulders, hips = (0.5 * (where[a] + where[b]) for a, b in (SHOULDERS, HIPS))
+    landmarks, places = _places()
+    on_us = dict(zip(landmarks.names, places, strict=True))
+    ours, our_hips = (0.5 * (on_us[a] + on_us[b]) for a, b in (SHOULDERS, HIPS))
+    usual = np.linalg.norm(on_us["skull"] - ours) / np.linalg.norm(ours - our_hips)
+    share = float(usual * _apart(shoulders, hips) / _apart(where["skull"], shoulders))
+    return share if HEADS[0] < share < HEADS[1] else None
+
+
+def _apart(one: FloatArray, other: FloatArray) -> float:
+    """Return the median distance of two points, each of shape (T, 3); NaN where never seen."""
+    apart = np.linalg.norm(one - other, axis=1)
+    apart = apart[np.isfinite(apart)]
+    return float(np.median(apart)) if len(apart) else float("nan")
+
+
+def _usual(one: str, other: str) -> float:
+    """Return how far two landmarks are apart on the upright human of 1.75 m [m]."""
+    landmarks, places = _places()
+    a, b = (places[landmarks.names.index(name)] for name in (one, other))
+    return float(np.linalg.norm(a - b))
+
+
+def _drop_middles(found: dict[str, str], at: Mapping[str, FloatArray]) -> None:
+    """Leave out a neck that lies between the shoulders, as pose estimators call their middle.
+
+    And a pelvis that does not lie between the hips: skeletons often begin above it.
+    """
+    label_of = {place: label for label, place in found.items()}
+    for place, (left, right), middle, near in (
+        ("neck", SHOULDERS, False, FLAT_NECK),
+        ("pelvis", HIPS, True, FLAT_PELVIS),
+    ):
+        if label_of.keys() >= {place, left, right}:
+            between = 0.5 * (at[label_of[left]] + at[label_of[right]])
+            if (_apart(at[label_of[place]], between) < near * 1.75) != middle:
+                del found[label_of[place]]
 
 
 def _drop_odd(
     found: dict[str, str],
-    labels: tuple[str, ...],
-    some: FloatArray,
-    sure: Mapping[str, str],
+    at: Mapping[str, FloatArray],
+    sure: Collection[str],
     warnings: list[str],
 ) -> None:
     """Leave out markers that lie too far from others of their segment to be what they are called.
@@ -199,7 +278,6 @@ def _drop_odd(
     landmarks, places = _places()
     body_of = dict(zip(landmarks.names, landmarks.bodies, strict=True))
     place_of = dict(zip(landmarks.names, places, strict=True))
-    at = {label: some[:, labels.index(label)] for label in found}
     size, near = _size(found, at, body_of, place_of), _joints()
     while True:
         odd: dict[str, int] = {}

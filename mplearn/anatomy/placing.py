@@ -10,7 +10,7 @@ from ..body.marker_sets.tables import TABLES
 from ..maths.rotation_kernels import nearest_rotation
 from ..recording import FloatArray, IntArray, Skeleton
 from .body_map import BodyMap
-from .person import Person, axes_along, cosines, unit
+from .person import NECK_RISE, Person, axes_along, cosines, unit
 from .plan import LimbPair
 
 FLAT = 0.8  # cosine between a foot and the vertical up to which it stands on its sole
@@ -148,7 +148,9 @@ class Placing:
     def _chest(self, arms: LimbPair) -> None:
         joint = self._turner((*arms.inner[0], *arms.nodes[0])[0])
         axes, raised = self._neutral(joint), self.person.raised
-        if axes is None or not raised.any():
+        if axes is None and raised.any() and self.person.legs is not None:
+            self._neck_above(arms, self.person.legs)
+        elif axes is None or not raised.any():
             self._joint("neck", self.person.neck)
         if axes is None:
             return
@@ -156,6 +158,18 @@ class Placing:
             at = np.array(_TABLE[place][1]) - _TABLE["neck"][1]
             at = raised + self.person.trunk_sizes * at
             self._on(place, self.person.neck, joint, axes, at, 1.0)
+
+    def _neck_above(self, arms: LimbPair, legs: LimbPair) -> None:
+        """Put the base of the neck above the shoulders: on the way from the hips to them."""
+        trunk = self.person.middle(arms, 0) - self.person.middle(legs, 0)
+        length = float(np.median(np.linalg.norm(trunk, axis=1)))
+        share = NECK_RISE * self.person.size / length
+        self.rows["neck"] = {
+            self.tree.joints[side[0]][0]: weight
+            for pair, weight in ((arms, 0.5 * (1.0 + share)), (legs, -0.5 * share))
+            for side in pair.nodes
+        }
+        self.used["neck"] = tuple(side[0] for side in arms.nodes)
 
     def _on_middle_of_hips(self, legs: LimbPair, place: str, joint: int, axes: FloatArray) -> None:
         left, right = (side[0] for side in legs.nodes)

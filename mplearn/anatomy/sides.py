@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import BodyError
 from ..mocap.options import option
 from ..recording import FloatArray
+from .facing import MirroredError
 from .joint_tree import JointTree
 from .name_hints import left_of_pair
 from .plan import LimbPair, Plan
@@ -42,7 +43,7 @@ def limbs_left_first(
         said = left_of_pair(*_names(tree, first))
         if abs(facing) > FACES and said and np.sign(facing) != said:
             seen = ", ".join(f"{why} {value:+.1f}" for why, value in votes)
-            raise BodyError(
+            raise MirroredError(
                 f"{name!r} is mirrored: its names call the one side left, and by the way it faces "
                 f"it is the right one ({seen}); is an axis turned round, or are the names "
                 f"exchanged? {option('names')} says which joint is which"

@@ -108,7 +108,7 @@ SKIN_MIDDLE = {
     ),
 }
 
-# joints, as pose estimators have them
+# joints, as pose estimators have them; what stands more than once may be any of these
 JOINTS_SIDED = {
     "shoulder": "shoulder sho sjc shoulderjc arm upperarm",
     "elbow": "elbow elb ejc forearm elbowjc",
@@ -117,10 +117,12 @@ JOINTS_SIDED = {
     "knee": "knee kne kjc kneejc shin leg",
     "ankle": "ankle ank ajc foot anklejc",
     "heel_back": "heel",
-    "toe_tip": "bigtoe footindex toetip",
+    "ball": "foot toe toes toebase",
+    "toe_tip": "bigtoe footindex toetip foot toe toes",
     "metatarsal5": "smalltoe",
     "ear": "ear",
     "eye": "eye eyeinner",
+    "hand": "hand",
     "knuckle_index": "index handindex1 indexfinger",
     "knuckle_little": "pinky handpinky1",
 }
@@ -129,5 +131,22 @@ JOINTS_MIDDLE = {
     "neck": "neck",
     "nose": "nose",
     "skull": "head",
-    "pelvis": "midhip pelvis hip hips root midpelvis",
+    "head_top": "headtop tophead",
+    "pelvis": "midhip pelvis hip hips root midpelvis spinebase hipcenter",
+}
+
+# joints that are called after the bone below them, as skeletons have them
+BONES_SIDED = {
+    "shoulder": "arm upperarm uarm uparm humerus shldr",
+    "elbow": "forearm foarm farm lowerarm lowarm lfarm radius",
+    "wrist": "hand wrist",
+    "hip": "upleg upperleg thigh femur",
+    "knee": "leg lowerleg lowleg shin shank calf tibia",
+    "ankle": "foot ankle",
+    "ball": "toe toes toebase toe0 ball",
+}
+
+BONES_MIDDLE = {
+    "neck": "neck neck1 lowerneck",
+    "skull": "head",
 }

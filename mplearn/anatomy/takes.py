@@ -13,6 +13,7 @@ from ..errors import BodyError, MPLearnError
 from ..recording import Recording, marker_channels
 from .body_map import BodyMap
 from .bones import with_bones
+from .facing import MirroredError
 from .labels import names_skin, without_shared_prefix
 from .markers import recognise_markers
 from .skeletons import recognise_skeleton
@@ -61,9 +62,34 @@ def recognise(recording: Recording, *, names: Mapping[str, str] | None = None) -
         return recognise_skeleton(recording, names)
     on_skin = recording.is_markers and names_skin(without_shared_prefix(recording.marker_names))
     hanging = None if names or on_skin else with_bones(recording)
-    if hanging is not None:
-        return recognise_skeleton(hanging)
-    return recognise_markers(recording, names)
+    if hanging is None:
+        return recognise_markers(recording, names)
+    try:
+        body = recognise_skeleton(hanging)
+    except MirroredError:
+        raise
+    except BodyError:
+        if (named := _by_names(recording)) is None:
+            raise
+        return named
+    loose = tuple(n for n in recording.marker_names if n not in hanging.marker_names)
+    body = replace(body, left_out=(*body.left_out, *loose))
+    return body if _is_whole(body) else _by_names(recording) or body
+
+
+def _by_names(recording: Recording) -> BodyMap | None:
+    """Return the body that names tell, if it is a whole one."""
+    try:
+        body = recognise_markers(recording)
+    except MirroredError:
+        raise
+    except BodyError:
+        return None
+    return body if _is_whole(body) else None
+
+
+def _is_whole(body: BodyMap) -> bool:
+    return {"thigh_l", "thigh_r", "upper_arm_l", "upper_arm_r"}.isdisjoint(body.unseen)
 
 
 def as_bodies(

@@ -13,6 +13,7 @@ from .findings import Findings
 
 # steps between frames from which on times count less than seconds: 2 ms are 500 Hz
 _FINER = ((1e-3, "milliseconds", 2.0), (1e-6, "microseconds", 2e3), (1e-9, "nanoseconds", 2e6))
+_TICKS = (1.2e17, 9e17)  # what .NET and Windows count in our days; nanoseconds are 1.7e18
 _EVEN = 0.3  # of a frame: what rounding leaves
 _ROUNDED = 0.6  # of the last decimal: rounding leaves a half, the line through all is not exact
 _OFTEN = 5  # frames that would be missing: where they lie as evenly as rounding has it, none is
@@ -143,6 +144,9 @@ def in_seconds(times: FloatArray, unit_s: float | None, findings: Findings) -> F
     if len(times) < 2 or np.isnan(times).any():
         return times
     step = float(np.median(np.diff(times)))
+    if _TICKS[0] < np.median(times) < _TICKS[1]:
+        findings.note("times are taken as ticks of 100 ns, since the year 1 or 1601")
+        return np.asarray((times - times[0]) * 1e-7)
     for unit, name, least in _FINER:
         if least <= step < 500.0 * least:
             findings.note(f"times are taken as {name}: their steps are {step:.6g}")

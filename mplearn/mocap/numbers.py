@@ -45,14 +45,16 @@ def plain_number(cell: str) -> str:
 
 
 def not_seen(points: FloatArray) -> BoolArray:
-    """Return where tables say that a marker was not seen, for points (..., 3): all zero, or nines.
+    """Return where tables say that a marker was not seen, for points (..., 3).
+
+    All three are zero, -1, or nines.
 
     Example:
         >>> not_seen(np.array([[0.0, 0.0, 0.0], [-9999.0, -9999.0, -9999.0], [0.0, 0.0, 9999.0]]))
         array([ True,  True, False])
     """
     same: BoolArray = (points == points[..., :1]).all(axis=-1)
-    gone: BoolArray = same & (points[..., 0] == 0.0)
+    gone: BoolArray = same & ((points[..., 0] == 0.0) | (points[..., 0] == -1.0))
     far = same & (np.abs(points[..., 0]) >= 999.9)
     for value in np.unique(points[far][..., 0]).tolist():
         if _NINES.fullmatch(repr(value)):

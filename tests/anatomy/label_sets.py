@@ -149,6 +149,59 @@ _MEDIAPIPE = {"nose": "nose"} | {
         "foot_index": "toe_tip",
     }.items()
 }
+_BOTH = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+KEY_POINTS = {
+    "coco": {"nose": "nose"}
+    | {
+        f"{word}_{place}": f"{place}_{word[0]}"
+        for word in ("left", "right")
+        for place in ("eye", "ear", *_BOTH)
+    },
+    "human36m": {"Hip": "pelvis", "Thorax": "shoulders", "Nose": "nose", "Head": "head_top"}
+    | {f"{s}{place.title()}": f"{place}_{s.lower()}" for s in "RL" for place in _BOTH},
+    "halpe": {"Nose": "nose", "Head": "head_top", "Neck": "shoulders", "Hip": "pelvis"}
+    | {
+        f"{side}{label}": f"{place}_{side.lower()}"
+        for side in "LR"
+        for label, place in {
+            **{place.title(): place for place in ("eye", "ear", *_BOTH)},
+            "BigToe": "toe_tip",
+            "SmallToe": "metatarsal5",
+            "Heel": "heel_back",
+        }.items()
+    },
+    "kinect": {"SpineBase": "pelvis", "SpineShoulder": "shoulders", "Neck": "c7", "Head": "skull"}
+    | {
+        f"{label}{word}": f"{place}_{word[0].lower()}"
+        for word in ("Left", "Right")
+        for label, place in {
+            **{place.title(): place for place in _BOTH},
+            "Hand": "hand",
+            "Foot": "toe_tip",
+        }.items()
+    },
+    "joints of SMPL": {"pelvis": "pelvis", "neck": "neck", "head": "skull"}
+    | {
+        f"{word}_{label}": f"{place}_{word[0]}"
+        for word in ("left", "right")
+        for label, place in {**{place: place for place in _BOTH}, "foot": "ball"}.items()
+    },
+    "bones": {"Hips": "pelvis", "Neck": "neck", "Head": "skull"}
+    | {
+        f"{word}{label}": f"{place}_{word[0].lower()}"
+        for word in ("Left", "Right")
+        for label, place in {
+            "Arm": "shoulder",
+            "ForeArm": "elbow",
+            "Hand": "wrist",
+            "UpLeg": "hip",
+            "Leg": "knee",
+            "Foot": "ankle",
+            "ToeBase": "ball",
+        }.items()
+    },
+}
+"""Points that are joints or lie on the face, as pose estimators and skeletons name them."""
 _PLUG_IN_GAIT = {
     {"RBAK": "RBAK"}.get(label, label): label for label in marker_set("plug_in_gait39").names
 }
@@ -171,7 +224,8 @@ def labelled(
     """Return what cameras see of markers of a set, each glued up to ``off_m`` from its place."""
     rng = np.random.default_rng(len(name))
     places = []
-    for place in SETS[name].values():
+    labels = (SETS | KEY_POINTS)[name]
+    for place in labels.values():
         table = marker_set("plug_in_gait39" if place in _PLUG_IN_GAIT else "landmarks")
         wanted = ("acromion_l", "acromion_r") if place == "shoulders" else (place,)
         if place == "shoulders":
@@ -182,6 +236,4 @@ def labelled(
         places.append(track.mean(axis=1))
     frames = np.stack(places, axis=1)
     frames = frames + rng.normal(0, 0.001, frames.shape)
-    return Recording(
-        frames.reshape(len(frames), -1), rate_hz, marker_channels(tuple(SETS[name])), name
-    )
+    return Recording(frames.reshape(len(frames), -1), rate_hz, marker_channels(tuple(labels)), name)

@@ -57,11 +57,16 @@ def joints(truth: Truth) -> Recording:
     return Recording(points.reshape(len(points), -1), RATE_HZ, marker_channels(JOINTS), "table")
 
 
+@pytest.mark.parametrize("noise_m", [0.0, 0.003, 0.005])
 @pytest.mark.parametrize("dialect", _MIDDLE)
-def test_joints_of_any_names_are_the_person(truth: Truth, joints: Recording, dialect: str) -> None:
-    order = np.random.default_rng(1).permutation(len(JOINTS))
+def test_joints_of_any_names_are_the_person(
+    truth: Truth, joints: Recording, dialect: str, noise_m: float
+) -> None:
+    rng = np.random.default_rng(1)
+    order = rng.permutation(len(JOINTS))
     names = [names_in(dialect)[i] for i in order]
     frames = joints.markers[:, order].reshape(len(joints), -1)
+    frames = frames + noise_m * rng.normal(size=frames.shape)
     table = replace(joints, frames=np.round(frames, 4), channels=marker_channels(tuple(names)))
     body = recognise(table)
     angles, points_mm = truth.errors(body.apply(table))
@@ -76,6 +81,44 @@ def test_bones_are_those_of_the_person(joints: Recording) -> None:
     pairs = {frozenset((names[k], names[p])) for k, p in enumerate(parents) if p >= 0}
     for a, b in (("UpLeg", "Leg"), ("Leg", "Foot"), ("Foot", "Toe"), ("Arm", "ForeArm")):
         assert all(frozenset((f"{s}{a}", f"{s}{b}")) in pairs for s in ("Left", "Right"))
+
+
+@pytest.mark.parametrize("noise_m", [0.001, 0.003])
+def test_bones_are_found_in_noise(joints: Recording, noise_m: float) -> None:
+    noise = noise_m * np.random.default_rng(0).normal(size=joints.frames.shape)
+    hanging = with_bones(replace(joints, frames=joints.frames + noise))
+    assert hanging is not None and len(hanging.marker_names) == len(JOINTS)
+
+
+@pytest.mark.parametrize("noise_m", [0.0, 0.003])
+def test_what_was_shuffled_has_no_bones(joints: Recording, noise_m: float) -> None:
+    rng = np.random.default_rng(0)
+    noisy = joints.markers + noise_m * rng.normal(size=joints.markers.shape)
+    tracks = [noisy[:, k] for k in range(noisy.shape[1])]
+    late = [np.roll(track, rng.integers(len(noisy)), axis=0) for track in tracks]
+    mixed = [track[rng.permutation(len(noisy))] for track in tracks]
+    columns = noisy.reshape(len(noisy), -1)[:, rng.permutation(3 * len(JOINTS))]
+    for frames in (np.concatenate(late, axis=1), np.concatenate(mixed, axis=1), columns):
+        assert with_bones(replace(joints, frames=frames)) is None
+
+
+def test_without_head_and_neck_the_shoulders_tell(truth: Truth, joints: Recording) -> None:
+    kept = [k for k, name in enumerate(JOINTS) if not name.startswith("Neck")]
+    frames = joints.markers[:, kept].reshape(len(joints), -1)
+    names = marker_channels(tuple(JOINTS[k] for k in kept))
+    table = replace(joints, frames=frames, channels=names)
+    body = recognise(table)
+    assert any("there is no neck" in warning for warning in body.warnings)
+    angles, points_mm = truth.errors(body.apply(table))
+    assert np.median(angles) < 3.0 and np.median(points_mm) < 15.0
+
+
+def test_a_joint_that_was_seldom_seen_costs_no_other(truth: Truth, joints: Recording) -> None:
+    markers = joints.markers.copy()
+    markers[10:, JOINTS.index("LeftToe")] = np.nan
+    body = recognise(replace(joints, frames=markers.reshape(len(joints), -1)))
+    assert "lumbar" in body.places  # by names alone it would be none
+    assert "LeftToe" in body.left_out
 
 
 def test_who_is_mirrored_is_refused(joints: Recording) -> None:

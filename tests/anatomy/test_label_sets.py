@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from label_sets import SETS, labelled
+from label_sets import KEY_POINTS, SETS, labelled
 
 from mplearn.anatomy import recognise
 from mplearn.errors import BodyError
@@ -25,10 +25,38 @@ def test_labels_of_any_system_are_the_same_person(truth, name):
     assert np.median(points) < 15.0
 
 
+@pytest.mark.parametrize("noise_m", [0.0, 0.003])
+@pytest.mark.parametrize("name", KEY_POINTS)
+def test_key_points_are_the_same_person(truth, name, noise_m):
+    """A head may be its top or its middle, a foot the ankle or the toes, a hand the wrist."""
+    recording = labelled(name, truth.body, truth.postures, 25.0, off_m=0.0)
+    noise = noise_m * np.random.default_rng(0).normal(size=recording.frames.shape)
+    noisy = replace(recording, frames=recording.frames + noise)
+    body = recognise(noisy)
+    assert not {"thigh_l", "shank_r", "upper_arm_r", "forearm_l"} & set(body.unseen)
+    for place, (label, *_) in body.parts:
+        assert KEY_POINTS[name][label] in (place, "c7" if place == "neck" else "head_top")
+    angles, points = truth.errors(body.apply(noisy))
+    assert np.median(angles) < 3.0
+    assert np.median(points) < 15.0
+
+
+def test_joints_that_keep_their_distances_by_chance_are_known_by_their_names(truth):
+    """Who does not bend the trunk: key points hang together as a skeleton that is none."""
+    recording = labelled("halpe", truth.body, truth.postures, 25.0, off_m=0.0)
+    chance = replace(recording, frames=recording.frames[:120])
+    angles, points = replace(truth, postures=truth.postures[:120]).errors(
+        recognise(chance).apply(chance)
+    )
+    assert np.median(angles) < 3.0
+    assert np.median(points) < 15.0
+
+
+@pytest.mark.parametrize("prefix", ["Skeleton_001_", "Anna.", "Anna ", "subject1-"])
 @pytest.mark.parametrize("name", ["cast", "helen_hayes", "opencap"])
-def test_what_all_labels_begin_with_says_nothing(truth, name):
+def test_what_all_labels_begin_with_says_nothing(truth, name, prefix):
     recording = labelled(name, truth.body, truth.postures, 25.0)
-    labels = tuple(f"Skeleton_001_{label}" for label in recording.marker_names)
+    labels = tuple(f"{prefix}{label}" for label in recording.marker_names)
     found = recognise(replace(recording, channels=marker_channels(labels)))
     assert found.places == recognise(recording).places
     assert set(found.points) <= set(labels)

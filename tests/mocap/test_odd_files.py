@@ -30,7 +30,7 @@ from scipy.spatial.transform import Rotation
 
 from mplearn.demonstrator import demonstrate
 from mplearn.errors import InvalidValueError, RecordingError
-from mplearn.mocap import Hints, open_recording
+from mplearn.mocap import Hints, open_recording, open_recordings
 from mplearn.recording import Recording
 
 pytestmark = pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")
@@ -97,7 +97,7 @@ def check(path: Path, points: np.ndarray, names: tuple[str, ...], says: str = ""
 
 MISSING = [
     *("nan", "NaN", "-1.#IND", "1.#QNAN", "-nan", "nan(ind)", "-nan(ind)", "N/A", "*", ".", "-"),
-    *("null", "?", "missing", "#VALUE!", "#DIV/0!", "-9999.0", "9999999", "0.0000"),
+    *("null", "?", "missing", "#VALUE!", "#DIV/0!", "-9999.0", "9999999", "0.0000", "-1"),
 ]
 
 
@@ -130,6 +130,52 @@ def by_points(text: str, head: str) -> str:
     return "\n".join(lines) + "\n"
 
 
+def quaternions(text: str) -> str:
+    """How each point is turned, behind where it is."""
+    head, *frames = (line.split(",") for line in text.splitlines())
+    lines = [head[:1], *(frame[:1] for frame in frames)]
+    for at in range(1, len(head), 3):
+        name = head[at].rpartition("_")[0]
+        lines[0] += [f"{name}_position.{axis}" for axis in "xyz"]
+        lines[0] += [f"{name}_rotation.{axis}" for axis in "wxyz"]
+        for line, frame in zip(lines[1:], frames, strict=True):
+            line += [*frame[at : at + 3], "1", "0", "0", "0"]
+    return "\n".join(map(",".join, lines)) + "\n"
+
+
+def in_brackets(text: str, form: str) -> str:
+    """The three numbers of a point in one cell."""
+    head, *frames = (line.split(",") for line in text.splitlines())
+    lines = [",".join([head[0], *(name[:-2] for name in head[1::3])])]
+    for time, *values in frames:
+        triples = (values[i : i + 3] for i in range(0, len(values), 3))
+        cells_ = ['"' + form.format(*v).replace('"', '""') + '"' if v[0] else "" for v in triples]
+        lines.append(",".join([time, *cells_]))
+    return "\n".join(lines) + "\n"
+
+
+def two_rows(text: str, *, named: bool) -> str:
+    """Names above axes, as pandas writes them, below them perhaps the name of the index."""
+    head, frames = text.split("\n", 1)
+    names = head.split(",")[1:]
+    lines = [["marker" if named else "", *(n[:-2] for n in names)]]
+    lines += [["axis" if named else "", *(n[-1:] for n in names)]]
+    lines += [["time", *([""] * len(names))]] if named else []
+    return "\n".join([*map(",".join, lines), frames])
+
+
+def sides_last(text: str) -> str:
+    """``WRA_l_x`` and ``WRA_r_x`` for ``LWRA_x`` and ``RWRA_x``."""
+    head, frames = text.split("\n", 1)
+    return re.sub(r"\b([LR])([A-Z]+)_", lambda m: f"{m[2]}_{m[1].lower()}_", head) + "\n" + frames
+
+
+def after_noon(seconds: float) -> str:
+    """A time of day so long after 12:59 PM."""
+    hour, minute = (12, 59) if seconds < 60 else (1, 0)
+    return f"{hour}:{minute:02d}:{seconds % 60:06.3f} PM"
+
+
 def fortran(text: str) -> str:
     return re.sub(r"(\d)e([-+]\d)", r"\1D\2", text)
 
@@ -157,6 +203,18 @@ TABLES: dict[str, Change] = {
     "axes in brackets": lambda s: re.sub(r"_([xyz])\b", r".pos[\1]", s),
     "axes of translations": lambda s: re.sub(r"_([xyz])\b", r"_T\1", s),
     "velocities too": velocities,
+    "quaternions too": quaternions,
+    "in brackets": lambda s: in_brackets(s, "[{}, {}, {}]"),
+    "in brackets of numpy": lambda s: in_brackets(s, "[{} {} {}]"),
+    "tuples": lambda s: in_brackets(s, "({}, {}, {})"),
+    "in curly brackets": lambda s: in_brackets(s, '{{"x": {}, "y": {}, "z": {}}}'),
+    "two rows of names": lambda s: two_rows(s, named=True),
+    "two rows of names, no name of the index": lambda s: two_rows(s, named=False),
+    "a remark below": lambda s: s + "\nEnd of file\n",
+    "means below": lambda s: s + "\nMean,1,2,3\n",
+    "bones": lambda s: by_points(s, "time,Bone,X,Y,Z"),
+    "kinds of joints": lambda s: by_points(s, "time,jointType,x,y,z"),
+    "names of segments": lambda s: by_points(s, "time,segment_name,posX,posY,posZ"),
     "long, axes named": lambda s: by_points(s, "time,marker,pos_x,pos_y,pos_z"),
     "long, with units": lambda s: by_points(s, "time,Marker Name,X (mm),Y (mm),Z (mm)"),
 }  # fmt: skip
@@ -172,7 +230,12 @@ def test_tables(tmp_path: Path, standing: Recording, points: np.ndarray, kind: s
 
 
 @pytest.mark.parametrize(
-    "remark", ["# fps: 50", "# rate = 50 Hz", "Sampling rate,50", "fps,50", "Frame Rate: 50.0"]
+    "remark",
+    [
+        *("# fps: 50", "# rate = 50 Hz", "Sampling rate,50", "fps,50", "Frame Rate: 50.0"),
+        *("# Sampling frequency: 50 Hz, subject: A", "// recorded at 50 Hz", "Abtastrate;50"),
+        *("Frames per second,50", "Fréquence (Hz),50", "dt,0.02", "Sample period (ms),20 ms"),
+    ],
 )
 def test_a_rate_above_the_table(
     tmp_path: Path, standing: Recording, points: np.ndarray, remark: str
@@ -249,6 +312,24 @@ def test_remarks_above_a_narrow_table(tmp_path: Path, remark: str) -> None:
     assert (len(recording), recording.rate_hz) == (20, 50.0)
 
 
+@pytest.mark.parametrize("unit", ["in", "inches"])
+def test_units_behind_the_axes(
+    tmp_path: Path, standing: Recording, points: np.ndarray, unit: str
+) -> None:
+    path = tmp_path / "a.csv"
+    text = table(points / 25.4, standing.marker_names, form=".6f")
+    path.write_text(re.sub(r"_([xyz])\b", rf"_\1_{unit}", text))
+    check(path, points, standing.marker_names)
+
+
+def test_sides_behind_the_names(tmp_path: Path, standing: Recording, points: np.ndarray) -> None:
+    """What ends in r is the right side, where there is a left one, and no rotation."""
+    path = tmp_path / "a.csv"
+    path.write_text(sides_last(table(points, standing.marker_names)))
+    names = [re.sub(r"^([LR])([A-Z]+)$", r"\2_\1", name) for name in standing.marker_names]
+    check(path, points, tuple(n[:-1] + n[-1].lower() if n[-2:-1] == "_" else n for n in names))
+
+
 def test_a_column_says_the_rate(tmp_path: Path, standing: Recording, points: np.ndarray) -> None:
     text = table(points, standing.marker_names, clock=lambda i: "50")
     path = tmp_path / "a.csv"
@@ -277,6 +358,15 @@ def test_numbered_axes_are_not_taken_for_markers_silently(
         (lambda i: f"2024-03-01 10:00:{i / 50:09.6f}", "datetime"),
         (lambda i: f"{1.7e9 + i / 50:.3f}", "epoch"),
         (lambda i: f"{1.7e12 + 20.0 * i:.0f}", "unix_time_ms"),
+        (lambda i: str(638_000_000_000_000_000 + 200_000 * i), "timestamp"),  # of .NET
+        (lambda i: f"01.05.2024 10:00:{i / 50:06.3f}", "Zeit"),
+        (lambda i: f"5/1/2024 {after_noon(59.4 + i / 50)}", "Time"),
+        (
+            lambda i: (
+                f"{'30.4.2024 23:59' if i < 30 else '1.5.2024 00:00'}:{(59.4 + i / 50) % 60:06.3f}"
+            ),
+            "time",
+        ),
     ],
 )
 def test_clocks(
@@ -286,6 +376,54 @@ def test_clocks(
     text = table(points, standing.marker_names, clock=clock).replace("time", name, 1)
     path.write_text(text)
     check(path, points, standing.marker_names)
+
+
+def test_whole_seconds_and_nanoseconds(
+    tmp_path: Path, standing: Recording, points: np.ndarray
+) -> None:
+    path = tmp_path / "a.csv"
+    clock = lambda i: f"{1_700_000_000 + i // 50},{20_000_000 * (i % 50)}"  # noqa: E731
+    text = table(points, standing.marker_names, clock=clock)
+    path.write_text(text.replace("time", "secs,nsecs", 1))
+    check(path, points, standing.marker_names)
+
+
+@pytest.mark.parametrize("long", [True, False])
+@pytest.mark.parametrize("who", ["person_id", "trackingId", "body"])
+def test_people_in_rows_of_their_own_are_takes_of_their_own(
+    tmp_path: Path, standing: Recording, points: np.ndarray, who: str, long: bool
+) -> None:
+    """Of two people the second comes later, and a metre further on."""
+    names, kept = standing.marker_names, slice(GONE.stop, None)
+    lines: list[str] = []
+    for person, late, far in (("1", 0, 0.0), ("2", 5, 1.0)):
+        text = table(points[kept] + far, names, clock=lambda i, late=late: str(i + late))
+        text = by_points(text, "frame,joint,x,y,z") if long else text.replace("time", "frame", 1)
+        (frame, rest), *rows = (line.split(",", 1) for line in text.splitlines())
+        lines += [] if lines else [f"{frame},{who},{rest}"]
+        lines += [f"{frame},{person},{rest}" for frame, rest in rows]
+    text = "\n".join(lines) + "\n"
+    path = tmp_path / "a_50hz.csv"
+    path.write_text(text)
+    first, second = open_recordings(path)
+    assert (first.person, second.person) == ("1", "2")
+    assert first.marker_names == tuple(f"1:{name}" for name in names)
+    assert second.marker_names == tuple(f"2:{name}" for name in names)
+    n_frames = len(points[kept])
+    assert len(first) == len(second) == n_frames + 5
+    assert first.markers[:n_frames] == pytest.approx(points[kept], abs=1e-5, nan_ok=True)
+    assert second.markers[5:] == pytest.approx(points[kept] + 1.0, abs=1e-5, nan_ok=True)
+    assert np.isnan(first.markers[n_frames:]).all() and np.isnan(second.markers[:5]).all()
+
+
+def test_several_rows_of_one_point_are_refused(
+    tmp_path: Path, standing: Recording, points: np.ndarray
+) -> None:
+    text = by_points(table(points, standing.marker_names), "time,marker,x,y,z")
+    path = tmp_path / "a.csv"
+    path.write_text(text + text.split("\n", 1)[1])
+    with pytest.raises(RecordingError, match="several rows of one point"):
+        open_recording(path)
 
 
 def test_a_table_that_was_cut_off(tmp_path: Path, standing: Recording, points: np.ndarray) -> None:

@@ -35,6 +35,9 @@ _NUMBERED = {33: MEDIAPIPE_POSE, 25: OPENPOSE_BODY_25}
 _SEP = r"[\s,._:|/>\-]"
 _UNIT_BEHIND = re.compile(r"(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]*?)\s*[\])]\s*$")
 _UNIT_JOINED = re.compile(rf"(?P<name>.*[^\s._]){_SEP}(?P<unit>mm|cm|deg|degrees|rad|m)$", re.I)
+_UNIT_OF_AXIS = re.compile(
+    rf"(?P<name>.*{_SEP}[xyz]){_SEP}(?P<unit>in|inch|inches|ft|feet|dm)$", re.I
+)
 _AXES = (
     re.compile(
         rf"(?P<name>.+?){_SEP}+(?:pos|position|loc|t|translate)?{_SEP}*(?P<axis>[xyz])$", re.I
@@ -91,14 +94,25 @@ _FRAME = re.compile(
     re.I,
 )
 _RATE = re.compile(rf"fps|(?:(?:frame|sampling|sample|capture){_SEP}?)rate({_SEP}?(hz|fps))?", re.I)
+_TURN = re.compile(rf"(.+?){_SEP}*[wxyz0-3]", re.I)
 _PLACE = re.compile(
     rf"(?:(?:pos|position|coord|loc|location|t|p){_SEP}?)?([xyz])(?:{_SEP}?(?:pos|position|coord))?",
     re.I,
 )
 _TEXTS = ("label", "segment", "person")
+_WHO = re.compile(
+    rf"(track|tracking|person|body|subject|skeleton|user|player|actor|individual|instance|human)"
+    rf"({_SEP}?(id|idx|index|number|no\.?|name))?$",
+    re.I,
+)
+_FINE = {  # what of a second goes with whole ones
+    re.compile(rf"(?:.*{_SEP})?n(?:ano)?sec(?:ond)?s?$", re.I): 1e-9,
+    re.compile(rf"(?:.*{_SEP})?(?:u|micro)sec(?:ond)?s?$", re.I): 1e-6,
+}
 _POINTS = re.compile(
-    rf"(marker|landmark|joint|key{_SEP}?point|body{_SEP}?part|point|trajectory|name)"
-    rf"({_SEP}?(name|id|index|label))?$",
+    rf"(marker|landmark|joint|key{_SEP}?point|body{_SEP}?part|bone|point|trajectory|name|"
+    rf"segment(?={_SEP}?name))"
+    rf"({_SEP}?(name|id|index|label|type))?$",
     re.I,
 )
 
@@ -118,6 +132,8 @@ class Columns:
         confidences: How sure a landmark is; no measurement.
         points: Column that names the point of each row, where each row is one point.
         rates: Columns that say the rate.
+        who: Column that tells people apart.
+        fine: Column of what goes with whole seconds, and its unit [s].
     """
 
     names: tuple[str, ...]
@@ -130,12 +146,14 @@ class Columns:
     confidences: tuple[int, ...]
     points: int | None
     rates: tuple[int, ...] = ()
+    who: int | None = None
+    fine: tuple[int, float] | None = None
 
     @property
     def measured(self) -> list[int]:
         """Columns that may be measurements."""
         other = {*self.times, *self.frames, *self.texts.values(), *self.confidences, self.points}
-        other |= {*self.rates, *self.nameless}
+        other |= {*self.rates, *self.nameless, self.who, *(self.fine or ())[:1]}
         return [i for i in range(len(self.names)) if i not in other]
 
     @property
@@ -151,7 +169,13 @@ class Columns:
         )
         alike = (takewhile(lambda each: len(set(each)) == 1, letters) for letters in named)
         known = tuple(stem for stem in ("".join(a for a, *_ in same) for same in alike) if stem)
-        return {i for i in self.measured if known and self.names[i].startswith(known)}
+        beside = {_stem(name) for name in known}  # Hips_quat.w, beside Hips_position.x
+        return {
+            i
+            for i in self.measured
+            if (known and self.names[i].startswith(known))
+            or ((turn := _TURN.fullmatch(self.names[i])) and _is_turn(turn[1], beside))
+        }
 
     def time_unit_s(self, column: int) -> float | None:
         """Return the unit of a column of times [s], if its header says it."""
@@ -176,6 +200,12 @@ def meaning_of(header: Sequence[str]) -> Columns:
     special |= set(frames)
     rates = [i for i, name in enumerate(names) if i not in special and _RATE.fullmatch(name)]
     free = [i for i in range(len(names)) if i not in {*special, *rates}]
+    who = next((i for i in free if _WHO.fullmatch(names[i])), None)
+    fine = next(
+        ((i, unit) for i in free for look, unit in _FINE.items() if times and look.match(names[i])),
+        None,
+    )
+    free = [i for i in free if i != who and (fine is None or i != fine[0])]
     axes = {i: match[1].lower() for i in free if (match := _PLACE.fullmatch(names[i]))}
     points = [i for i in free if _POINTS.fullmatch(names[i])]
     if points and sorted(axes.values()) == ["x", "y", "z"]:
@@ -183,7 +213,7 @@ def meaning_of(header: Sequence[str]) -> Columns:
         best = min(points, key=lambda i: names[i].lower().endswith(("id", "index")))
         names = tuple(axes.get(i, name) for i, name in enumerate(names))
         ways = tuple(times), tuple(frames), texts
-        return Columns(names, units, *ways, {}, (), (), best, tuple(rates))
+        return Columns(names, units, *ways, {}, (), (), best, tuple(rates), who, fine)
     markers, doubled = _markers(names, free)
     used = {i for columns in markers.values() for i in columns}
     confidences = [i for i in free if i not in used and _CONFIDENCE.fullmatch(names[i])]
@@ -198,6 +228,8 @@ def meaning_of(header: Sequence[str]) -> Columns:
         tuple(confidences) if markers else (),
         None,
         tuple(rates),
+        who if markers else None,
+        fine if markers else None,
     )
 
 
@@ -233,7 +265,7 @@ def _untupled(name: str) -> str:
 
 
 def _without_unit(name: str) -> tuple[str, str]:
-    for pattern in (_UNIT_BEHIND, _UNIT_JOINED):
+    for pattern in (_UNIT_BEHIND, _UNIT_JOINED, _UNIT_OF_AXIS):
         match = pattern.fullmatch(name)
         if match is None or not match["name"]:
             continue
@@ -258,8 +290,13 @@ def _markers(
         groups: defaultdict[str, dict[str, list[int]]] = defaultdict(lambda: defaultdict(list))
         for i in left:
             match = pattern.fullmatch(names[i])
-            if match is not None and _last_word(match["name"]) not in _NO_POSITION:
+            if match is not None:
                 groups[match["name"].strip()][match["axis"].lower()].append(i)
+        left_sides = {name.lower() for name in groups if _last_word(name) == "l"}
+        for name in list(groups):
+            right_side = _last_word(name) == "r" and f"{name[:-1]}l".lower() in left_sides
+            if _last_word(name) in _NO_POSITION and not right_side:
+                del groups[name]
         for name, axes in groups.items():
             if set(axes) != {"x", "y", "z"}:
                 continue
@@ -304,6 +341,18 @@ def _may_go(word: str, n_names: int) -> bool:
     """Whether a word that so many names share tells neither a part of a body nor a side."""
     tells = word == _WHOLE or place_of(word) != Place("", "")
     return word in _DECORATION or (n_names >= _MANY and not tells)
+
+
+def _is_turn(name: str, beside: set[str]) -> bool:
+    """Whether columns of a name tell how something is turned, or moves, that is one of others."""
+    return _last_word(name) in _NO_POSITION and _stem(name) in beside
+
+
+def _stem(name: str) -> str:
+    """Return ``hips`` for ``Hips_position.`` and ``Hips_quat``."""
+    words = [word for word in re.split(rf"{_SEP}+", name.lower()) if word]
+    last = words[-1] if len(words) > 1 else ""
+    return " ".join(words[:-1] if last in _NO_POSITION | _DECORATION else words)
 
 
 def _last_word(name: str) -> str:

@@ -23,6 +23,7 @@ radians and metres; those whose names say ``(deg)`` or ``(mm)`` are converted.
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -49,6 +50,11 @@ _MARKERS_SHARE = 0.5  # of a table's columns, without what else a marker has: it
 _LEAST_MARKERS = 3  # that a .txt file must name to be taken for a table
 _SAME_STEP = 0.01
 _TURN = 2 * np.pi
+_CLOCK = re.compile(  # 10:00:00.02, 1.5.2024 10:00:00,02, 5/1/2024 10:00:00.02 AM
+    r"(?:(?P<date>\d{1,2}[./-]\d{1,2}[./-]\d{2,4}),?[ T]+)?"
+    r"(?P<clock>(?:\d+:)?\d+:\d+(?:[.,]\d*)?)\s*(?P<half>[AP]M)?",
+    re.I,
+)
 
 
 class CSVReader(Reader):
@@ -77,6 +83,8 @@ class CSVReader(Reader):
         table = _read(sheet, header, columns, findings)
         if columns.points is not None:
             table = _by_points(path, table, columns)
+        elif len(set(table.texts.get("who", ()))) > 1:
+            table = _by_people(path, table)
         person = _person(path, table)
         rate_hz, clock = _clock(path, table, header.rate_hz or table.rate_hz, hints, findings)
         index = np.rint(clock.places).astype(np.int64)
@@ -151,6 +159,8 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
     textual = dict(columns.texts)
     if columns.points is not None:
         textual["point"] = columns.points
+    if columns.who is not None:
+        textual["who"] = columns.who
     for i in columns.times:  # times of the day are texts
         if i < len(first) and first[i].strip() and not is_number(first[i]):
             textual[f"time {i}"] = i
@@ -165,14 +175,28 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
         wanted = [next(i for i in measured if columns.names[i].lower() == a) for a in "xyz"]
     else:
         wanted = measured
-    clocks = [*columns.times, *columns.frames, *columns.rates]
+    fine_at, fine_s = columns.fine or (None, 0.0)
+    clocks = [
+        *columns.times,
+        *columns.frames,
+        *columns.rates,
+        *([fine_at] if fine_at is not None else []),
+    ]
     clocks = [i for i in clocks if i not in textual.values()]
     if columns.nameless:
         findings.leave_out(["(no name)"] * len(columns.nameless))
         findings.note(f"{len(columns.nameless)} columns without a name left out")
 
     def rows() -> Iterator[tuple[int, list[str]]]:
+        last = header.start
         for line, cells in sheet.rows(header.start):
+            begin = next(cell for cell in cells if cell.strip())
+            if clocks and line > last + 1 and last > header.start and not is_number(begin):
+                findings.note(
+                    f"what stands from line {line} on, {begin.strip()[:40]!r}, is left out"
+                )
+                return
+            last = line
             if cells[0].strip() == header.names[0] and cells[0].strip() and not is_number(cells[0]):
                 findings.note(f"line {line} repeats the names: left out")
                 continue
@@ -195,8 +219,9 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
         cut_off=sheet.cut_off,
     )
     place = {column: k for k, column in enumerate([*clocks, *wanted])}
-    numbers = [i for i in columns.frames if _counts(found[:, place[i]])]
-    if wanted == measured:  # what is only called a number of frames is measured
+    in_order = columns.who is None and columns.points is None
+    numbers = [i for i in columns.frames if _counts(found[:, place[i]], in_order=in_order)]
+    if wanted == measured and not are_markers:  # what is only called a number of frames is measured
         wanted = [i for i in clocks if i in columns.frames and i not in numbers] + wanted
     if not wanted or not len(found):
         raise bad_file(path, f"{len(wanted)} channels, {len(found)} rows", "at least one of each")
@@ -204,6 +229,11 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
         raise bad_file(path, f"columns named {list(columns.names[:6])}", "names, each different")
     times = [(found[:, place[i]], columns.time_unit_s(i)) for i in clocks if i in columns.times]
     times = [(seconds, unit_s) for seconds, unit_s in times if not np.isnan(seconds).all()]
+    if fine_at is not None and len(times) == 1 and _counts(times[0][0]):  # as ROS has stamps
+        times = [(times[0][0] + fine_s * found[:, place[fine_at]], 1.0)]
+    if not times:  # as pandas writes an index of times
+        index = [found[:, place[i]] for i in columns.frames if not columns.names[i]]
+        times = [(x, None) for x in index if (np.diff(x) > 0).all() and not _counts(x)]
     times += [(_of_day(path, texts.pop(n)), 1.0) for n in list(texts) if n.startswith("time ")]
     table = _Table(
         found[:, [place[i] for i in wanted]],
@@ -263,30 +293,37 @@ def _in_si(table: _Table, wanted: list[int], columns: Columns, findings: Finding
     return replace(table, values=values)
 
 
-def _counts(values: FloatArray) -> bool:
+def _counts(values: FloatArray, *, in_order: bool = True) -> bool:
     """Whether a column holds numbers of frames: whole, and never going back."""
     return bool(
         not np.isnan(values).any()
         and (values == np.rint(values)).all()
-        and (np.diff(values) >= 0).all()
+        and (not in_order or (np.diff(values) >= 0).all())
     )
 
 
 def _of_day(path: Path, texts: list[str]) -> FloatArray:
     """Return times that are written with a date, or as hours, minutes and seconds [s]."""
     times = []
+    day, days = "", -1
     for row, text in enumerate(texts, start=1):
+        found = _CLOCK.fullmatch(text.strip())
         try:
-            if text[:4].isdigit():
-                times.append(datetime.fromisoformat(text.replace("/", "-")).timestamp())
+            if found and not text[:4].isdigit():
+                days += (found["date"] or "") != day or days < 0
+                day = found["date"] or ""
+                parts = [float(part) for part in found["clock"].replace(",", ".").split(":")]
+                seconds = sum(p * 60.0**k for k, p in enumerate(reversed(parts)))
+                half = (found["half"] or "").upper()
+                hour = parts[0] % 12 + (12 if half == "PM" else 0) if half else parts[0]
+                times.append(86400.0 * days + seconds + 3600.0 * (hour - parts[0]))
             else:
-                parts = [float(part) for part in text.split(":")]
-                times.append(sum(p * 60.0**k for k, p in enumerate(reversed(parts))))
+                times.append(datetime.fromisoformat(text.replace("/", "-")).timestamp())
         except (ValueError, OverflowError) as error:
             raise bad_file(
                 path,
                 f"row {row} holds the time {text[:40]!r}",
-                "a number, or hours:minutes:seconds",
+                "a number, a date and time, or hours:minutes:seconds",
             ) from error
     return np.array(times, dtype=np.float64)
 
@@ -299,13 +336,20 @@ def _by_points(path: Path, table: _Table, columns: Columns) -> _Table:
     if keys is None or np.isnan(keys).any():
         raise bad_file(path, "a row for each point, without frames or times", "a column 'frame'")
     frames, first, row = np.unique(keys, return_index=True, return_inverse=True)
-    names = list(dict.fromkeys(table.texts["point"]))
+    of_points = table.texts["point"]
+    if len(set(who := table.texts.get("who", []))) > 1:
+        of_points = [f"{whose}:{name}" for whose, name in zip(who, of_points, strict=True)]
+    names = list(dict.fromkeys(of_points))
     if len(frames) * len(names) > 4 * len(keys) + 1000:
         raise bad_file(path, f"{len(names)} points in {len(frames)} frames", "most points in each")
     column = {name: k for k, name in enumerate(names)}
     points = np.full((len(frames), len(names), 3), np.nan)
     axes = [[n.lower() for n in table.channels].index(axis) for axis in "xyz"]
-    which = np.array([column[name] for name in table.texts["point"]], dtype=np.int64)
+    which = np.array([column[name] for name in of_points], dtype=np.int64)
+    if len(np.unique(row * len(names) + which)) < len(which):
+        raise bad_file(
+            path, "several rows of one point at one time", "one, or a column 'person_id'"
+        )
     points[row, which] = table.values[:, axes]
     unit = next((columns.units[i] for i, n in enumerate(columns.names) if n.lower() == "x"), "")
     if all(name.isdecimal() for name in names) and len(names) == len(MEDIAPIPE_POSE):
@@ -314,6 +358,7 @@ def _by_points(path: Path, table: _Table, columns: Columns) -> _Table:
         names = [known[name] for name in names]
     texts = {name: [values[i] for i in first] for name, values in table.texts.items()}
     del texts["point"]
+    texts.pop("who", None)
     return _Table(
         points.reshape(len(frames), -1),
         (),
@@ -323,6 +368,35 @@ def _by_points(path: Path, table: _Table, columns: Columns) -> _Table:
         None if table.numbers is None else table.numbers[first],
         texts,
         table.rate_hz,
+    )
+
+
+def _by_people(path: Path, table: _Table) -> _Table:
+    """Return a table with a row for each frame, of one with a row for each person in it."""
+    assert table.markers is not None
+    keys = table.numbers if table.numbers is not None else None
+    if keys is None and table.times:
+        keys = table.times[0][0]
+    who = table.texts["who"]
+    people = {name: k for k, name in enumerate(dict.fromkeys(who))}
+    which = np.array([people[name] for name in who], dtype=np.int64)
+    if keys is None or np.isnan(keys).any():
+        raise bad_file(path, f"{len(people)} people without frames or times", "a column 'frame'")
+    frames, first, row = np.unique(keys, return_index=True, return_inverse=True)
+    if len(frames) * len(people) > 4 * len(keys) + 1000:
+        raise bad_file(path, f"{len(people)} people in {len(frames)} frames", "most people in each")
+    if len(np.unique(row * len(people) + which)) < len(which):
+        raise bad_file(path, "several rows of one person at one time", "one")
+    values = np.full((len(frames), len(people), table.values.shape[1]), np.nan)
+    values[row, which] = table.values
+    texts = {name: [each[i] for i in first] for name, each in table.texts.items() if name != "who"}
+    return replace(
+        table,
+        values=values.reshape(len(frames), -1),
+        markers=tuple(f"{name}:{marker}" for name in people for marker in table.markers),
+        times=tuple((times[first], unit_s) for times, unit_s in table.times),
+        numbers=None if table.numbers is None else table.numbers[first],
+        texts=texts,
     )
 
 

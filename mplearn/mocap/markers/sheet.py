@@ -20,8 +20,24 @@ _UNIT = re.compile(
 )
 _SEPARATOR = re.compile(r'"?sep=([,;\t]?)"?', re.I)
 _RATE = re.compile(
-    r"\b(?:fps|frequency|freq|(?:(?:frame|sampl(?:e|ing)|capture|data|camera)[\s_-]*)?rate)\b"
+    r"\b(?:fps|frames per second|frequency|frequenz|fréquence|frecuencia|frequenza|freq|"
+    r"abtastrate|bildrate|(?:(?:frame|sampl(?:e|ing)|capture|data|camera)[\s_-]*)?rate)\b"
     r"[^\d\n]{0,12}?(\d+(?:\.\d+)?)\s*(?:hz|fps|1/s)?\W*$",
+    re.I,
+)
+_HERTZ = re.compile(r"(\d+(?:\.\d+)?)\s*(?:hz|fps)\b", re.I)
+_OTHER_RATE = re.compile(r"filter|pass|cut.?off|analog|emg|force", re.I)
+_STEP = re.compile(
+    r"\b(?:dt|time[\s_-]*step|(?:frame|sampl(?:e|ing))[\s_-]*(?:time|period|interval))\b"
+    r"[^\d\n]{0,12}?(\d*\.?\d+)\s*(m?s)?\W*$",
+    re.I,
+)
+_RATES_HZ = (1.0, 10_000.0)
+_OPENS = ("[", "(", "{")
+_TRIPLE = re.compile(
+    r"\s*[\[({]\s*"
+    + r"[\s,;]+".join(rf"(?:[\"']?{a}[\"']?\s*[:=]\s*)?([-+.\deE]+|nan|none|null)" for a in "xyz")
+    + r"\s*[\])}]\s*",
     re.I,
 )
 _LOOK = 40  # lines
@@ -38,6 +54,7 @@ class Sheet:
         separator: What separates cells; empty for white space.
         decimal_comma: Whether numbers have a decimal comma.
         cut_off: Whether the last line has no end.
+        triples: Columns whose cells hold three numbers, ``[0.1, 0.2, 1.7]``: they count as three.
     """
 
     path: Path
@@ -45,6 +62,7 @@ class Sheet:
     separator: str
     decimal_comma: bool
     cut_off: bool = False
+    triples: frozenset[int] = frozenset()
 
     @classmethod
     def of(cls, path: Path, text: str, separators: str = ",;\t|") -> Sheet:
@@ -65,7 +83,10 @@ class Sheet:
         cells = [cell for i in range(min(len(lines), _LOOK)) for cell in sheet.cells(i)]
         commas = sum(bool(_DECIMAL_COMMA.fullmatch(cell)) for cell in cells)
         points = sum(bool(_DECIMAL_POINT.fullmatch(cell)) for cell in cells)
-        return cls(path, lines, separator, commas > points, bool(text) and text[-1] not in "\r\n")
+        some_rows = [sheet.cells(i) for i in range(min(len(lines), _LOOK))]
+        triples = {i for row in some_rows for i, cell in enumerate(row) if _three(cell)}
+        cut_off = bool(text) and text[-1] not in "\r\n"
+        return cls(path, lines, separator, commas > points, cut_off, frozenset(triples))
 
     def cells(self, line: int) -> list[str]:
         """Return the cells of a line, counted from 0.
@@ -77,13 +98,27 @@ class Sheet:
         if not self.separator:
             return text.split()
         if '"' not in text:
-            return text.split(self.separator)
+            return self._spread(text.split(self.separator))
         try:
-            return next(csv.reader([text], delimiter=self.separator, strict=True), [])
+            return self._spread(next(csv.reader([text], delimiter=self.separator, strict=True), []))
         except csv.Error as error:
             raise bad_file(
                 self.path, f"not a table (line {line + 1}: {error})", "rows of cells"
             ) from error
+
+    def _spread(self, cells: list[str]) -> list[str]:
+        """Return cells with three for each that holds three numbers, or names what does."""
+        if not self.triples:
+            return cells
+        spread: list[str] = []
+        for i, cell in enumerate(cells):
+            if i not in self.triples:
+                spread.append(cell)
+            elif cell.strip() and not is_number(cell) and not cell.lstrip().startswith(_OPENS):
+                spread += [f"{cell.strip()}.{axis}" for axis in "xyz"]
+            else:
+                spread += _three(cell) or ["", "", ""]
+        return spread
 
     def rows(self, start: int, stop: int | None = None) -> Iterator[tuple[int, list[str]]]:
         """Yield the rows that hold anything, each with the number of its line, from 1.
@@ -105,6 +140,12 @@ class Sheet:
         cells = [cell.strip() for cell in self.cells(line)]
         filled = [cell for cell in cells if cell]
         return bool(filled) and 2 * sum(map(is_number, filled)) >= len(filled)
+
+
+def _three(cell: str) -> list[str]:
+    """Return the three numbers of ``[0.1, 0.2, 1.7]`` or ``{"x": 0.1, "y": 0.2, "z": 1.7}``."""
+    match = _TRIPLE.fullmatch(cell) if cell.lstrip().startswith(_OPENS) else None
+    return [match[k] for k in (1, 2, 3)] if match else []
 
 
 def is_number(text: str) -> bool:
@@ -152,11 +193,11 @@ def find_header(sheet: Sheet) -> Header:
             break
         if line == 0 or not above:
             width = _width_below(sheet, line)
-            said = _RATE.search(sheet.lines[line])
+            said = _said_rate(sheet.lines[line])
             filled = sum(map(bool, cells))
-            marked = 2 * len(cells) < width and (cells[0][:1] in _COMMENT or said)
+            marked = 2 * len(cells) < width and (cells[0][:1] in _COMMENT or said is not None)
             if marked or (4 * filled < width and not _data_follow(sheet, line, width)):
-                rate_hz = float(said[1]) if said else rate_hz
+                rate_hz = said or rate_hz
                 continue  # a remark, not the names
             cells = _uncommented(cells)
             if sheet.is_data(line):
@@ -168,6 +209,22 @@ def find_header(sheet: Sheet) -> Header:
     if not above:
         raise bad_file(sheet.path, "an empty table", "rows of cells below a row of names")
     return Header(_joined_names(above), start, rate_hz)
+
+
+def _said_rate(line: str) -> float | None:
+    """Return the rate that a remark says [1/s], perhaps by its step in time, if it says one."""
+    found = _RATE.search(line)
+    hertz = _HERTZ.findall(line)
+    step = _STEP.search(line)
+    if found:
+        rate_hz = float(found[1])
+    elif len(hertz) == 1 and not _OTHER_RATE.search(line):
+        rate_hz = float(hertz[0])
+    elif step and float(step[1]) > 0:
+        rate_hz = (1000.0 if step[2] == "ms" else 1.0) / float(step[1])
+    else:
+        return None
+    return rate_hz if _RATES_HZ[0] <= rate_hz <= _RATES_HZ[1] else None
 
 
 def _uncommented(cells: list[str]) -> list[str]:
@@ -207,6 +264,9 @@ def _joined_names(above: list[list[str]]) -> tuple[str, ...]:
         axis = letter[:1].lower() if _AXIS.fullmatch(letter) else ""
         own = f"{current}.{axis}" if axis else letter or name
         joined.append(_with_unit(own, unit))
+    index = above[-1]
+    if len(above) > axes + 1 and index[0] and not any(index[1:]):  # pandas' name of the index
+        joined[0] = index[0]
     while joined and not joined[-1]:
         joined.pop()
     return tuple(joined)
