@@ -156,8 +156,9 @@ def _level(place: str) -> float:
 
 def _heights(labels: tuple[str, ...], some: FloatArray) -> dict[str, float]:
     """Return how high each marker is, as a share of the highest ones' height over the lowest."""
-    with np.errstate(all="ignore"):
-        usual = np.nanmedian(some[..., 2], axis=0)
+    usual = np.full(len(labels), np.nan)
+    ever = ~np.isnan(some[..., 2]).all(axis=0)
+    usual[ever] = np.nanmedian(some[:, ever, 2], axis=0)
     known = usual[np.isfinite(usual)]
     if not len(known):
         return {}

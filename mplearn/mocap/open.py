@@ -33,6 +33,7 @@ from .resample import resample
 from .skeletons.amc import AMCReader
 from .skeletons.bvh import BVHReader
 from .skeletons.g1_csv import G1CSVReader
+from .skeletons.joint_arrays import JointArrayReader
 from .skeletons.mvnx import MVNXReader
 from .skeletons.smpl import SMPLReader
 
@@ -48,6 +49,7 @@ for _reader in (
     AMCReader(),
     MVNXReader(),
     SMPLReader(),
+    JointArrayReader(),
     C3DReader(),
     XDFReader(),
     UIPRMDReader(),

@@ -494,6 +494,20 @@ def write_smpl(path: Path, **arrays: object) -> Path:
     return path
 
 
+def standing_coco(n_frames: int = 12) -> np.ndarray:
+    """The 17 key points of COCO of somebody who stands and sways, shape (T, 17, 3) [m]."""
+    side = [(0, 0.2, 1.45), (0, 0.25, 1.15), (0, 0.25, 0.9), (0, 0.1, 0.95), (0, 0.1, 0.5)]
+    pairs = [(0.08, 0.03, 1.65), (0.0, 0.07, 1.62), *side, (0, 0.1, 0.08)]
+    points = [(0.1, 0, 1.6), *(((x, sign * y, z)) for x, y, z in pairs for sign in (1, -1))]
+    sway = 0.02 * np.sin(np.arange(n_frames) / 5.0)[:, None, None]
+    return np.array(points) + sway * np.array(points)[:, 2:]
+
+
+def write_joint_array(path: Path, points: np.ndarray | None = None) -> Path:
+    np.save(path, standing_coco() if points is None else points)
+    return path
+
+
 def g1_values(n_frames: int = 12, seed: int = 0) -> np.ndarray:
     """The root's x y z [m] and quaternion x y z w, and 29 joints [rad], shape (T, 36)."""
     from scipy.spatial.transform import Rotation
@@ -622,6 +636,7 @@ WRITERS: dict[str, tuple[str, Writer]] = {
     "G1 CSV": ("take.csv", write_g1_csv),
     "MVNX": ("take.mvnx", write_mvnx),
     "SMPL": ("take.npz", write_smpl),
+    "joint array": ("take_100hz.npy", write_joint_array),
     "Motive CSV": ("take.csv", write_motive),
     "Nexus CSV": ("take.csv", write_nexus),
     "Qualisys TSV": ("take.tsv", write_qualisys),

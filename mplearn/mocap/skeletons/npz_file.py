@@ -6,6 +6,7 @@ import io
 import struct
 import zipfile
 import zlib
+from collections.abc import Iterable
 from pathlib import Path
 from tokenize import TokenError
 from typing import Any
@@ -13,9 +14,17 @@ from typing import Any
 import numpy as np
 from numpy.lib import format as npy
 
+from ...errors import RecordingError
+from ...recording import FloatArray
 from ..files import bad_file, read_bytes
 
-_EXPECTED = "a NumPy archive (.npz) of plain arrays"
+RATES = (
+    *("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps", "mocap_fps"),
+    *("sampling_rate", "sample_rate", "rate_hz", "rate"),
+)
+"""Names of arrays that say the rate [1/s]."""
+
+_EXPECTED = "plain arrays of NumPy (.npy, or .npz)"
 _MOST_PACKED = 60  # times; measured numbers pack to a half or so
 _SMALL_BYTES = 4_000_000
 _DAMAGE = (zipfile.BadZipFile, zlib.error, OSError, EOFError, ValueError, KeyError, struct.error,
@@ -64,16 +73,77 @@ class NPZFile:
             raise bad_file(self.path, f"{name!r} expands to {member.file_size} bytes", _EXPECTED)
         try:
             content = self._archive.read(member)
-            stream = io.BytesIO(content)
-            version = npy.read_magic(stream)
-            read_header = (
-                npy.read_array_header_1_0 if version[0] == 1 else npy.read_array_header_2_0
-            )
-            shape, _, dtype = read_header(stream)
-            size = float(np.prod(shape, dtype=np.float64)) * dtype.itemsize
-            if dtype.hasobject or size > len(content):
-                raise ValueError(f"shape {shape} of {dtype}")
-            return npy.read_array(io.BytesIO(content), allow_pickle=False)
         except _DAMAGE as error:
-            reason = str(error)[:80]
-            raise bad_file(self.path, f"{name!r} cannot be read ({reason})", _EXPECTED) from error
+            raise _unreadable(self.path, repr(name), error) from error
+        return _array(self.path, content, repr(name))
+
+    def first_of(self, names: Iterable[str]) -> str | None:
+        """Return the first of some names that there is an array of."""
+        return next((name for name in names if name in self), None)
+
+    def numbers(self, name: str) -> FloatArray:
+        """Return an array of finite numbers, or NaN.
+
+        Raises:
+            RecordingError: It holds something else.
+        """
+        return finite(self.path, name, self.read(name))
+
+    def rate_hz(self) -> float | None:
+        """Return the rate that an array says [1/s]; None where there is none of its names.
+
+        Raises:
+            RecordingError: It is no rate.
+        """
+        name = self.first_of(RATES)
+        if name is None:
+            return None
+        value = self.read(name)
+        try:
+            rate_hz = float(value.item())  # or as text
+        except (ValueError, TypeError):
+            rate_hz = np.nan
+        if not 0 < rate_hz < 1e6:
+            raise bad_file(self.path, f"{name} is {value.tolist()}"[:80], "frames a second")
+        return rate_hz
+
+
+def read_npy(path: Path) -> np.ndarray[Any, np.dtype[Any]]:
+    """Return the array of an ``.npy`` file, plain or gzipped.
+
+    Raises:
+        RecordingError: It is damaged, or of objects.
+    """
+    return _array(path, read_bytes(path), "the array")
+
+
+def finite(path: Path, name: str, array: np.ndarray[Any, np.dtype[Any]]) -> FloatArray:
+    """Return an array as numbers, if it holds finite ones, or NaN.
+
+    Raises:
+        RecordingError: It holds something else.
+    """
+    if array.dtype.kind not in "fiu":
+        raise bad_file(path, f"{name} of {array.dtype}", "numbers")
+    values: FloatArray = np.asarray(array, dtype=np.float64)
+    if np.isinf(values).any():
+        raise bad_file(path, f"{name} holds infinite values", "finite numbers")
+    return values
+
+
+def _array(path: Path, content: bytes, name: str) -> np.ndarray[Any, np.dtype[Any]]:
+    try:
+        stream = io.BytesIO(content)
+        version = npy.read_magic(stream)
+        read_header = npy.read_array_header_1_0 if version[0] == 1 else npy.read_array_header_2_0
+        shape, _, dtype = read_header(stream)
+        size = float(np.prod(shape, dtype=np.float64)) * dtype.itemsize
+        if dtype.hasobject or size > len(content):
+            raise ValueError(f"shape {shape} of {dtype}")
+        return npy.read_array(io.BytesIO(content), allow_pickle=False)
+    except _DAMAGE as error:
+        raise _unreadable(path, name, error) from error
+
+
+def _unreadable(path: Path, name: str, error: Exception) -> RecordingError:
+    return bad_file(path, f"{name} cannot be read ({str(error)[:80]})", _EXPECTED)

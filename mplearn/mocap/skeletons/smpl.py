@@ -21,7 +21,7 @@ from ..options import option
 from ..placing.space import Space
 from ..rates import rate_beside
 from ..reader import Hints, Reader
-from .npz_file import NPZFile
+from .npz_file import RATES, NPZFile
 from .skeletal import Limbs, limb_order, skeletal_recording
 from .stature import unit_of_places
 
@@ -61,17 +61,19 @@ _ENDS = (
     ("left_wrist_end", "left_wrist", 0.0, 0.108, 0.0),
     ("right_wrist_end", "right_wrist", 0.0, -0.108, 0.0),
 )
+BODY_JOINTS = tuple(name for name, *_ in _JOINTS)
+"""Names of the joints of the body, in the order of the models."""
+
 _TO_OURS = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # theirs: x left, y up
 _N_BODY = len(_JOINTS)
 _MODELS = {24: "SMPL", 52: "SMPL-H", 55: "SMPL-X", 22: "the body alone", 23: "SMPL without root"}
 
-_POSES = ("poses", "smpl_poses", "fullpose", "full_pose", "pose")
-_ROOTS = ("root_orient", "global_orient")
+POSES = ("poses", "smpl_poses", "fullpose", "full_pose", "pose")
+ROOTS = ("root_orient", "global_orient")
 _BODIES = ("pose_body", "body_pose")
 _FAR_M = 20.0  # from where all begins: hardly a place in metres
 _SQUARE = 0.01  # by which matrices and quaternions are off rotations, at most
 _PLACES = ("trans", "transl", "smpl_trans", "root_trans")
-_RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
 
 
 class SMPLReader(Reader):
@@ -90,9 +92,9 @@ class SMPLReader(Reader):
         findings = Findings(self.format)
         archive = NPZFile(path)
         vectors = _vectors(archive, findings)
-        rate_hz = hints.rate_hz or _rate(archive) or rate_beside(path, findings)
+        rate_hz = hints.rate_hz or archive.rate_hz() or rate_beside(path, findings)
         if rate_hz is None:
-            raise bad_file(path, f"none of {', '.join(_RATES)}", f"one, or {option('rate_hz')}")
+            raise bad_file(path, f"none of {', '.join(RATES[:5])}", f"one, or {option('rate_hz')}")
         limbs = mean_person()
         local = np.broadcast_to(np.eye(3), (len(vectors), len(limbs.names), 3, 3)).copy()
         turns = rotation_vector_to_matrix(vectors)
@@ -125,8 +127,8 @@ def mean_person() -> Limbs:
 
 def _vectors(archive: NPZFile, findings: Findings) -> FloatArray:
     """Return the rotation vectors of the body's joints, shape (T, 22, 3) [rad]."""
-    name = _first(archive, _POSES)
-    root, body = _first(archive, _ROOTS), _first(archive, _BODIES)
+    name = archive.first_of(POSES)
+    root, body = archive.first_of(ROOTS), archive.first_of(_BODIES)
     if name is not None:
         poses = _as_vectors(archive, name, findings)
     elif root is not None and body is not None:
@@ -170,7 +172,7 @@ def _as_vectors(archive: NPZFile, name: str, findings: Findings) -> FloatArray:
         RecordingError: It holds matrices that are no rotations, or so many numbers a joint as no
             rotation has that is known here.
     """
-    values = _numbers(archive, name)
+    values = archive.numbers(name)
     if values.ndim == 3 and len(values) == 1 and values.shape[2] >= 3 * _N_BODY:
         values = values[0]  # a batch of one, as networks have it
     width = int(np.prod(values.shape[1:]))
@@ -220,12 +222,12 @@ def _rotation_vectors(quaternions: FloatArray, seen: BoolArray) -> FloatArray:
 
 
 def _places(archive: NPZFile, n_frames: int, findings: Findings) -> FloatArray:
-    name = _first(archive, _PLACES)
+    name = archive.first_of(_PLACES)
     if name is None:
         findings.warn("there is no 'trans': the pelvis is taken to stay where it is")
         height = -float(mean_person().offsets[[1, 4, 7, 10], 2].sum())
         return np.tile([0.0, 0.0, height], (n_frames, 1))
-    places = _numbers(archive, name)
+    places = archive.numbers(name)
     if places.size != 3 * n_frames or places.shape[-1:] != (3,):
         raise bad_file(archive.path, f"{name} of shape {places.shape}", f"({n_frames}, 3)")
     return places.reshape(n_frames, 3)
@@ -249,27 +251,3 @@ def _unit(
         return 1.0
     axis = int(np.abs(upward[known].sum(axis=0)).argmax())
     return unit_of_places(path, places[known, axis], 1.0, hints, findings)
-
-
-def _rate(archive: NPZFile) -> float | None:
-    name = _first(archive, _RATES)
-    if name is None:
-        return None
-    value = _numbers(archive, name)
-    if value.size != 1 or not 0 < value.flat[0] < 1e6:
-        raise bad_file(archive.path, f"{name} is {value.tolist()}"[:80], "frames a second")
-    return float(value.flat[0])
-
-
-def _numbers(archive: NPZFile, name: str) -> FloatArray:
-    array = archive.read(name)
-    if array.dtype.kind not in "fiu":
-        raise bad_file(archive.path, f"{name} of {array.dtype}", "numbers")
-    values: FloatArray = np.asarray(array, dtype=np.float64)
-    if np.isinf(values).any():
-        raise bad_file(archive.path, f"{name} holds infinite values", "finite numbers")
-    return values
-
-
-def _first(archive: NPZFile, names: tuple[str, ...]) -> str | None:
-    return next((name for name in names if name in archive), None)

@@ -1,0 +1,115 @@
+"""Arrays of joints without names: which ones they are, by their number and their bones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from known_person import RATE_HZ, Truth
+
+from mplearn.anatomy import recognise
+from mplearn.body import human_body, marker_set
+from mplearn.errors import RecordingError
+from mplearn.mocap import Hints, open_recording
+from mplearn.mocap.skeletons.joint_arrays import LAYOUTS
+
+pytestmark = pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")
+# where joints are that are not called as the place is
+PLACES = {
+    **dict.fromkeys(("mid_hip", "spine_base", "pelvis"), ("pelvis",)),
+    **dict.fromkeys(("thorax", "spine_shoulder"), ("shoulder_l", "shoulder_r")),
+    "hip": ("pelvis",),
+    "head": ("head_top",),
+    "big_toe": ("toe_tip",),
+    "small_toe": ("metatarsal5",),
+    "heel": ("heel_back",),
+    "foot_index": ("toe_tip",),
+    "foot": ("ball",),
+    "index": ("knuckle_index",),
+    "pinky": ("knuckle_little",),
+    "thumb": ("thumb_side",),
+}
+
+
+@pytest.fixture(scope="module")
+def landmarks(truth: Truth) -> dict[str, np.ndarray]:
+    table = marker_set("landmarks")
+    bodies, offsets = table.attach(truth.body.tree, human_body().tree)
+    points = np.array([truth.body.tree.points(q, bodies, offsets) for q in truth.postures])
+    return dict(zip(table.names, points.swapaxes(0, 1), strict=True))
+
+
+def joints(layout: str, landmarks: dict[str, np.ndarray]) -> np.ndarray:
+    """Joints of a layout, NaN where the body has no such place."""
+    found = []
+    for name in LAYOUTS[layout].split():
+        word, _, rest = name.partition("_")
+        sided = word in ("left", "right")
+        part, end = (rest, f"_{word[0]}") if sided else (name, "")
+        middle = (part,) if sided and part == "hip" else PLACES.get(part, (part,))
+        if layout == "Kinect" and part == "foot":
+            middle = ("toe_tip",)
+        places = [place if sided is False else f"{place}{end}" for place in middle]
+        at = [landmarks[place] for place in places if place in landmarks]
+        found.append(np.mean(at, axis=0) if at else np.full_like(landmarks["nose"], np.nan))
+    return np.stack(found, axis=1)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_the_joints_of_a_layout_are_the_persons(
+    tmp_path: Path, truth: Truth, landmarks: dict[str, np.ndarray], layout: str
+) -> None:
+    points = joints(layout, landmarks)
+    more = {"COCO-WholeBody": 110, "SMPL": 2}.get(layout, 0)  # of hands and face
+    whole = np.concatenate([points, np.repeat(points[:, :1], more, axis=1)], axis=1)
+    np.save(
+        tmp_path / f"walk_{RATE_HZ:g}hz.npy", 1000.0 * whole[..., [0, 2, 1]] * (1, 1, -1)
+    )  # y up
+    take = open_recording(tmp_path / f"walk_{RATE_HZ:g}hz.npy")
+    assert take.report is not None and f"those of {layout}" in " ".join(take.report.notes)
+    assert (take.report.unit_m, take.report.up, take.rate_hz) == (0.001, "y", RATE_HZ)
+    assert take.markers == pytest.approx(points, abs=1e-9, nan_ok=True)
+    angles, off_mm = truth.errors(recognise(take).apply(take))
+    assert np.median(angles) < 3.0 and np.median(off_mm) < 15.0
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_joints_in_another_order_are_refused(
+    tmp_path: Path, landmarks: dict[str, np.ndarray], layout: str
+) -> None:
+    points = joints(layout, landmarks)
+    more = {"COCO-WholeBody": 110}.get(layout, 0)
+    points = np.concatenate([points, np.repeat(points[:, :1], more, axis=1)], axis=1)
+    for seed in range(5):
+        np.save(tmp_path / "a.npy", np.random.default_rng(seed).permutation(points, axis=1))
+        with pytest.raises(RecordingError, match="would not be a person's"):
+            open_recording(tmp_path / "a.npy", hints=Hints(rate_hz=RATE_HZ))
+
+
+def test_an_archive_with_batch_confidence_and_rate(
+    tmp_path: Path, landmarks: dict[str, np.ndarray]
+) -> None:
+    points = joints("COCO", landmarks)
+    sure = np.concatenate([points, np.ones((*points.shape[:2], 1))], axis=2)
+    np.savez(tmp_path / "a.npz", keypoints_3d=sure[None], fps=np.array(f"{RATE_HZ:g}"))
+    take = open_recording(tmp_path / "a.npz")
+    assert take.rate_hz == RATE_HZ
+    assert take.markers == pytest.approx(points)
+
+
+@pytest.mark.parametrize(
+    "shape", [(5, 9, 3), (5, 17, 2), (5, 322), (0, 17, 3), (17, 3), (2, 5, 17, 3)]
+)
+def test_what_is_no_array_of_joints(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    np.save(tmp_path / "a.npy", np.ones(shape))
+    with pytest.raises(RecordingError, match="frames"):
+        open_recording(tmp_path / "a.npy", hints=Hints(rate_hz=RATE_HZ))
+
+
+def test_without_a_rate_the_option_is_named(
+    tmp_path: Path, landmarks: dict[str, np.ndarray]
+) -> None:
+    np.save(tmp_path / "a.npy", joints("COCO", landmarks))
+    with pytest.raises(RecordingError, match="rate_hz"):
+        open_recording(tmp_path / "a.npy")
