@@ -50,6 +50,15 @@ class NatNetServer:
                 packet(FRAME, frame_content(frame, number, time_s, changed=changed)), self._client
             )
 
+    def send_raw(self, data: bytes) -> None:
+        """Send a packet as it is."""
+        assert self._client is not None
+        self._socket.sendto(data, self._client)
+
+    def models(self) -> bytes:
+        """Return the packet that says what is tracked."""
+        return packet(MODELS, self._models())
+
     def __enter__(self) -> Self:
         return self
 

@@ -4,6 +4,7 @@ import socket
 import struct
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
@@ -30,14 +31,15 @@ class QTMServer:
         self.name = f"qtm:127.0.0.1:{self._listening.getsockname()[1]}"
         self._client: socket.socket | None = None
         self.streaming = threading.Event()
+        self.deaf = False
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._serve)
         self._thread.start()
 
-    def send(self, frame: FloatArray, number: int, time_s: float) -> None:
-        """Send a frame, shape (M, 3) [mm]."""
+    def send(self, frame: FloatArray, number: int, time_s: float, more: int = 0) -> None:
+        """Send a frame, shape (M, 3) [mm], which says that it has more markers than it has."""
         points = frame.astype("<f4").tobytes()
-        component = struct.pack("<Ihh", len(frame), 0, 0) + points
+        component = struct.pack("<Ihh", len(frame) + more, 0, 0) + points
         component = struct.pack("<II", len(component) + 8, 1) + component
         packet = struct.pack("<qII", round(time_s * 1e6), number, 1) + component
         self._send(DATA, packet)
@@ -52,7 +54,8 @@ class QTMServer:
         self.streaming.clear()
         client, self._client = self._client, None
         if client is not None:
-            client.shutdown(socket.SHUT_RDWR)
+            with suppress(OSError):  # the other end may be gone
+                client.shutdown(socket.SHUT_RDWR)
             client.close()
 
     def __enter__(self) -> Self:
@@ -83,6 +86,7 @@ class QTMServer:
             self._client = client
             self._send(COMMAND, b"QTM RT Interface connected\0")
             self._answer(client)
+            client.close()
 
     def _answer(self, client: socket.socket) -> None:
         data = b""
@@ -99,7 +103,8 @@ class QTMServer:
             while len(data) >= 8 and len(data) >= struct.unpack_from("<I", data)[0]:
                 size = struct.unpack_from("<I", data)[0]
                 command, data = data[8:size].rstrip(b"\0").decode(), data[size:]
-                self._do(command)
+                if not self.deaf:
+                    self._do(command)
 
     def _do(self, command: str) -> None:
         if command.startswith("version"):

@@ -48,7 +48,7 @@ class NatNetReceiver(Receiver):
     """
 
     def __init__(self, address: tuple[str, int]) -> None:
-        self._buffer = require("natnet.packet_buffer", EXTRA).PacketBuffer
+        self._buffer = _bounded(require("natnet.packet_buffer", EXTRA).PacketBuffer)
         self._info = require("natnet.server_info", EXTRA).ServerInfo
         self._models = require("natnet.data_descriptions", EXTRA).DataDescriptions
         self._frame = require("natnet.data_frame", EXTRA).DataFrame
@@ -57,7 +57,7 @@ class NatNetReceiver(Receiver):
         self._version: Any = None
         self._names: dict[str, tuple[str, ...]] = {}  # of the markers of each set
         self._streams: dict[tuple[tuple[str, int], ...], Stream] = {}
-        self._known = False
+        self._known = self._doubted = False
 
     def receive(self, inbox: Inbox) -> None:
         """Connect, and receive until nothing comes any more."""
@@ -89,6 +89,7 @@ class NatNetReceiver(Receiver):
                             joined = self._take(data, heard_s, inbox)
                         except Exception as error:  # whatever the package meets in a packet
                             inbox.damaged(f"a packet cannot be read: {error!r:.200}")
+                            self._doubted = True
                             continue
                         if joined is not None and group is None:
                             group = _joined(*joined)
@@ -105,9 +106,10 @@ class NatNetReceiver(Receiver):
         """Nothing stays open."""
 
     def _ask(self, one: socket.socket, at: Any) -> None:
-        """Say that we are here, and ask for what is not known."""
-        if self._version is None:
+        """Say that we are here, and ask for what is not known, or may be wrong."""
+        if self._version is None or self._doubted:
             one.sendto(_packet(CONNECT, b"Ping\0"), at)
+        if self._version is None:
             return
         one.sendto(_packet(KEEP_ALIVE), at)
         if not self._known:
@@ -120,6 +122,7 @@ class NatNetReceiver(Receiver):
         buffer.read_uint16()
         if kind == SERVER_INFO:
             self._version = self._info.read_from_buffer(buffer, None).nat_net_protocol_version
+            self._doubted = False
             rest = bytes(buffer.data[buffer.pointer :])
             if len(rest) >= _CONNECTION.size:
                 _, port, by_group, *group = _CONNECTION.unpack_from(rest)
@@ -158,6 +161,26 @@ class NatNetReceiver(Receiver):
         points[(points == 0.0).all(axis=1) | np.isinf(points).any(axis=1)] = np.nan  # not seen
         number, time_s = frame.prefix.frame_number, float(frame.suffix.timestamp)
         inbox.put(Sample(stream, points.ravel(), arrived_s, number, time_s))
+
+
+def _bounded(buffer: Any) -> Any:
+    """Return the package's buffer, but one that never reads beyond its end, whatever counts say."""
+
+    class Bounded(buffer):  # type: ignore[misc]
+        def read_string(self, max_length: int | None = None, static_length: bool = False) -> str:
+            self._require(1)
+            return str(super().read_string(max_length, static_length))
+
+        def read_float32_array(self, count: int) -> tuple[float, ...]:
+            self._require(4 * count)
+            return tuple(super().read_float32_array(count))
+
+        def _require(self, size: int) -> None:
+            left = len(self.data) - self.pointer
+            if size > left:
+                raise ValueError(f"it ends too soon: {size} bytes more are said, {left} are left")
+
+    return Bounded
 
 
 def _packet(kind: int, content: bytes = b"\0") -> bytes:

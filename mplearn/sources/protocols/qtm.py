@@ -22,7 +22,7 @@ from .addresses import host_and_port, shown
 
 EXTRA = "live"
 PORT = 22223  # of the little-endian server
-TIMEOUT_S, WAKE_S = 5.0, 0.1
+TIMEOUT_S, SILENT_S, WAKE_S = 5.0, 5.0, 0.1
 MILLIMETRES = 0.001
 _HEADER = struct.Struct("<Ihh")  # of a component: markers, and rates of what was dropped
 
@@ -56,7 +56,10 @@ class QTMReceiver(Receiver):
 
     def receive(self, inbox: Inbox) -> None:
         """Connect, and receive until the connection is lost."""
-        asyncio.run(self._receive(inbox))
+        try:
+            asyncio.run(self._receive(inbox))
+        except TimeoutError:
+            raise ConnectionError(f"{shown(self.address)} does not answer") from None
 
     def close(self) -> None:
         """Nothing stays open."""
@@ -64,9 +67,20 @@ class QTMReceiver(Receiver):
     async def _receive(self, inbox: Inbox) -> None:
         changed, lost = asyncio.Event(), asyncio.Event()
         stream: Stream | None = None
+        heard_s = time.monotonic()
+
+        def cannot_read(error: object) -> None:
+            inbox.damaged(f"a packet cannot be read: {error!r:.200}")
 
         def on_packet(packet: Any) -> None:
-            arrived_s = time.monotonic()
+            try:
+                take(packet)
+            except Exception as error:  # whatever a packet holds, the connection goes on
+                cannot_read(error)
+
+        def take(packet: Any) -> None:
+            nonlocal heard_s
+            arrived_s = heard_s = time.monotonic()
             at = packet.components.get(self._component)
             if at is None:
                 return
@@ -82,6 +96,10 @@ class QTMReceiver(Receiver):
                 Sample(stream, values, arrived_s, packet.framenumber, packet.timestamp * 1e-6)
             )
 
+        def on_failure(_: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+            cannot_read(context.get("exception", context["message"]))  # the package's; it ends
+
+        asyncio.get_running_loop().set_exception_handler(on_failure)
         host, port = self.address
         connection = await self._qtm.connect(
             host,
@@ -97,6 +115,9 @@ class QTMReceiver(Receiver):
             await connection.stream_frames(components=["3d"], on_packet=on_packet)
             changed.clear()
             while not (inbox.closed or lost.is_set()):
+                if time.monotonic() - heard_s > SILENT_S:  # asked, it answers, or is gone
+                    heard_s = time.monotonic()
+                    changed.set()
                 if changed.is_set():
                     changed.clear()
                     found = described(await connection.get_parameters(["general", "3d"]))
