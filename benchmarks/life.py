@@ -9,11 +9,14 @@ frame, time of a checkpoint, and for how long the stream was ever held up by a c
 snapshot for readers (processor time).
 """
 
+from __future__ import annotations
+
 import argparse
 import gc
 import os
 import tempfile
 import time
+from array import array
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -40,7 +43,7 @@ class Figures:
     file_mb: list[float] = field(default_factory=list)
     frame_us: list[float] = field(default_factory=list)
     checkpoint_ms: list[float] = field(default_factory=list)
-    held_up_ms: list[float] = field(default_factory=list)
+    held_up_ms: array[float] = field(default_factory=lambda: array("f"))  # of each chunk
     snapshot_ms: list[float] = field(default_factory=list)
     primitives: list[int] = field(default_factory=list)
 
@@ -142,7 +145,7 @@ def live(
                 figures.frame_us.append(1e6 * took / max(life.n_frames - since, 1))
                 figures.checkpoint_ms.append(1e3 * max(life.store.figures.checkpoints_s, default=0))
                 life.store.figures.checkpoints_s.clear()
-                figures.held_up_ms += [1e3 * each for each in held]
+                figures.held_up_ms.extend(1e3 * each for each in held)
                 held.clear()
                 figures.primitives.append(len(life.learner.tree.leaves))
                 start, since = time.process_time(), life.n_frames
