@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from mplearn.body import PROPORTIONS, human_body, robot_body
+from mplearn.body.inverse_kinematics.follower import follower
+from mplearn.body.marker_sets.marker_set import marker_set
 from mplearn.errors import BodyError
 
 HUMAN_JOINTS = [
@@ -139,3 +141,20 @@ def test_proportions_stretch_what_they_name():
 def test_impossible_humans(height, proportions, message):
     with pytest.raises(BodyError, match=message):
         human_body(height, proportions)
+
+
+def test_nobody_changes_a_body_that_others_share():
+    for body in (human_body(), robot_body()):
+        shared = follower(body)
+        for array in (
+            body.joint_limits, body.driven, body.tree.offset, body.tree.limits,
+            shared.free, shared.own, shared.rest_weight, shared.tree.axis,
+            marker_set("plug_in_gait39").offsets,
+        ):  # fmt: skip
+            with pytest.raises(ValueError, match="read-only"):
+                array[:] = 0
+        factors = np.full_like(body.tree.offset, 1.1)
+        larger = body.tree.scaled(factors)  # is another's, and says the same to kernels
+        np.testing.assert_array_equal(larger.linkage.offset, larger.offset)
+        np.testing.assert_array_equal(body.tree.linkage.offset, body.tree.offset)
+        assert larger.offset[0, 2] > body.tree.offset[0, 2]

@@ -43,7 +43,7 @@ class CommandLimiter:
     """
 
     def __init__(self, robot: Robot, period_s: float, here: FloatArray) -> None:
-        self.limits = robot.position_limits
+        self.limits = robot.position_limits.copy()
         self.fastest = robot.per_joint("velocity")
         self.strongest = self.fastest / RISE_S
         self.period_s = period_s

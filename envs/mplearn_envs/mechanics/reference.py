@@ -115,7 +115,7 @@ def reference_robot(robot: Robot) -> ReferenceRobot:
         out[:] = np.linalg.norm(moved[thighs] - moved[feet], axis=1)
     limits = robot.position_limits.copy()
     stance = Stance(
-        robot.leg_joints,
+        robot.leg_joints.copy(),
         np.repeat(np.arange(2), [len(leg) for leg in robot.legs]),
         limits[robot.leg_joints].copy(),
         feet,
@@ -139,7 +139,7 @@ def reference_robot(robot: Robot) -> ReferenceRobot:
             + (f"; it takes 6 hinges to place a foot, its legs have {few}" if few < 6 else "")
         )
     limits[[names.index(name) for name in robot.toes]] = 0.0  # one flat sole a foot
-    upper = robot.upper_joints
+    upper = robot.upper_joints.copy()
     lowest = 0.45 * straight[2]
     base_limits = np.array([[lowest, straight[2]], [-0.6, 0.6], [-0.6, 1.6]])
     turn = quaternion_to_matrix(model.body_iquat[1:])
@@ -172,7 +172,8 @@ def rest_reference(robot: Robot) -> Reference:
     target[0] = ref.standing_height
     swing = np.append(ref.rest[7 + robot.leg_joints], np.zeros(2))
     still, flat = np.zeros_like(target), np.zeros(2)
-    return Reference(target, still, ref.rest, swing, 0.0 * swing, np.zeros(2), ref.ground, flat)
+    posture, ground = ref.rest.copy(), ref.ground.copy()
+    return Reference(target, still, posture, swing, 0.0 * swing, np.zeros(2), ground, flat)
 
 
 def tracked_columns(robot: Robot) -> IntArray:

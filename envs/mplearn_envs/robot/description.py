@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mplearn.errors import RobotError
+from mplearn.maths.read_only import read_only
 from mplearn.recording import FloatArray, IntArray
 
 from .compiling import compile_once
@@ -151,7 +152,7 @@ class Robot:
             )
 
     def model(self) -> mujoco.MjModel:
-        """Compile the simulation model."""
+        """Return the simulation model; all who ask share it, so copy it before you change it."""
         return compile_once(self.xml)
 
     @cached_property
@@ -169,27 +170,27 @@ class Robot:
     def attention_angles(self) -> FloatArray:
         """Where each hinge is upright in the zero of the robot's MJCF, shape (n,) [rad]."""
         angles = dict(self.attention)
-        return np.array([angles.get(name, 0.0) for name in self.joint_names])
+        return read_only(np.array([angles.get(name, 0.0) for name in self.joint_names]))
 
     @cached_property
     def signs(self) -> FloatArray:
         """-1 for each hinge that counts the other way in the robot's MJCF, else 1, shape (n,)."""
-        return np.where(np.isin(self.joint_names, self.flipped), -1.0, 1.0)
+        return read_only(np.where(np.isin(self.joint_names, self.flipped), -1.0, 1.0))
 
     @cached_property
     def leg_joints(self) -> IntArray:
         """Indices of the legs' hinges, left leg first, shape (n_legs,)."""
-        return np.array([self.joint_names.index(n) for leg in self.legs for n in leg])
+        return read_only(np.array([self.joint_names.index(n) for leg in self.legs for n in leg]))
 
     @cached_property
     def upper_joints(self) -> IntArray:
         """Indices of all other hinges, shape (n - n_legs,)."""
-        return np.setdiff1d(np.arange(len(self.joint_names)), self.leg_joints)
+        return read_only(np.setdiff1d(np.arange(len(self.joint_names)), self.leg_joints))
 
     @cached_property
     def position_limits(self) -> FloatArray:
         """Lower and upper limit of each hinge, shape (n, 2) [rad]."""
-        return np.array(self.model().jnt_range[1:])
+        return read_only(np.array(self.model().jnt_range[1:]))
 
     def per_joint(self, quantity: str) -> FloatArray:
         """Return one of the groups' quantities for every hinge, shape (n,).

@@ -175,7 +175,7 @@ def settle(
             np.ascontiguousarray(frame),
             markers,
             tree.linkage,
-            Moves(low, high, follower.free, follower.rest_weight),
+            Moves(low, high, follower.free.copy(), follower.rest_weight.copy()),
             SEARCH,
             residual,
         )

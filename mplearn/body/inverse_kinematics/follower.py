@@ -14,6 +14,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from mplearn.maths.read_only import read_only
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
 from ..kinematics.tree import KinematicTree
@@ -26,7 +27,7 @@ GIRDLE_SIGMA_M = 0.03  # how far a shoulder usually is from its place
 
 @dataclass(frozen=True, eq=False)
 class Follower:
-    """A body as the solver sees it.
+    """A body as the solver sees it, shared by all who follow that body: its arrays refuse changes.
 
     Attributes:
         body: The body whose posture is wanted.
@@ -44,16 +45,14 @@ class Follower:
     @cached_property
     def free(self) -> BoolArray:
         """Degrees of freedom of the tree that may move: all but the held hinges, shape (6 + n,)."""
-        return np.array(
-            [True] * 6 + [name not in self.body.held for name in self.tree.joint_names],
-            dtype=np.bool_,
-        )
+        moves = [True] * 6 + [name not in self.body.held for name in self.tree.joint_names]
+        return read_only(np.array(moves, dtype=np.bool_))
 
     @cached_property
     def own(self) -> IntArray:
         """Where the body's own posture lies in the tree's, shape (nq,)."""
         joints = [7 + self.tree.joint_names.index(name) for name in self.body.joint_names]
-        return np.array([*range(7), *joints], dtype=np.int64)
+        return read_only(np.array([*range(7), *joints], dtype=np.int64))
 
     @cached_property
     def rest_weight(self) -> FloatArray:
@@ -63,7 +62,7 @@ class Follower:
         """
         sigma = np.ptp(self.tree.limits, axis=1) / 4
         weight: FloatArray = np.where(self.tree.slides, GIRDLE_SIGMA_M, sigma) ** -2.0
-        return weight
+        return read_only(weight)
 
 
 @lru_cache(maxsize=16)

@@ -147,6 +147,8 @@ class InverseKinematics:
         self._used = np.flatnonzero(known)
         selected = self.markers.select([self.marker_names[i] for i in self._used])
         self._follower = follower(body)
+        self._free = self._follower.free.copy()
+        self._rest_weight = self._follower.rest_weight.copy()
         self._selected = selected
         self._bodies, _ = selected.attach(self._follower.tree)
         n = len(self._follower.tree.joint_names)
@@ -237,7 +239,7 @@ class InverseKinematics:
             Followed(self._posture, self._variance, self._fresh),
             Markers(self._bodies, self.calibration.offsets, self._weights),
             self._tree.linkage,
-            Joints(self._limits, self._follower.free, self._follower.rest_weight),
+            Joints(self._limits, self._free, self._rest_weight),
             self._rules,
             residuals,
         )

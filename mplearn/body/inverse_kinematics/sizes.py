@@ -83,7 +83,7 @@ def fit_sizes(
     shifted = range(n_groups, n_groups + 3 * n_markers)
     normal[shifted, shifted] = np.repeat(place_sigma_m / MARKER_SIGMA_M, 3) ** -2.0
     mats = np.array([tree.forward(q)[1] for q in postures])
-    links = _Links(tree.parent, tree.offset, groups)
+    links = _Links(tree.linkage.parent, tree.linkage.offset, groups)
     _add_markers(mats, links, expected, frames, _Equations(normal, gradient))
     solution = first + np.linalg.solve(normal, gradient)
     factors = expected.size * np.clip(solution[:n_groups], NARROWEST, WIDEST)[groups]

@@ -8,13 +8,14 @@ joint rates.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mplearn.errors import BodyError
+from mplearn.maths.read_only import read_only
 from mplearn.maths.rotations import quaternion_to_matrix
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, eq=False)
 class KinematicTree:
     """A tree of rigid bodies, each hung on its parent by hinges and slides; the root is free.
+
+    Its arrays refuse to be changed: bodies are shared by all who ask for them.
 
     Attributes:
         body_names: Names of the B bodies, parents before children.
@@ -66,6 +69,18 @@ class KinematicTree:
     site_names: tuple[str, ...]
     site_body: IntArray
     site_offset: FloatArray
+    _own: dict[str, Any] = field(init=False, repr=False)  # the arrays themselves, for kernels
+
+    def __post_init__(self) -> None:
+        given = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
+        own = {
+            name: value if value.flags.writeable else value.copy()
+            for name, value in given.items()
+            if isinstance(value, np.ndarray)
+        }
+        object.__setattr__(self, "_own", own)
+        for name, value in own.items():
+            object.__setattr__(self, name, read_only(value))
 
     @classmethod
     def from_model(cls, model: mujoco.MjModel) -> KinematicTree:
@@ -116,17 +131,8 @@ class KinematicTree:
     def linkage(self) -> Linkage:
         """The tree's arrays, as kernels take them."""
         first = np.searchsorted(self.joint_body, np.arange(len(self.parent) + 1)).astype(np.int64)
-        return Linkage(
-            self.parent,
-            self.offset,
-            self.rotation,
-            self.joint_body,
-            self.slides,
-            self.axis,
-            self.anchor,
-            first,
-            _above(self.parent, self.joint_body),
-        )
+        own = {name: self._own[name] for name in Linkage._fields if name in self._own}
+        return Linkage(**own, first=first, above=_above(self.parent, self.joint_body))
 
     def body(self, name: str) -> int:
         """Return the index of a body.

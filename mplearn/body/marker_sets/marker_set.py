@@ -15,6 +15,7 @@ from functools import cache
 import numpy as np
 
 from mplearn.errors import BodyError
+from mplearn.maths.read_only import read_only
 from mplearn.recording import BoolArray, FloatArray, IntArray
 
 from ..kinematics.tree import KinematicTree
@@ -151,7 +152,7 @@ def marker_set(name: str) -> MarkerSet:
         name=name,
         names=tuple(table),
         bodies=tuple(body for body, _ in table.values()),
-        offsets=np.array([offset for _, offset in table.values()]),
+        offsets=read_only(np.array([offset for _, offset in table.values()])),
     )
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mplearn.errors import BodyError
+from mplearn.maths.read_only import read_only
 from mplearn.recording import FloatArray, IntArray
 
 from ..kinematics.tree import KinematicTree
@@ -58,9 +59,8 @@ class Body:
     @cached_property
     def driven(self) -> IntArray:
         """Indices into `joint_names` of the hinges that are not held."""
-        return np.array(
-            [i for i, name in enumerate(self.joint_names) if name not in self.held], dtype=np.int64
-        )
+        driven = [i for i, name in enumerate(self.joint_names) if name not in self.held]
+        return read_only(np.array(driven, dtype=np.int64))
 
     @cached_property
     def driven_names(self) -> tuple[str, ...]:

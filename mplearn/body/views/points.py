@@ -24,7 +24,7 @@ def points_of(features: FloatArray, body: Body, parts: IntArray, places: FloatAr
     Returns:
         Shape (T, P, 3) [m].
     """
-    postures = _postures(features, body.driven, len(body.tree.axis))
+    postures = _postures(features, body.driven.copy(), len(body.tree.axis))
     return np.asarray(points_of_postures(postures, body.tree.linkage, parts, places))
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from mplearn.body import robot_body
 from mplearn.errors import RobotError
+from mplearn_envs.mechanics import rest_reference
 from mplearn_envs.robot import humanoid
 from mplearn_envs.robot.compiling import read_model
 
@@ -51,3 +52,16 @@ def test_an_incomplete_description_is_refused():
         replace(robot, knees=("knee_l", "knee_x"))
     with pytest.raises(RobotError, match="does not compile"):
         replace(robot, xml="<mujoco><nonsense/></mujoco>")
+
+
+def test_nobody_changes_a_robot_that_others_share():
+    robot = humanoid()
+    for array in (
+        robot.leg_joints, robot.upper_joints, robot.position_limits,
+        robot.signs, robot.attention_angles,
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match="read-only"):
+            array[:] = 0
+    moved = rest_reference(robot)
+    moved.q[:], moved.ground[:] = 0.0, 0.0
+    assert rest_reference(robot).q[3] == 1.0  # upright, as before
