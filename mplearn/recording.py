@@ -6,6 +6,7 @@ A missing measurement is NaN. Lengths are metres, angles radians, the vertical a
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias, get_args
 
@@ -194,15 +195,22 @@ class Recording:
     report: ReadReport | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
-        frames = np.asarray(self.frames, dtype=np.float64)
+        try:
+            frames = np.asarray(self.frames, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise RecordingError(f"frames must be numbers of shape (T, D): {error}") from error
         if frames.ndim != 2:
             raise RecordingError(f"frames must have shape (T, D), not {frames.shape}")
+        given: object = self.channels
+        if isinstance(given, str) or not isinstance(given, Collection):
+            raise RecordingError(f"channels must be names, one a column, not {given!r:.80}")
         if frames.shape[1] != len(self.channels):
             raise RecordingError(
                 f"{frames.shape[1]} columns need as many channel names, not {len(self.channels)}"
             )
-        if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
-            raise RecordingError(f"rate_hz must be positive and finite, not {self.rate_hz}")
+        number = isinstance(self.rate_hz, (int, float, np.integer, np.floating))
+        if not (number and np.isfinite(self.rate_hz) and self.rate_hz > 0):
+            raise RecordingError(f"rate_hz must be positive and finite, not {self.rate_hz!r:.80}")
         if np.isinf(frames).any():
             raise RecordingError("frames hold infinite values; a missing measurement is NaN")
         object.__setattr__(self, "frames", frames)

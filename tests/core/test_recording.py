@@ -42,6 +42,10 @@ def test_slices_shift_labels_and_drop_cut_ones() -> None:
         (np.zeros((3, 1)), 0.0, ("a",), "0.0"),
         (np.zeros((3, 1)), np.nan, ("a",), "nan"),
         (np.full((3, 1), np.inf), 100.0, ("a",), "infinite"),
+        (np.zeros((3, 2)), ("a", "b"), 100.0, "channels must be names, one a column, not 100.0"),
+        (np.zeros((3, 2)), 100.0, "ab", "'ab'"),
+        (np.zeros((3, 1)), "100", ("a",), "'100'"),
+        ([["a"]], 100.0, ("a",), "numbers"),
     ],
 )
 def test_a_recording_refuses_what_is_not_one(
