@@ -6,7 +6,8 @@ compiled into it and may have changed since. `njit` here looks at all of these, 
 
 **Entrances.** For each kernel numba makes, besides the kernel, an entrance for Python and one for
 C, which take every array of every record apart: longer to compile than a short kernel itself.
-`kernel` and `inner_kernel` leave them out where many kernels call each other with large records.
+`kernel` and `inner_kernel` leave them out where many kernels call each other with large records;
+`inlined` kernels are never compiled by themselves.
 """
 
 from __future__ import annotations
@@ -58,6 +59,15 @@ def inner_kernel(function: _Kernel) -> _Kernel:
     It has no entrance for Python either: a process that calls it from there ends.
     """
     return njit(cache=True, nogil=True, **_NO_PYTHON)(function)
+
+
+def inlined(function: _Kernel) -> _Kernel:
+    """Put a kernel's code where it is called, for one that is called in one place.
+
+    Otherwise numba compiles it by itself, and once more within each kernel that calls it, directly
+    or not.
+    """
+    return njit(inline="always")(function)
 
 
 def fingerprint(function: Callable[..., Any]) -> str:

@@ -12,6 +12,7 @@ from mplearn.body.inverse_kinematics.gauss_newton import (
     Markers,
     Moves,
     Search,
+    Seen,
     empty_equations,
     normal_equations,
     solve_frame,
@@ -161,7 +162,7 @@ def test_the_normal_equations_are_those_of_the_jacobian(body):
     normal, gradient = equations.normal, equations.gradient
     normal[:], gradient[:] = np.nan, np.nan
     placed = Markers(bodies, offsets, weights)
-    normal_equations(q, markers, points, residuals, placed, 0.06, linkage, at, equations)
+    normal_equations(q, Seen(markers, points, residuals), placed, 0.06, linkage, at, equations)
     seen = np.isfinite(residuals)
     jacobian = tree.jacobian(q, bodies[seen], offsets[seen]).reshape(-1, 6 + n)
     weight = np.repeat(weights[seen] / (1 + (residuals[seen] / 0.06) ** 2), 3)

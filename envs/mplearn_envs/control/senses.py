@@ -6,7 +6,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from mplearn.maths.compiling import inner_kernel, kernel
+from mplearn.maths.compiling import inlined, inner_kernel, kernel
 from mplearn.maths.plane import turn_in_plane
 from mplearn.maths.rotation_kernels import rotation_error
 from mplearn.recording import FloatArray
@@ -104,14 +104,14 @@ def sole_middle(robot: ReferenceRobot, feet: FloatArray, side: int) -> tuple[flo
     return feet[side, 0] + x, feet[side, 1] + y
 
 
-@kernel
+@inlined
 def in_base(q: FloatArray, vector: FloatArray) -> FloatArray:
     """Return a vector of the world (3,) as the base sees it."""
     conjugate = np.array([q[3], -q[4], -q[5], -q[6]])
     return _rotated(conjugate, vector)
 
 
-@inner_kernel
+@inlined
 def _turned_by(q: FloatArray, vector: FloatArray) -> FloatArray:
     """Return a vector of the base's frame (3,) in the world's."""
     return _rotated(q[3:7], vector)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mplearn.maths.compiling import inner_kernel, kernel
+from mplearn.maths.compiling import inlined, inner_kernel, kernel
 from mplearn.maths.plane import turn_in_plane, wrap_angle
 from mplearn.recording import FloatArray
 from mplearn_envs.mechanics.reference import ReferenceRobot
@@ -93,7 +93,7 @@ def swinging(mind: Mind) -> int:
     return int(mind.phase[1]) if mind.phase[0] == SWINGS else -1
 
 
-@kernel
+@inlined
 def wake(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now, up: int) -> None:
     """Start to balance by steps.
 
@@ -113,13 +113,20 @@ def wake(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now, up: int) -> 
 
 
 @kernel
-def settled(law: StepLaw, mind: Mind, now: Now, for_s: float) -> bool:
-    """Return whether both feet stand beside each other and the weight has rested between them."""
+def settled(law: StepLaw, mind: Mind, feet: FloatArray, for_s: float) -> bool:
+    """Return whether both feet stand beside each other and the weight has rested between them.
+
+    Args:
+        law: What stepping goes by.
+        mind: What is remembered.
+        feet: Where the feet are: x, y [m] and yaw [rad], shape (2, 3).
+        for_s: How long the weight must have rested [s].
+    """
     rests = mind.phase[0] == STANDS and mind.time[2] >= for_s
-    return bool(rests and _astray(law, now.feet) < ASTRAY_M)
+    return bool(rests and _astray(law, feet) < ASTRAY_M)
 
 
-@kernel
+@inlined
 def decide(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> tuple[float, float]:
     """Think on by one control period; return where the zero-moment point shall be [m].
 
@@ -171,7 +178,7 @@ def _lift(
     mind.foot_rate[:3], mind.foot_rate[3] = now.foot_rate[side, :3], now.foot_rate[side, 5]
 
 
-@inner_kernel
+@inlined
 def _on_one_foot(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> tuple[float, float]:
     """Move the foot on; return where in the standing sole the zero-moment point shall be."""
     side = int(mind.phase[1])
@@ -201,7 +208,7 @@ def _on_one_foot(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> t
     return nearest_inside(sole, x, y)
 
 
-@inner_kernel
+@inlined
 def _on_both_feet(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> tuple[float, float]:
     """Bring the weight between the feet or over one; return the wanted zero-moment point."""
     left_x, left_y = sole_middle(robot, now.feet, LEFT)
@@ -232,7 +239,7 @@ def _on_both_feet(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> 
     )
 
 
-@inner_kernel
+@inlined
 def _astray(law: StepLaw, feet: FloatArray) -> float:
     """Return how far the left foot is from its place beside the right one [m]."""
     x, y = turn_in_plane(feet[0, 0] - feet[1, 0], feet[0, 1] - feet[1, 1], -feet[1, 2])
@@ -252,7 +259,7 @@ def _beside(law: StepLaw, feet: FloatArray, side: int) -> FloatArray:
     return np.array([other[0] + dx, other[1] + dy, other[2] + turn])
 
 
-@inner_kernel
+@inlined
 def _swing(law: StepLaw, robot: ReferenceRobot, mind: Mind, floor: float) -> None:
     """Move the foot that steps on its way: up, and down to its place."""
     h = law.period_s
@@ -271,7 +278,7 @@ def _swing(law: StepLaw, robot: ReferenceRobot, mind: Mind, floor: float) -> Non
     at += h * rate
 
 
-@inner_kernel
+@inlined
 def _towards(x: float, rate: float, goal: float, left: float) -> float:
     """Return the acceleration with which a cubic comes to rest at a goal in the time left."""
     return 6.0 * (goal - x) / (left * left) - 4.0 * rate / left

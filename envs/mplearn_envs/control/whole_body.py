@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mplearn.maths.compiling import inner_kernel, kernel
+from mplearn.maths.compiling import inlined
 from mplearn.maths.plane import wrap_angle
 from mplearn.maths.rotation_kernels import rotation_error, turn_about_vertical
 from mplearn.maths.solvers import solve_damped
@@ -54,6 +54,7 @@ class BodyLaw(NamedTuple):
     """What the whole body's control goes by.
 
     Attributes:
+        period_s: Control period [s].
         stiffness: Gain of each servo, shape (n,) [N m/rad].
         damping: Its velocity gain, shape (n,) [N m s/rad].
         torque: Torque limits, shape (n,) [N m].
@@ -73,6 +74,7 @@ class BodyLaw(NamedTuple):
         learns: How fast a joint learns by which share of its velocity's gain its servo is wrong.
     """
 
+    period_s: float
     stiffness: FloatArray
     damping: FloatArray
     torque: FloatArray
@@ -104,7 +106,7 @@ class Upper(NamedTuple):
     change: FloatArray
 
 
-@kernel
+@inlined
 def wanted_acceleration(
     law: BodyLaw,
     robot: ReferenceRobot,
@@ -113,7 +115,6 @@ def wanted_acceleration(
     upper: Upper,
     zmp_x: float,
     zmp_y: float,
-    period_s: float,
 ) -> FloatArray:
     """Return the acceleration that the robot shall have, layout of qacc, shape (6 + n,).
 
@@ -125,9 +126,8 @@ def wanted_acceleration(
         upper: What the rest of the body does.
         zmp_x: Where the zero-moment point shall be [m].
         zmp_y: The same.
-        period_s: Control period [s].
     """
-    stance = robot.stance
+    stance, period_s = robot.stance, law.period_s
     swings = swinging(mind)
     change = np.empty(18)
     for side in range(2):
@@ -135,7 +135,7 @@ def wanted_acceleration(
     push = now.rate * now.rate
     change[_COG] = push * (now.cog[0] - zmp_x)
     change[_COG + 1] = push * (now.cog[1] - zmp_y)
-    height = _height(law, robot, mind, now, upper.base[0], period_s)
+    height = _height(law, robot, mind, now, upper.base[0])
     lift = _HEIGHT[0] * (height + now.floor - now.q[2]) - _HEIGHT[1] * now.v[2]
     change[HEIGHT] = min(max(lift, -law.drop), law.rise)
     yaw = now.feet[0, 2] + 0.5 * wrap_angle(now.feet[1, 2] - now.feet[0, 2])
@@ -175,7 +175,7 @@ def wanted_acceleration(
     return out
 
 
-@inner_kernel
+@inlined
 def _foot(
     law: BodyLaw,
     robot: ReferenceRobot,
@@ -207,10 +207,8 @@ def _foot(
         out[3 + i] = min(max(a, -law.foot_turn), law.foot_turn)
 
 
-@inner_kernel
-def _height(
-    law: BodyLaw, robot: ReferenceRobot, mind: Mind, now: Now, wanted: float, period_s: float
-) -> float:
+@inlined
+def _height(law: BodyLaw, robot: ReferenceRobot, mind: Mind, now: Now, wanted: float) -> float:
     """Return how high the base shall be over the floor, so that both legs will reach [m]."""
     stance, swings = robot.stance, swinging(mind)
     out = wanted - (law.crouch_m if mind.phase[3] > 0.0 else 0.0)
@@ -220,14 +218,14 @@ def _height(
         ground = now.pose.position[foot, 2]
         far = 0.0
         for i in range(2):
-            speed = (now.after.position[thigh, i] - hip[i]) / period_s
+            speed = (now.after.position[thigh, i] - hip[i]) / law.period_s
             if side == swings:
                 left = max(mind.time[1] - mind.time[0], 0.0)
                 d = hip[i] + left * speed - mind.place[i]
             elif mind.phase[0] == SHIFTS:
                 d = hip[i] + mind.goal[i] - now.cog[i] - now.pose.position[foot, i]
             else:
-                speed -= (now.after.position[foot, i] - now.pose.position[foot, i]) / period_s
+                speed -= (now.after.position[foot, i] - now.pose.position[foot, i]) / law.period_s
                 d = hip[i] + _AHEAD_S * speed - now.pose.position[foot, i]
             far += d * d
         if side == swings:
@@ -238,7 +236,7 @@ def _height(
     return out
 
 
-@inner_kernel
+@inlined
 def _cog_rate_of(robot: ReferenceRobot, now: Now, rate: FloatArray) -> FloatArray:
     """Return the COG's velocity that comes of the tracked hinges alone, shape (3,) [m/s]."""
     q = now.q.copy()
@@ -249,7 +247,7 @@ def _cog_rate_of(robot: ReferenceRobot, now: Now, rate: FloatArray) -> FloatArra
     return moved
 
 
-@kernel
+@inlined
 def command_legs(
     law: BodyLaw,
     robot: ReferenceRobot,
@@ -257,7 +255,6 @@ def command_legs(
     now: Now,
     change: FloatArray,
     needed: FloatArray,
-    period_s: float,
     command: FloatArray,
     owed: FloatArray,
 ) -> None:
@@ -273,13 +270,12 @@ def command_legs(
         now: The moment.
         change: Wanted acceleration, layout of qacc, shape (6 + n,).
         needed: Generalised forces that make it without the ground's, same layout.
-        period_s: Control period [s].
         command: Commands of all servos, shape (n,) [rad], in which the legs' are written.
         owed: Of each joint, the velocity wanted for now [rad/s], the torque by which what the
             robot believes of itself is wrong [N m], and the share of the velocity's gain by which
             it is, shape (3, n); brought up to date.
     """
-    stance, swings = robot.stance, swinging(mind)
+    stance, swings, period_s = robot.stance, swinging(mind), law.period_s
     points, sides = np.empty((8, 3)), np.empty(8, np.int64)
     n = 0
     for side in range(2):

@@ -19,6 +19,7 @@ from mplearn_envs.control.stepping import Mind, StepLaw, decide, new_mind, settl
 from mplearn_envs.control.whole_body import BodyLaw, Upper, command_legs, wanted_acceleration
 from mplearn_envs.mechanics.gravity import holding_torques
 from mplearn_envs.mechanics.inverse_dynamics import free_model
+from mplearn_envs.mechanics.kinematics import places
 from mplearn_envs.mechanics.reference import (
     Reference,
     ReferenceRobot,
@@ -159,6 +160,7 @@ class Reflexes:
             _TUNED["lift_m"],
         )
         self.body = BodyLaw(
+            period_s,
             robot.per_joint("stiffness"),
             robot.per_joint("damping"),
             robot.per_joint("torque"),
@@ -316,15 +318,18 @@ def send_watchful(
                 if pushes.steps[p, 0] <= step < pushes.steps[p, 1]:
                     views.xfrc_applied[pushes.body, :3] += pushes.force[p]
             mj_step1(model, data)
+            woken = False
             if progress.awake[0] == 0:
                 mj_subtree_velocity(model, data)
-                if correct(balance.ankles, step, views) > ASTRAY_M:
-                    progress.awake[0] = 1
-                    now = sense(robot, views.qpos.copy(), views.qvel.copy(), h, course.up[at])
-                    wake(law, robot, mind, now, course.up[at])
-                    owed[0], owed[1] = views.qvel[6:], 0.0
+                woken = correct(balance.ankles, step, views) > ASTRAY_M
+            if woken:
+                progress.awake[0] = 1
             if progress.awake[0] == 1:
-                now = sense(robot, views.qpos.copy(), views.qvel.copy(), h, swinging(mind))
+                up = course.up[at] if woken else swinging(mind)
+                now = sense(robot, views.qpos.copy(), views.qvel.copy(), h, up)
+                if woken:
+                    wake(law, robot, mind, now, up)
+                    owed[0], owed[1] = now.v[6:], 0.0
                 zmp_x, zmp_y = decide(law, robot, mind, now)
                 over = knot > n_knots
                 upper = Upper(
@@ -332,10 +337,10 @@ def send_watchful(
                     still if over else course.rate[at],
                     still if over else course.change[at],
                 )
-                change = wanted_acceleration(body, robot, mind, now, upper, zmp_x, zmp_y, h)
+                change = wanted_acceleration(body, robot, mind, now, upper, zmp_x, zmp_y)
                 own.qpos[:], own.qvel[:], own.qacc[:] = views.qpos, views.qvel, change
                 mj_inverse(own.model, own.data)
-                command_legs(body, robot, mind, now, change, own.qfrc_inverse, h, views.ctrl, owed)
+                command_legs(body, robot, mind, now, change, own.qfrc_inverse, views.ctrl, owed)
             progress.command[:] = views.ctrl
             if progress.late.shape[0] > 0:
                 slot = step % progress.late.shape[0]
@@ -351,7 +356,7 @@ def send_watchful(
         if knot >= n_knots:
             if progress.awake[0] == 0:
                 return False, True
-            now = sense(robot, views.qpos.copy(), views.qvel.copy(), h, swinging(mind))
-            if settled(law, mind, now, RESTS_S):
+            feet = places(robot.tree, robot.stance.feet, views.qpos.reshape(1, -1))[0]
+            if settled(law, mind, feet, RESTS_S):
                 return False, True
     return False, False

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mplearn.recording import FloatArray
-from mplearn_envs.mechanics.servos import approach
+from mplearn_envs.mechanics.servos import Bounds, approach
 from mplearn_envs.robot import Robot
 
 RISE_S = 0.05  # in which a command, which leads by its velocity, may reach its velocity limit
@@ -54,15 +54,9 @@ class CommandLimiter:
         """Return the commands of the next period, shape (n,) [rad]."""
         rate = (wanted - self._wanted) / self.period_s
         self._wanted = wanted
+        bounds = Bounds(self.limits, self.fastest, self.strongest)
         self._here, self._velocity = approach(
-            wanted,
-            rate,
-            self._here,
-            self._velocity,
-            self.limits,
-            self.fastest,
-            self.strongest,
-            self.period_s,
+            wanted, rate, self._here, self._velocity, bounds, self.period_s
         )
         return self._here
 

@@ -11,7 +11,7 @@ from mplearn.recording import FloatArray
 from mplearn_envs.mechanics import reference_robot, rest_reference
 from mplearn_envs.mechanics.balanced_momentum import balanced_momentum
 from mplearn_envs.mechanics.reference import N_BASE, soles
-from mplearn_envs.mechanics.servos import approach
+from mplearn_envs.mechanics.servos import Bounds, approach
 from mplearn_envs.mechanics.support import GRAVITY
 from mplearn_envs.mechanics.velocity_ik import settle
 from mplearn_envs.robot import Robot
@@ -143,16 +143,9 @@ class Restraint:
 
     def _wish(self, wanted: FloatArray, rate: FloatArray) -> FloatArray:
         """Return the velocity within each coordinate's own limits that leads to a posture."""
+        bounds = Bounds(self._robot.limits, self.fastest, self.strongest)
         _, velocity = approach(
-            wanted,
-            rate,
-            self._here,
-            self._velocity,
-            self._robot.limits,
-            self.fastest,
-            self.strongest,
-            self.period_s,
-            self._brake_s,
+            wanted, rate, self._here, self._velocity, bounds, self.period_s, self._brake_s
         )
         return velocity
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mplearn.maths.compiling import njit
+from mplearn.maths.compiling import inlined, njit
 from mplearn.recording import FloatArray
 
 from .support import GRAVITY
@@ -71,7 +71,7 @@ def plan_cog(
     return out
 
 
-@njit(cache=True)
+@inlined
 def _solve_banded(bands: FloatArray, right: FloatArray) -> None:
     """Solve a symmetric system in place; ``bands[d, i]`` is its element (i + d, i). Cholesky."""
     n = bands.shape[1]

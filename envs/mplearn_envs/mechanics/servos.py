@@ -2,11 +2,27 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from mplearn.maths.compiling import njit
 from mplearn.recording import FloatArray
 from mplearn_envs.robot import Robot
+
+
+class Bounds(NamedTuple):
+    """Within which U coordinates move.
+
+    Attributes:
+        position: Smallest and largest position, shape (U, 2).
+        velocity: Largest velocities, shape (U,).
+        acceleration: Largest accelerations, shape (U,).
+    """
+
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
 
 
 @njit(cache=True)
@@ -37,9 +53,7 @@ def approach(
     rate: FloatArray,
     here: FloatArray,
     velocity: FloatArray,
-    limits: FloatArray,
-    fastest: FloatArray,
-    strongest: FloatArray,
+    bounds: Bounds,
     period_s: float,
     brake_s: float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
@@ -54,9 +68,7 @@ def approach(
         rate: How fast what is wanted moves, shape (U,).
         here: Where it is, within the limits, shape (U,).
         velocity: How fast it moves, shape (U,): 0 at first, later what was returned.
-        limits: Smallest and largest position, shape (U, 2).
-        fastest: Velocity limits, shape (U,).
-        strongest: Acceleration limits, shape (U,).
+        bounds: The limits.
         period_s: The period [s].
         brake_s: Time that all of it together needs to come to rest, where that is longer than each
             coordinate needs [s].
@@ -66,8 +78,8 @@ def approach(
     """
     position, speed = np.empty_like(here), np.empty_like(here)
     for u in range(here.shape[0]):
-        most, top = strongest[u], fastest[u]
-        low, high = limits[u, 0], limits[u, 1]
+        most, top = bounds.acceleration[u], bounds.velocity[u]
+        low, high = bounds.position[u, 0], bounds.position[u, 1]
         up = min(top, _stoppable(high - here[u], most, period_s, brake_s))
         down = max(-top, -_stoppable(here[u] - low, most, period_s, brake_s))
         course = min(max(rate[u], -top), top)

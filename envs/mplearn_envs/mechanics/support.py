@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mplearn.errors import InvalidValueError
-from mplearn.maths.compiling import njit
+from mplearn.maths.compiling import inlined, njit
 from mplearn.recording import FloatArray, IntArray
 
 GRAVITY = 9.81
@@ -63,7 +63,7 @@ def hull_margin(hull: FloatArray, x: float, y: float) -> float:
     return float(_margins(hull, point)[0])
 
 
-@njit(cache=True)
+@inlined
 def _left_turn(a: FloatArray, b: FloatArray, c: FloatArray) -> bool:
     area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
     return bool(area > 1e-12)

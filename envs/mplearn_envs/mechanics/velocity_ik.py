@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mplearn.maths.compiling import njit
+from mplearn.maths.compiling import inlined, njit
 from mplearn.maths.rotation_kernels import rotation_error
 from mplearn.maths.solvers import solve_damped
 from mplearn.recording import FloatArray, IntArray
@@ -81,7 +81,7 @@ def jacobian_rows(stance: Stance, pose: Pose) -> FloatArray:
     return out
 
 
-@njit(cache=True)
+@inlined
 def _minus_skew(out: FloatArray, row: int, arm: FloatArray) -> None:
     """Write the columns of omega x arm into rows row..row+2, columns 3..5."""
     out[row, 4], out[row, 5] = arm[2], -arm[1]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mplearn.maths.compiling import njit
+from mplearn.maths.compiling import inlined, njit
 from mplearn.maths.plane import turn_in_plane
 from mplearn.maths.rotation_kernels import rotation_error, turn_about_vertical, turn_by_vector
 from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix
@@ -119,7 +119,7 @@ def balanced_path(
     return out, worst
 
 
-@njit(cache=True)
+@inlined
 def _aim(
     robot: ReferenceRobot,
     stance: Stance,
@@ -170,7 +170,7 @@ def _aim(
     stance.foot_rotation[side] = rotation
 
 
-@njit(cache=True)
+@inlined
 def _too_near(robot: ReferenceRobot, side: int, x: float, y: float, other: FloatArray) -> float:
     """Return how far a foot must go to the left so that it clears the one that stands [m]."""
     corners = robot.corners[side]

@@ -40,6 +40,20 @@ class Markers(NamedTuple):
     weights: FloatArray
 
 
+class Seen(NamedTuple):
+    """What was seen of M markers in a frame.
+
+    Attributes:
+        measured: Their positions, shape (M, 3) [m]; NaN where missing.
+        expected: Where the body has them, shape (M, 3) [m].
+        residuals: Distances between both, shape (M,) [m]; NaN where missing.
+    """
+
+    measured: FloatArray
+    expected: FloatArray
+    residuals: FloatArray
+
+
 class Moves(NamedTuple):
     """What the degrees of freedom may do in a frame.
 
@@ -143,6 +157,7 @@ def solve_frame(
     normal, gradient = equations.normal, equations.gradient
     rest_weight = moves.rest_weight
     points = np.empty_like(frame)
+    seen = Seen(frame, points, residuals)
     moved, step = np.zeros(dofs), np.empty(dofs)  # since the last frame; in this iteration
     iteration = 0
     while True:
@@ -156,7 +171,7 @@ def solve_frame(
         if iteration == search.max_iterations:
             break
         c = search.outlier_m * search.widening if iteration == 0 else search.outlier_m
-        normal_equations(q, frame, points, residuals, markers, c, linkage, configuration, equations)
+        normal_equations(q, seen, markers, c, linkage, configuration, equations)
         for i in range(dofs):
             if i >= 6 and normal[i, i] > 0.0:
                 pull = rest_weight[i - 6] * normal[i, i] / (rest_weight[i - 6] + normal[i, i])
@@ -181,9 +196,7 @@ def solve_frame(
 @njit(cache=True)
 def normal_equations(
     q: FloatArray,
-    frame: FloatArray,
-    points: FloatArray,
-    residuals: FloatArray,
+    seen: Seen,
     markers: Markers,
     c: float,
     linkage: Linkage,
@@ -199,15 +212,14 @@ def normal_equations(
 
     Args:
         q: Posture, shape (7 + n,).
-        frame: Measured positions, shape (M, 3) [m].
-        points: Where the body has the markers, shape (M, 3) [m].
-        residuals: Distances between both, shape (M,) [m]; NaN where a marker is missing.
+        seen: Where the markers were measured, and where the body has them.
         markers: Where they sit on the body.
         c: Scale of the Cauchy loss [m].
         linkage: The body's kinematics.
         configuration: Where it is.
         equations: Filled.
     """
+    frame, points, residuals = seen
     carried, motions, normal, gradient = equations
     parent, above = linkage.parent, linkage.above
     axes, anchors = configuration.axis, configuration.anchor

@@ -16,7 +16,7 @@ from mplearn_envs.link.attacks import ATTACKS, Attacker, under_attack
 from mplearn_envs.link.restraint import Restraint
 from mplearn_envs.mechanics import reference_robot, rest_reference
 from mplearn_envs.mechanics.kinematics import forward
-from mplearn_envs.mechanics.servos import approach
+from mplearn_envs.mechanics.servos import Bounds, approach
 from mplearn_envs.mechanics.velocity_ik import errors, settle
 
 SECONDS = 2.0  # each attack begins within one
@@ -42,9 +42,8 @@ def test_what_is_approached_keeps_all_limits_wherever_it_jumps(seed, acceleratio
             wanted = rng.uniform(-3, 3, 2)
         rate = (wanted - before) / PERIOD_S
         before = wanted
-        here, velocity = approach(
-            wanted, rate, here, velocity, limits, fastest, strongest, PERIOD_S
-        )
+        bounds = Bounds(limits, fastest, strongest)
+        here, velocity = approach(wanted, rate, here, velocity, bounds, PERIOD_S)
         path.append(here)
     speed = np.diff(path, axis=0) / PERIOD_S
     assert (np.array(path) >= limits[:, 0]).all() and (np.array(path) <= limits[:, 1]).all()
@@ -59,8 +58,8 @@ def test_what_keeps_the_limits_is_followed_without_lag():
     here, velocity, worst = wanted[0], np.zeros(2), []
     for before, now in itertools.pairwise(wanted):
         rate = (now - before) / PERIOD_S
-        limits = np.array([[-2.0, 2.0]] * 2)
-        here, velocity = approach(now, rate, here, velocity, limits, 2 * one, 4 * one, PERIOD_S)
+        bounds = Bounds(np.array([[-2.0, 2.0]] * 2), 2 * one, 4 * one)
+        here, velocity = approach(now, rate, here, velocity, bounds, PERIOD_S)
         worst.append(np.abs(here - now).max())
     assert max(worst[500:]) < 1e-9  # once it has caught up
 
