@@ -43,6 +43,12 @@ class Demonstrator:
     Raises:
         InvalidValueError: The seed or the rate is not allowed.
         BodyError: There is no human of the person's stature and proportions.
+
+    Example:
+        >>> teacher = Demonstrator(seed=1)
+        >>> blocks = list(teacher.blocks(["BAR", "BAL"]))  # both arms raised, and lowered
+        >>> [segment.label for block in blocks for segment in block.truth]
+        ['BAR', 'BAL']
     """
 
     def __init__(

@@ -141,6 +141,13 @@ def markov_walk(
     Raises:
         InvalidValueError: The graph names unknown or impossible followers, holds a dead end, or has
             no primitive that starts standing.
+
+    Example:
+        >>> from itertools import islice
+        >>> import numpy as np
+        >>> order = {"BAR": {"BAL": 1.0}, "BAL": {"BAR": 1.0}}
+        >>> sorted(islice(markov_walk(np.random.default_rng(0), order), 2))
+        ['BAL', 'BAR']
     """
     _check_graph(graph)
     if not (np.isfinite(balance) and balance >= 0.0):

@@ -56,7 +56,16 @@ def lost_throughout(recording: Recording) -> str:
 
 
 def alike(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
-    """Return the recordings of the channels that most have, all at the lowest of their rates."""
+    """Return the recordings of the channels that most have, all at the lowest of their rates.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import Recording
+        >>> quick = Recording(np.zeros((100, 2)), 100.0, ("x", "y"))
+        >>> slow = Recording(np.zeros((50, 2)), 50.0, ("x", "y"))
+        >>> [take.rate_hz for take in alike([quick, slow])]
+        [50.0, 50.0]
+    """
     if not recordings:
         return ()
     channels, _ = Counter(each.channels for each in recordings).most_common(1)[0]

@@ -16,6 +16,11 @@ class Table:
         columns: Heads of the columns, length k.
         rows: Cells, each row of length k.
         note: How to read it: protocol, matching rule, tolerance.
+
+    Example:
+        >>> found = Table("Primitives", ("person", "found"), (("s01", "22"), ("s02", "21")))
+        >>> found.rows[1]
+        ('s02', '21')
     """
 
     title: str

@@ -46,6 +46,13 @@ def from_hmmlearn(other: Any) -> LeftRightHMM:
 
     Raises:
         ModelError: It is not diagonal, or not a left-right chain from its first state.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.hmm import LeftRightHMM, to_hmmlearn
+        >>> ours = LeftRightHMM(np.array([[0.0], [1.0]]), np.full((2, 1), 0.1), np.log([0.9, 1.0]))
+        >>> from_hmmlearn(to_hmmlearn(ours)).means.ravel().tolist()
+        [0.0, 1.0]
     """
     if getattr(other, "covariance_type", None) != "diag":
         kind = getattr(other, "covariance_type", type(other).__name__)

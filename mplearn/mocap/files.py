@@ -40,7 +40,14 @@ def cmu_subject(name: str) -> str:
 
 
 def bad_file(path: Path, found: str, expected: str) -> RecordingError:
-    """Return the error of a file that does not hold what its format promises."""
+    """Return the error of a file that does not hold what its format promises.
+
+    Example:
+        >>> from pathlib import Path
+        >>> raise bad_file(Path("take.trc"), "a frame of 5 numbers", "7")
+        Traceback (most recent call last):
+        mplearn.errors.RecordingError: ...take.trc...
+    """
     shown = found if len(found) <= _LONGEST_SHOWN else f"{found[:_LONGEST_SHOWN]}..."
     return RecordingError(f"{path}: {shown}; expected {expected}")
 

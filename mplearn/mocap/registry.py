@@ -39,7 +39,13 @@ def register_reader(reader: Reader) -> None:
 
 
 def readers() -> tuple[Reader, ...]:
-    """Return all readers, in the order in which they are asked."""
+    """Return all readers, in the order in which they are asked.
+
+    Example:
+        >>> suffixes = {suffix for reader in readers() for suffix in reader.suffixes}
+        >>> {".bvh", ".c3d", ".trc"} <= suffixes
+        True
+    """
     _load_entry_points()
     return tuple(_registered)
 

@@ -66,7 +66,12 @@ def register_source(kind: str, factory: Factory) -> None:
 
 
 def source_kinds() -> dict[str, str]:
-    """Return the kinds of sources there are, each with a line about it."""
+    """Return the kinds of sources there are, each with a line about it.
+
+    Example:
+        >>> {"demonstrator", "recording", "udp"} <= set(source_kinds())
+        True
+    """
     _load_entry_points()
     return {
         kind: (inspect.getdoc(factory) or "").partition("\n")[0]

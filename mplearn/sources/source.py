@@ -54,6 +54,11 @@ class Stream:
 
     Raises:
         InvalidValueError: Two channels have one name, or the rate is none of motion.
+
+    Example:
+        >>> stream = Stream(("LSHO.x", "LSHO.y", "LSHO.z"), rate_hz=100.0)
+        >>> len(stream.channels), stream.skeleton is None
+        (3, True)
     """
 
     channels: tuple[str, ...]

@@ -98,6 +98,11 @@ def to_plain(value: Any, share: Share | None = None) -> Any:
     Args:
         value: A state, a configuration, or anything they hold.
         share: Says what stands for a part that is kept by its content; the part itself by default.
+
+    Example:
+        >>> from mplearn.tree import TreeConfig
+        >>> to_plain(TreeConfig(min_exemplars=4))["min_exemplars"]
+        4
     """
     if isinstance(value, (np.ndarray, str, int, float)) or value is None:
         return value.item() if isinstance(value, np.generic) else value

@@ -137,7 +137,13 @@ _SAVED_AS: dict[type, dict[str, str]] = {}
 
 
 def require(holds: bool, place: str, problem: str | Callable[[], str]) -> None:
-    """Raise a `StateError` at a place where something does not hold."""
+    """Raise a `StateError` at a place where something does not hold.
+
+    Example:
+        >>> require(2 > 3, "nodes[0].left", "must be greater than 3")
+        Traceback (most recent call last):
+        mplearn.errors.StateError: nodes[0].left: must be greater than 3
+    """
     if not holds:
         raise StateError(problem if isinstance(problem, str) else problem(), place)
 
@@ -148,6 +154,12 @@ def require_no_cycle(parents: Mapping[int, int | None], place: Callable[[int], s
     Args:
         parents: The node above each node; one that is not among them is above all.
         place: Returns the place of what is said of a node.
+
+    Example:
+        >>> require_no_cycle({1: None, 2: 1, 3: 2}, "nodes[{}].parent".format)
+        >>> require_no_cycle({1: 2, 2: 1}, "nodes[{}].parent".format)
+        Traceback (most recent call last):
+        mplearn.errors.StateError: nodes[2].parent: node 2 lies below itself
     """
     safe: set[int] = set()
     for start in parents:

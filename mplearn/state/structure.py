@@ -56,6 +56,16 @@ def from_plain(kind: type[T], value: Any) -> T:
 
     Raises:
         StateError: They describe none; its place says where.
+
+    Example:
+        >>> from mplearn.segmentation import ZeroVelocityConfig
+        >>> from mplearn.state import to_plain
+        >>> plain = to_plain(ZeroVelocityConfig())
+        >>> from_plain(ZeroVelocityConfig, plain) == ZeroVelocityConfig()
+        True
+        >>> from_plain(ZeroVelocityConfig, plain | {"speed": 1.0})
+        Traceback (most recent call last):
+        mplearn.errors.StateError: ...speed...
     """
     return cast(T, _reader(cast(Any, kind))(value, {}))
 

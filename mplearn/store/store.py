@@ -356,6 +356,18 @@ def check(path: str | Path) -> tuple[str, ...]:
 
     Raises:
         StoreError: It cannot be opened at all.
+
+    Example:
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = Path(folder) / "life.db"
+        ...     learner = MotionLearner(LearnerConfig(("x", "y"), 50.0))
+        ...     LifelongLearner.open(path, lambda: learner).close()
+        ...     check(path), info(path).path == path
+        ((), True)
     """
     connection = open_reading(Path(path))
     try:

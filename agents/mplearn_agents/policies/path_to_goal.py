@@ -38,6 +38,16 @@ class PathToGoal(Policy):
     Raises:
         UnknownPrimitiveError: The goal is not in the graph.
         InvalidValueError: ``prefer`` is none of these.
+
+    Example:
+        >>> import networkx as nx
+        >>> import numpy as np
+        >>> graph = nx.DiGraph()
+        >>> graph.add_weighted_edges_from([(0, 1, 0.5), (1, 2, 1.0), (0, 0, 0.5)], "probability")
+        >>> legal, prior = np.array([1, 1, 0]), np.array([0.5, 0.5, 0.0])
+        >>> policy = PathToGoal(graph, goal=2)
+        >>> policy.act(None, {"action_mask": legal, "transition_prior": prior})
+        1
     """
 
     def __init__(

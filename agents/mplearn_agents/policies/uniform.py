@@ -15,6 +15,12 @@ class UniformLegal(Policy):
 
     Args:
         seed: Seed of the walk; None draws one.
+
+    Example:
+        >>> import numpy as np
+        >>> legal = np.array([0, 0, 1])
+        >>> UniformLegal(seed=0).act(None, {"action_mask": legal, "transition_prior": legal / 1.0})
+        2
     """
 
     def __init__(self, seed: int | None = None) -> None:

@@ -48,6 +48,10 @@ class TrainingConfig:
         discount: What a reward in a second's time is worth, in (0, 1]; None is the environment's.
         speeds: Among which speeds it chooses with the primitive, see `ActionOptions.speeds`.
         environment: Further arguments of the environment.
+
+    Example:
+        >>> TrainingConfig(task="recite", steps=1000).algorithm
+        'maskable-ppo'
     """
 
     env: EnvVersion = "v0"

@@ -90,6 +90,12 @@ def reference_robot(robot: Robot) -> ReferenceRobot:
 
     Raises:
         RobotError: The robot cannot stand so that its COG is over its feet.
+
+    Example:
+        >>> from mplearn_envs.robot import humanoid
+        >>> ref = reference_robot(humanoid())
+        >>> round(ref.standing_height, 2), ref.corners.shape
+        (0.89, (2, 4, 3))
     """
     model = robot.model()
     tree = mass_tree(model)

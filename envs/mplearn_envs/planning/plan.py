@@ -33,6 +33,10 @@ class PlannerConfig:
             farther inside by this share of its distance from the COG, which is what moving masses
             make of it.
         cache_size: Number of plans that are kept.
+
+    Example:
+        >>> PlannerConfig(period_s=0.002, knot_steps=10).knot_steps
+        10
     """
 
     period_s: float = 0.004

@@ -66,6 +66,15 @@ class FollowTask(Task):
         deadline_s: When the episode ends [s].
         agree: Reward of a second in agreement.
         fallen: Price of a fall.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> task = FollowTask(pace=0.7)
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", task=task, dynamics="kinematic")
+        >>> observation, info = env.reset(seed=1)
+        >>> env.observation_space["task"].contains(observation["task"])
+        True
     """
 
     pace: float = 0.8

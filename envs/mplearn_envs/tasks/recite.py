@@ -54,6 +54,15 @@ class ReciteTask(Task):
         said: Reward of a requested primitive in its turn.
         complete: Reward of the whole request.
         fallen: Price of a fall.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> task = ReciteTask(request=["squat down", "bow down"])
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", task=task, dynamics="kinematic")
+        >>> observation, info = env.reset(seed=1)
+        >>> info["is_success"]
+        False
     """
 
     length: int = 3

@@ -36,6 +36,12 @@ class MarkerSet:
         names: Names of the M markers.
         bodies: Name of the body that carries each, length M.
         offsets: Positions in that body's frame on the reference human, shape (M, 3) [m].
+
+    Example:
+        >>> from mplearn.body import marker_set
+        >>> known = marker_set("plug_in_gait39")
+        >>> known.knows(["Subject:LSHO", "lamp"])  # whoever the subject is
+        (True, False)
     """
 
     name: str

@@ -35,6 +35,12 @@ class Body:
         height_m: Stature, sole to top of the head [m].
         tree: The same kinematics as plain arrays.
         held: Hinges that are kept at zero, not driven.
+
+    Example:
+        >>> from mplearn.body import robot_body
+        >>> robot = robot_body()
+        >>> robot.rest.shape, robot.rest[3:7].tolist()
+        ((45,), [1.0, 0.0, 0.0, 0.0])
     """
 
     name: str

@@ -32,6 +32,15 @@ class FactorialHMM:
 
     Raises:
         ModelError: Shapes disagree, or a value is out of range.
+
+    Example:
+        >>> import numpy as np
+        >>> stays = np.log([0.5, 1.0])  # of each state; the last one stays
+        >>> slow, quick = np.array([[0.0], [1.0]]), np.array([[0.0], [0.5]])
+        >>> model = FactorialHMM((slow, quick), (stays, stays), np.array([0.1]))
+        >>> likely, unlikely = np.array([[0.0], [1.5]]), np.array([[1.5], [0.0]])
+        >>> model.score(likely) > model.score(unlikely)
+        True
     """
 
     means: tuple[FloatArray, ...]

@@ -37,6 +37,14 @@ class SemiMarkovHMM(GaussianStates):
 
     Raises:
         ModelError: Shapes disagree, or a value is out of range.
+
+    Example:
+        >>> import numpy as np
+        >>> means, variances = np.array([[0.0], [1.0]]), np.full((2, 1), 0.1)
+        >>> model = SemiMarkovHMM(means, variances, np.array([5.0, 5.0]), np.array([1.0, 1.0]))
+        >>> usual, hurried = [0.0] * 5 + [1.0] * 5, [0.0] + [1.0] * 9
+        >>> model.score(np.c_[usual]) > model.score(np.c_[hurried])
+        True
     """
 
     means: FloatArray
