@@ -1,9 +1,14 @@
-"""What MkDocs calls while it builds the site: formulas become MathML, rooms become API pages."""
+"""What MkDocs calls while it builds the site.
+
+Formulas become MathML, rooms become pages of the reference, and a drawing of what they import.
+"""
 
 from __future__ import annotations
 
 import html
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +46,16 @@ MODULES = (
     ),
     "mplearn_agents.walk",
 )
+
+
+def on_page_markdown(markdown: str, page: Any, config: Any, **_: Any) -> str:
+    """Draw the rooms from what they import, where the page of the structure wants it."""
+    if page.file.src_uri != "structure.md":
+        return markdown
+    root = Path(config["config_file_path"]).parent
+    drawn = [sys.executable, "scripts/structure.py", "--svg", "-"]
+    svg = subprocess.run(drawn, cwd=root, check=True, capture_output=True, text=True).stdout
+    return markdown.replace("<!-- rooms -->", svg)
 
 
 def on_page_content(content: str, page: Any, **_: Any) -> str:
