@@ -23,6 +23,7 @@ from .markers.csv_table import CSVReader
 from .markers.motive import MotiveReader
 from .markers.nexus import NexusReader
 from .markers.qualisys import QualisysReader
+from .markers.storage import StorageReader
 from .markers.trc import TRCReader
 from .markers.ui_prmd import UIPRMDReader
 from .markers.xdf import XDFReader
@@ -45,6 +46,7 @@ for _reader in (
     QualisysReader(),
     MotiveReader(),
     TRCReader(),
+    StorageReader(),
     BVHReader(),
     AMCReader(),
     MVNXReader(),

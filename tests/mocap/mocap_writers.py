@@ -252,6 +252,22 @@ def write_csv(
     return path
 
 
+def write_storage(
+    path: Path, points: np.ndarray | None = None, *, vectors: bool = False, rate_hz: float = 100.0
+) -> Path:
+    points = y_up(person() if points is None else points)
+    names = [f"M{i}" for i in range(points.shape[1])]
+    columns = names if vectors else [f"{name}_{axis}" for name in names for axis in "XYZ"]
+    lines = [f"DataType={'Vec3' if vectors else 'double'}", "version=3", "OpenSimVersion=4.4"]
+    lines += ["endheader", "\t".join(["time", *columns])]
+    for i, frame in enumerate(points):
+        cells = [f"{x:.6f}" for x in frame.ravel()]
+        cells = [",".join(cells[k : k + 3]) for k in range(0, len(cells), 3)] if vectors else cells
+        lines.append("\t".join([f"{i / rate_hz:.5f}", *cells]))
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
 def y_up(points: np.ndarray) -> np.ndarray:
     """Return points with z up in the axes of tools with y up and x forward."""
     return np.stack([points[..., 0], points[..., 2], -points[..., 1]], axis=-1)
@@ -633,6 +649,7 @@ WRITERS: dict[str, tuple[str, Writer]] = {
     "BVH": ("take.bvh", write_bvh),
     "TRC": ("take.trc", write_trc),
     "CSV": ("take.csv", write_csv),
+    "OpenSim storage": ("take.sto", write_storage),
     "G1 CSV": ("take.csv", write_g1_csv),
     "MVNX": ("take.mvnx", write_mvnx),
     "SMPL": ("take.npz", write_smpl),

@@ -8,7 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mocap_writers import person, write_c3d, write_csv, write_trc, write_ui_prmd
+from mocap_writers import (
+    person,
+    write_c3d,
+    write_csv,
+    write_storage,
+    write_trc,
+    write_ui_prmd,
+)
 
 from mplearn.errors import InvalidValueError, RecordingError, RecordingWarning
 from mplearn.mocap import Hints, open_recording, open_recordings, take_names
@@ -430,3 +437,27 @@ def test_axes_turn_without_mirroring(up: str, forward: str) -> None:
     turn = to_z_up(up, forward)
     assert np.linalg.det(turn) == pytest.approx(1.0)
     assert turn @ turn.T == pytest.approx(np.eye(3))
+
+
+@pytest.mark.parametrize("vectors", [False, True])
+def test_markers_in_tables_of_opensim(tmp_path: Path, vectors: bool) -> None:
+    points = person(20, 8)
+    take = open_recording(write_storage(tmp_path / "a.sto", points, vectors=vectors))
+    assert take.marker_names == tuple(f"M{i}" for i in range(8))
+    assert take.markers == pytest.approx(points, abs=1e-6)
+
+
+def test_coordinates_of_opensim_are_radians_and_metres(tmp_path: Path) -> None:
+    path = tmp_path / "ik.mot"
+    path.write_text(
+        "Coordinates\nversion=1\nnRows=2\nnColumns=3\ninDegrees=yes\n\nUnits are S.I. units\n\n"
+        "endheader\n    time\tpelvis_tilt\tpelvis_ty\n"
+        "  0.00\t  90.0\t  0.95\n  0.01\t 180.0\t 1.0\n"
+    )
+    take = open_recording(path)
+    assert take.channels == ("pelvis_tilt", "pelvis_ty")
+    assert take.rate_hz == pytest.approx(100.0)
+    assert take.frames == pytest.approx(np.array([[np.pi / 2, 0.95], [np.pi, 1.0]]))
+    path.write_text(path.read_text().replace("endheader", ""))
+    with pytest.raises(RecordingError, match="endheader"):
+        open_recording(path)

@@ -337,6 +337,15 @@ def test_a_column_says_the_rate(tmp_path: Path, standing: Recording, points: np.
     check(path, points, standing.marker_names)
 
 
+def test_points_of_a_picture_with_a_depth_of_zero_are_told(
+    tmp_path: Path, standing: Recording, points: np.ndarray
+) -> None:
+    flat = points * (0.0, 1.0, 1.0)
+    path = tmp_path / "a.csv"
+    path.write_text(table(flat, standing.marker_names))
+    check(path, flat, standing.marker_names, "all points have the same x")
+
+
 def test_numbered_axes_are_not_taken_for_markers_silently(
     tmp_path: Path, standing: Recording, points: np.ndarray
 ) -> None:

@@ -54,7 +54,7 @@ SEPARATORS = {
         ),
         ",",
     ),
-    **dict.fromkeys(("TRC", "Qualisys TSV"), "\t"),
+    **dict.fromkeys(("TRC", "Qualisys TSV", "OpenSim storage"), "\t"),
 }
 
 

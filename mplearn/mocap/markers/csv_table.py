@@ -28,6 +28,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -61,7 +62,16 @@ class CSVReader(Reader):
     """Reads tables with named columns; see the module's docstring for the format."""
 
     format = "CSV"
-    suffixes = (".csv", ".tsv", ".txt")
+    suffixes: ClassVar[tuple[str, ...]] = (".csv", ".tsv", ".txt")
+    usual = Space(1.0)  # what tables that do not say it are in
+
+    def sheet(self, path: Path) -> Sheet:
+        """Return the table that a file holds.
+
+        Raises:
+            RecordingError: There is none.
+        """
+        return Sheet.of(path, read_text(path))
 
     def accepts(self, path: Path) -> bool:
         """Whether it is called a table, or is a text that begins like one of markers."""
@@ -76,7 +86,7 @@ class CSVReader(Reader):
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read the table; see `Reader.read`."""
         findings = Findings(self.format)
-        sheet = Sheet.of(path, read_text(path))
+        sheet = self.sheet(path)
         header = find_header(sheet)
         columns = meaning_of(header.names)
         _check_names(path, columns)
@@ -106,7 +116,7 @@ class CSVReader(Reader):
         seen = (~np.isnan(points).any(axis=2)).sum(axis=0)
         kept, names = chosen_names(path, table.markers, seen, findings)
         points = points[:, kept]
-        space = Space(table.unit_m or 1.0, says_unit=table.unit_m is not None)
+        space = replace(self.usual, unit_m=table.unit_m or 1.0, says_unit=table.unit_m is not None)
         _warn_of_pictures(points, names, findings)
         at = placed(path, points, names, rate_hz, space, hints, findings)
         return Recording(

@@ -19,6 +19,7 @@ from .vertical import find_vertical
 _FARTHEST_M = 100.0  # no capture volume is larger
 _SMALLEST_M = 0.02  # all markers of a body within less: not a body
 _MANY = 10  # markers; fewer may be a hand's
+_THIN_M = 1e-3  # no body is thinner
 _FEW = 3  # markers; about fewer the file alone can tell
 
 
@@ -128,10 +129,25 @@ def placed(
     """
     unit = hints.unit_m or _settled_unit(points, names, space, findings, sized)
     metres = checked_markers(path, points if unit == 1.0 else points * unit, names)
+    _warn_of_flat(metres, findings)
     up = hints.up_axis or _settled_up(metres, names, rate_hz, space, findings)
     turn = to_z_up(up, space.forward) if up == space.up else upright(up)
     turned = metres if np.array_equal(turn, np.eye(3)) else metres @ turn.T
     return Placed(turned, unit, up, turn)
+
+
+def _warn_of_flat(metres: FloatArray, findings: Findings) -> None:
+    """Warn where all points lie in one plane of the axes, as points of a picture do."""
+    if metres.shape[1] < _MANY:
+        return
+    some = metres[:: max(1, len(metres) // 200)]
+    some = some[~np.isnan(some).any(axis=2)]
+    thin = np.ptp(some, axis=0) < _THIN_M if len(some) else np.zeros(3, dtype=np.bool_)
+    if thin.any() and not thin.all():
+        findings.warn(
+            f"all points have the same {'xyz'[int(thin.argmax())]}: they seem to be those of a "
+            "picture, without depth, and how somebody is turned cannot be told from them"
+        )
 
 
 def _settled_unit(
