@@ -6,9 +6,10 @@
 from __future__ import annotations
 
 import re
-from itertools import chain, takewhile
+from itertools import chain
 from typing import Literal, NamedTuple
 
+from ..mocap.markers.names import WORD_MARKS, shared_start
 from .synonyms import (
     BONES_MIDDLE,
     BONES_SIDED,
@@ -18,7 +19,6 @@ from .synonyms import (
     SKIN_SIDED,
 )
 
-_MARKS = "_.:- "  # between the words of a label
 CUT = 4  # letters that some files keep of a label
 _PELVIS = frozenset(("iliac_front", "iliac_back", "trochanter"))
 _LIMBS = frozenset(("elbow", "hip", "knee"))  # called by others where joints are called as bones
@@ -71,12 +71,8 @@ def read_label(label: str) -> list[Label]:
 
 def without_shared_prefix(labels: tuple[str, ...]) -> tuple[str, ...]:
     """Return labels without what all begin with, as ``Skeleton_001_`` of Motive; a side stays."""
-    if len(labels) < 2:
-        return labels
-    pairs = takewhile(lambda pair: pair[0] == pair[1], zip(min(labels), max(labels), strict=False))
-    shared = "".join(letter for letter, _ in pairs)
-    start = shared[: max(shared.rfind(mark) for mark in _MARKS) + 1]
-    words = set(re.split(f"[{re.escape(_MARKS)}]+", start.lower()))
+    start = shared_start(labels)
+    words = set(re.split(f"[{re.escape(WORD_MARKS)}]+", start.lower()))
     named = [label[len(start) :] for label in labels]
     if words & {"l", "r", "left", "right"}:
         return labels

@@ -62,6 +62,25 @@ def not_seen(points: FloatArray) -> BoolArray:
     return gone
 
 
+def without_unseen(points: FloatArray) -> FloatArray:
+    """Return points, shape (T, M, 3), NaN where they were not seen.
+
+    One that is at zero all the time stays where it lies amid the others, as the hips from which all
+    is counted; elsewhere it was never seen.
+    """
+    gone = not_seen(points)
+    found = np.where(gone[..., None], np.nan, points)
+    always = np.flatnonzero(gone.all(axis=0))
+    others = found[~np.isnan(found).all(axis=(1, 2))]
+    if len(always) == 1 and len(others):
+        others = np.delete(others, always, axis=1)
+        middle = np.nanmedian(others, axis=1, keepdims=True)
+        spread = np.nanmedian(np.linalg.norm(others - middle, axis=2))
+        if np.median(np.linalg.norm(middle, axis=2)) < spread:
+            found[:, always] = points[:, always]
+    return found
+
+
 def number(path: Path, cell: str, where: str) -> float:
     """Return a finite number, or NaN where it is missing: an empty cell, or one of `MISSING`.
 

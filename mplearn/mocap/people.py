@@ -10,6 +10,7 @@ from itertools import product
 import numpy as np
 
 from ..recording import ReadReport, Recording, Skeleton, marker_channels
+from .markers.names import WORD_MARKS, shared_start
 from .options import option
 from .skeletons.kinematics import AXIS_MARK
 
@@ -17,7 +18,6 @@ FEWEST_JOINTS = 12  # of a person's skeleton
 FEWEST_MARKERS = 10  # that people have in common; clusters on limbs are smaller
 LOOSE, LOOSE_M = 0.25, 0.02  # how much a bone may stretch and still be one: of its length, and [m]
 LEAST_SIZE = 0.5  # of the largest tree of joints: hands and props are smaller
-_SEPARATORS = (":", "_", ".", "-", " ")
 _SIDE = re.compile(r"left|right|lft|rgt|links|rechts|^[lr](?=[A-Z_ ]|$)", re.IGNORECASE)
 _LOOK = 100  # frames
 
@@ -64,12 +64,13 @@ def each_person(recording: Recording) -> tuple[Recording, ...]:
 def _by_prefix(recording: Recording) -> Mapping[str, list[int]]:
     """Return the markers of each person, by prefix, if several have markers of the same names."""
     names = recording.marker_names
-    for separator, cut in product(_SEPARATORS, (str.partition, str.rpartition)):
+    shared = shared_start(names)  # body_0_nose, body_1_nose
+    for separator, cut in product(WORD_MARKS, (str.partition, str.rpartition)):
         groups: dict[str, dict[str, int]] = {}
         for k, name in enumerate(names):
-            prefix, found, rest = cut(name, separator)
+            prefix, found, rest = cut(name.removeprefix(shared), separator)
             if found:
-                groups.setdefault(prefix, {})[rest.lower()] = k
+                groups.setdefault(shared + prefix, {})[rest.lower()] = k
         largest = max((len(group) for group in groups.values()), default=0)
         people = {
             prefix: list(group.values())

@@ -337,6 +337,28 @@ def test_a_column_says_the_rate(tmp_path: Path, standing: Recording, points: np.
     check(path, points, standing.marker_names)
 
 
+@pytest.mark.parametrize("hidden", ["LANK", "CLAV"])
+def test_a_marker_that_is_zero_throughout_was_never_seen(
+    tmp_path: Path, standing: Recording, points: np.ndarray, hidden: str
+) -> None:
+    gone = points.copy()
+    gone[:, standing.marker_names.index(hidden)] = np.nan
+    path = tmp_path / "a.csv"
+    path.write_text(table(gone, standing.marker_names, missing="0"))
+    check(path, gone, standing.marker_names)
+
+
+def test_a_point_from_which_all_is_counted_is_there(
+    tmp_path: Path, standing: Recording, points: np.ndarray
+) -> None:
+    names = standing.marker_names
+    root = points[:, [names.index("LASI")]]
+    path = tmp_path / "a.csv"
+    path.write_text(table(points - root, names))
+    read = open_recording(path, hints=Hints(up_axis="z"))
+    assert not np.isnan(read.markers[:, names.index("LASI")]).any()
+
+
 def test_points_of_a_picture_with_a_depth_of_zero_are_told(
     tmp_path: Path, standing: Recording, points: np.ndarray
 ) -> None:

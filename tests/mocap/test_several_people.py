@@ -18,7 +18,9 @@ def of_markers(names: tuple[str, ...]) -> Recording:
 
 
 @pytest.mark.parametrize("between", [":", "_", ".", "-", " "])
-@pytest.mark.parametrize("people", [("Anna", "Ben"), ("Skeleton_001", "Skeleton_002", "Ball")])
+@pytest.mark.parametrize(
+    "people", [("Anna", "Ben"), ("Skeleton_001", "Skeleton_002", "Ball"), ("a b_0", "a b_1")]
+)
 def test_prefixes_tell_people_apart(between: str, people: tuple[str, ...]) -> None:
     names = tuple(f"{who}{between}{name}" for who in people[:2] for name in NAMES)
     names += tuple(f"{who}{between}tip{k}" for who in people[2:] for k in range(4))

@@ -37,7 +37,7 @@ from ...recording import FloatArray, IntArray, LabelledSegment, Recording, marke
 from ..clock import Clock, even_clock, in_seconds
 from ..files import bad_file, head_text, read_text, stem
 from ..findings import Findings
-from ..numbers import measured_rows, not_seen
+from ..numbers import measured_rows, without_unseen
 from ..options import option
 from ..placing.size import named_unit
 from ..placing.space import Space, placed
@@ -111,8 +111,7 @@ class CSVReader(Reader):
                 report=findings.report(rate_hz),
             )
         points = values.reshape(len(values), -1, 3).copy()
-        gone = not_seen(points)
-        points[gone & ~gone.all(axis=0)] = np.nan  # what is there always may be where all begins
+        points = without_unseen(points)
         seen = (~np.isnan(points).any(axis=2)).sum(axis=0)
         kept, names = chosen_names(path, table.markers, seen, findings)
         points = points[:, kept]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import takewhile
 from pathlib import Path
 
 from ...recording import IntArray
@@ -16,6 +17,8 @@ _UNIDENTIFIED = re.compile(
     re.I,
 )
 _SEPARATORS = ":|"
+WORD_MARKS = ":_.- "
+"""What stands between the words of a label."""
 
 
 def chosen_names(
@@ -70,6 +73,20 @@ def without_prefix(labels: Sequence[str]) -> list[str]:
     if len(prefixes) > 1:
         return list(labels)
     return [_split(label)[1] for label in labels]
+
+
+def shared_start(labels: Sequence[str]) -> str:
+    """Return what all labels begin with, up to a mark between words: ``Anna_`` of ``Anna_LASI``.
+
+    Example:
+        >>> shared_start(["body_0_nose", "body_1_nose"]), shared_start(["LASI", "LPSI"])
+        ('body_', '')
+    """
+    if len(labels) < 2:
+        return ""
+    pairs = takewhile(lambda pair: pair[0] == pair[1], zip(min(labels), max(labels), strict=False))
+    shared = "".join(letter for letter, _ in pairs)
+    return shared[: max(shared.rfind(mark) for mark in WORD_MARKS) + 1]
 
 
 def _split(label: str) -> tuple[str, str]:

@@ -12,7 +12,7 @@ import numpy as np
 from ...recording import FloatArray, IntArray, Recording, marker_channels
 from ..files import bad_file, read_bytes, stem
 from ..findings import Findings
-from ..numbers import not_seen
+from ..numbers import without_unseen
 from ..options import option
 from ..placing.size import named_unit
 from ..placing.space import Space, placed
@@ -61,8 +61,7 @@ class XDFReader(Reader):
         values[~np.isfinite(values)] = np.nan
         rate_hz, values = _even(path, stream, values, hints, findings)
         points = values.reshape(len(values), -1, 3)
-        gone = not_seen(points)
-        points[gone & ~gone.all(axis=0)] = np.nan  # what is there always may be where all begins
+        points = without_unseen(points)
         seen = (~np.isnan(points).any(axis=2)).sum(axis=0)
         kept, names = chosen_names(path, list(markers), seen, findings)
         unit = described_unit(stream.info, stream.n_channels, columns)

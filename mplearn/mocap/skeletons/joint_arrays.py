@@ -16,7 +16,7 @@ from ...recording import FloatArray, Recording, marker_channels
 from ..files import bad_file, stem, suffix
 from ..findings import Findings
 from ..markers.columns import MEDIAPIPE_POSE
-from ..numbers import not_seen
+from ..numbers import without_unseen
 from ..options import option
 from ..placing.space import Space, placed
 from ..rates import rate_beside
@@ -127,8 +127,7 @@ class JointArrayReader(Reader):
         rate_hz = hints.rate_hz or said_hz or rate_beside(path, findings)
         if rate_hz is None:
             raise bad_file(path, "no rate", f"one in its name, or {option('rate_hz')}")
-        gone = not_seen(points)
-        points[gone & ~gone.all(axis=0)] = np.nan  # what is there always may be where all begins
+        points = without_unseen(points)
         layout = _layout(path, points)
         names = tuple(LAYOUTS[layout].split())
         findings.note(f"{points.shape[1]} joints: those of {layout}")
