@@ -295,7 +295,7 @@ class _Run:
             learners.append(_learner_of(part))
             self._merged += k > 0
             self._show(self._progress())
-        learner = merged_learner(learners)
+        learner = merged_learner(learners, [person for person, _ in parts])
         shutil.rmtree(folder, ignore_errors=True)
         return learner
 
@@ -313,7 +313,9 @@ class _Run:
         def done(k: int, _: None) -> None:
             self._merged += len(groups[several[k]][1]) - 1
 
-        self._all(merge_files, [(groups[k][1], to[k]) for k in several], done, lambda k: 0)
+        self._all(
+            merge_files, [(groups[k][1], to[k], groups[k][0]) for k in several], done, lambda k: 0
+        )
         return [(person, path) for (person, _), path in zip(groups, to, strict=True)]
 
     # ---- doing
@@ -387,17 +389,18 @@ class _Run:
         )
 
 
-def merge_files(parts: Sequence[Path], to: Path) -> None:
-    """Merge what some stores, or files of learners, know; write it to a file.
+def merge_files(parts: Sequence[Path], to: Path, person: str) -> None:
+    """Merge what some stores, or files of learners, know of one person; write it to a file.
 
     Args:
         parts: The stores and files.
         to: The file.
+        person: Who moves; empty where unknown, then there may be many.
 
     Raises:
         MPLearnError: One cannot be read, or the file cannot be written.
     """
-    state = merged_state(_learner_of(part) for part in parts)
+    state = merged_state((_learner_of(part) for part in parts), [person] * len(parts))
     replace(FILES, compression=0).write(to, to_plain(state))  # it is read once, and goes
 
 

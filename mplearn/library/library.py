@@ -179,9 +179,17 @@ class PrimitiveLibrary:
         Raises:
             InvalidValueError: As `recognise`.
         """
+        return self.score_recognised(self.recognise(frames))
+
+    def score_recognised(self, found: Recognition) -> AnomalyScore:
+        """Return `score_motion` of a segment from what `recognise` has already found for it.
+
+        Raises:
+            InvalidValueError: The library was made without a recogniser.
+        """
         length = self._recogniser.distance.length
-        matches = self.recognise(frames).alternatives
-        return self._novelty.score((match.node, float(length(match.distance))) for match in matches)
+        matches = ((each.node, float(length(each.distance))) for each in found.alternatives)
+        return self._novelty.score(matches)
 
     def score_order(self, sequence: Sequence[Key | None]) -> tuple[AnomalyScore, ...]:
         """Return how unusual each primitive of a sequence is after those before it.

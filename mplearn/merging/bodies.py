@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,37 +11,45 @@ from ..body.observer.known_bodies import BodiesState, KnownBodies
 from ..recording import FloatArray
 
 
-def merge_bodies(first: KnownBodies, second: KnownBodies) -> tuple[BodiesState, dict[int, int]]:
+def merge_bodies(
+    first: KnownBodies,
+    second: KnownBodies,
+    known: Mapping[int, int],
+    apart: Collection[int],
+) -> tuple[BodiesState, dict[int, int]]:
     """Return all known bodies together, and the number there of each person of the second.
 
-    Who is the same is found one to one, the surest first; all others are new to the first, as long
-    as there is room, and then the nearest. Neither changes.
+    Who is the same is found one to one, the surest first, but for what was told; all others are new
+    to the first, however many people it tells apart. Neither changes.
+
+    Args:
+        first: Keeps its numbers.
+        second: Gets others.
+        known: Number in the first of people of the second, as far as that was told.
+        apart: People of the first who are nobody else of the second, as was told.
     """
     mine, theirs, config = first.state(), second.state(), first.config
+    numbers = dict(known)
     pairs = [
         (_likeness(first, mine, theirs, i, j), i, j)
         for i in range(mine.n_people)
+        if i not in apart and i not in numbers.values()
         for j in range(theirs.n_people)
+        if j not in numbers
     ]
-    numbers: dict[int, int] = {}
     for likeness, i, j in sorted(pairs, reverse=True):
         if likeness > config.caution and j not in numbers and i not in numbers.values():
             numbers[j] = i
-    n_people = mine.n_people
-    for j in range(theirs.n_people):
-        if j in numbers:
-            continue
-        if n_people < config.max_people:
-            numbers[j] = n_people
-            n_people += 1
-        else:
-            numbers[j] = max(pair for pair in pairs if pair[2] == j)[1]
+    new = [j for j in range(theirs.n_people) if j not in numbers]
+    numbers |= {j: mine.n_people + k for k, j in enumerate(new)}
+    n_people = mine.n_people + len(new)
     squares, counts = _summed(first, mine, theirs)
+    more = max(0, n_people - len(mine.means))
     merged = replace(
         mine,
         n_people=n_people,
-        means=mine.means.copy(),
-        blocks=mine.blocks.copy(),
+        means=np.pad(mine.means, ((0, more), (0, 0)), constant_values=np.nan),
+        blocks=np.pad(mine.blocks, (0, more)),
         squares=squares,
         counts=counts,
     )

@@ -13,13 +13,13 @@ from .people import merged_people
 from .watching import merge_watching
 
 
-def merge_learners(learners: Sequence[MotionLearner]) -> MotionLearner:
+def merge_learners(learners: Sequence[MotionLearner], people: Sequence[str] = ()) -> MotionLearner:
     """Return a learner that knows what all of some know, as if their streams followed each other.
 
     The learners stay as they are; a stream that one is in the middle of is ended for the merged
     one. Where markers are observed, people are matched by their bodies, as seen by the same
-    markers: who is known to both is one person, all others are kept apart; without markers all is
-    one person's. Primitives that several
+    markers: who is known to both is one person, all others are kept apart, as are those who are
+    told to be by their names; without markers all is one person's. Primitives that several
     have learned become one (`merge_people`); the counts of transitions are added, so that they do
     not depend on the order of the learners but for the names of primitives; what none had
     recognised alone is counted where it is known now. The first learner's primitives keep their
@@ -30,9 +30,15 @@ def merge_learners(learners: Sequence[MotionLearner]) -> MotionLearner:
     Each learner is copied once, however many there are; exemplars never are. Which leaves of
     different people are one primitive is found once, when all are there.
 
+    Args:
+        learners: At least one.
+        people: Who moved before each of them, where that is known; empty for those of whom it is
+            not. People seen under different names are never one, whatever their bodies; who alone
+            was seen under a name, by the same markers, is one person.
+
     Raises:
-        InvalidValueError: There are no learners, or they have other configurations; bodies may be
-            observed by other markers.
+        InvalidValueError: There are no learners, or not as many names; or they have other
+            configurations; bodies may be observed by other markers.
 
     Example:
         >>> import numpy as np
@@ -49,23 +55,23 @@ def merge_learners(learners: Sequence[MotionLearner]) -> MotionLearner:
     """
     for other in learners[1:]:
         _check_rules(learners[0], other)
-    return merged_learner(_copied(each) for each in learners)
+    return merged_learner((_copied(each) for each in learners), people)
 
 
-def merged_learner(learners: Iterable[MotionLearner]) -> MotionLearner:
+def merged_learner(learners: Iterable[MotionLearner], people: Sequence[str] = ()) -> MotionLearner:
     """Return what `merge_learners` makes of some, all of which are used up.
 
     Raises:
         InvalidValueError: As `merge_learners`; some are used up by then.
     """
-    merged, several = _merged(learners)
+    merged, several = _merged(learners, people)
     merged.tree.wake()
     if several:
         merged.chain.revise(merged.tree.withdraw_young())
     return merged
 
 
-def merged_state(learners: Iterable[MotionLearner]) -> LearnerState:
+def merged_state(learners: Iterable[MotionLearner], people: Sequence[str] = ()) -> LearnerState:
     """Return the state of what some learners know that will be merged with others yet.
 
     All of them are used up. Nothing is made to wait again, so that the order in which many are
@@ -75,14 +81,18 @@ def merged_state(learners: Iterable[MotionLearner]) -> LearnerState:
     Raises:
         InvalidValueError: As `merge_learners`; some are used up by then.
     """
-    return _merged(learners)[0].state()
+    return _merged(learners, people)[0].state()
 
 
-def _merged(learners: Iterable[MotionLearner]) -> tuple[MotionLearner, bool]:
+def _merged(learners: Iterable[MotionLearner], names: Sequence[str]) -> tuple[MotionLearner, bool]:
     """Return the first learner, which knows what all know; and whether there were several."""
     all_of_them = list(learners)
     if not all_of_them:
         raise InvalidValueError("at least one learner is needed to merge")
+    if names and len(names) != len(all_of_them):
+        raise InvalidValueError(
+            f"a name of each of {len(all_of_them)} learners' people is needed, not {len(names)}"
+        )
     first, *others = all_of_them
     for other in others:
         _check_rules(first, other)
@@ -90,12 +100,7 @@ def _merged(learners: Iterable[MotionLearner]) -> tuple[MotionLearner, bool]:
         each.end_stream()
     if not others:
         return first, False
-    people = [{person: person for person in first.tree.people}]
-    for other in others:
-        own = {person: person for person in other.tree.people}
-        if first.watching is not None and other.watching is not None:
-            own |= merge_watching(first.watching, other.watching)
-        people.append(own)
+    people = _matched(all_of_them, names or [""] * len(all_of_them))
     merged = merged_people([each.tree for each in all_of_them], people)
     graph = merge_graphs(
         (each.graph, {id: new_id[id] for id in each.graph.ids})
@@ -116,6 +121,21 @@ def _merged(learners: Iterable[MotionLearner]) -> tuple[MotionLearner, bool]:
         person = own.get(each.state().person, person)
     first.adopt(merged.tree, chain, n_frames, person)
     return first, True
+
+
+def _matched(learners: Sequence[MotionLearner], names: Sequence[str]) -> list[dict[int, int]]:
+    """Return the number of each person of each learner in the first, which knows them all then."""
+    first, *others = learners
+    called = (
+        {} if first.watching is None else dict.fromkeys(range(first.watching.n_people), names[0])
+    )
+    people = [{person: person for person in first.tree.people}]
+    for other, name in zip(others, names[1:], strict=True):
+        own = {person: person for person in other.tree.people}
+        if first.watching is not None and other.watching is not None:
+            own |= merge_watching(first.watching, other.watching, name, called)
+        people.append(own)
+    return people
 
 
 def _check_rules(one: MotionLearner, other: MotionLearner) -> None:

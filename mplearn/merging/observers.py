@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from ..body import MotionObserver
@@ -10,21 +11,24 @@ from .bodies import merge_bodies
 
 
 def merge_observers(
-    first: MotionObserver, second: MotionObserver
+    first: MotionObserver,
+    second: MotionObserver,
+    known: Mapping[int, int],
+    apart: Collection[int],
 ) -> tuple[ObserverState, dict[int, int]]:
     """Return the state of the first with the people of the second, and their numbers there.
 
-    Neither changes.
+    Neither changes; see `merge_bodies` for what was told.
     """
     state = first.state()
-    bodies, numbers = merge_bodies(first.identity.bodies, second.identity.bodies)
-    known = {each.person: each.body for each in state.known}
+    bodies, numbers = merge_bodies(first.identity.bodies, second.identity.bodies, known, apart)
+    fitted = {each.person: each.body for each in state.known}
     for each in second.state().known:
         if each.person in numbers:
-            known.setdefault(numbers[each.person], each.body)
+            fitted.setdefault(numbers[each.person], each.body)
     merged = replace(
         state,
         identity=replace(state.identity, bodies=bodies),
-        known=tuple(KnownState(person, body) for person, body in known.items()),
+        known=tuple(KnownState(person, body) for person, body in fitted.items()),
     )
     return merged, numbers

@@ -13,7 +13,7 @@ from ..library import PrimitiveLibrary, RecognisedSegment, SegmentTable
 from ..mocap import resample, with_channels
 from ..recording import FloatArray, Recording, Segment
 
-_AT_ONCE = 50  # frames between two looks at how far it is
+_AT_ONCE = 50  # frames taken at once
 
 
 class Recognising(MotionLearner):
@@ -43,7 +43,7 @@ class Recognising(MotionLearner):
             nearest, distance, p_value = "", np.nan, np.nan
             if found.alternatives:
                 nearest = _name(library, found.alternatives[0].node)
-                distance, p_value = found.distance, library.score_motion(features).p_value
+                distance, p_value = found.distance, library.score_recognised(found).p_value
             yield RecognisedSegment(
                 recording.name,
                 segment.start / rate_hz,
@@ -99,14 +99,12 @@ def recognise_recording(
     reader = Recognising(library, recording.channels)
     if not library.body and recording.channels != library.channels:
         raise RecordingError(f"{recording.name} has not the channels of the library")
-    looked = 0
-    for k, _ in enumerate(reader.learn_recording(recording), start=1):
-        if k % _AT_ONCE == 0:
-            progress(_AT_ONCE)
-            looked += _AT_ONCE
+    left = len(recording.frames)
+    for _ in reader.learn_recording(recording, _AT_ONCE):
+        looked = min(left, _AT_ONCE)
+        left -= looked
+        progress(looked)
         yield from reader.judged(recording)
-    progress(max(0, len(recording.frames) - looked))
-    yield from reader.judged(recording)
 
 
 def _name(library: PrimitiveLibrary, id: int) -> str:

@@ -9,6 +9,7 @@ from mplearn.body.observer.identity import BodyIdentity, IdentityConfig
 from mplearn.body.observer.observer import BLOCK_FRAMES
 from mplearn.demonstrator import Person, demonstrate
 from mplearn.errors import BodyError, InvalidValueError
+from mplearn.merging import merge_observers
 from mplearn.recording import Recording
 
 SIZES = {"small": 1.58, "middle": 1.70, "tall": 1.84}
@@ -140,6 +141,24 @@ def test_one_more_than_can_be_told_apart_is_the_nearest(people):
         assert observer.person in (0, 1)
         observer.restart()
     assert observer.identity.n_people == 2
+
+
+def test_merged_observers_know_more_people_than_one_tells_apart(people):
+    rules, names = IdentityConfig(max_people=2), people["small"].marker_names
+    one, two = (MotionObserver(names, 100.0, identity=rules) for _ in range(2))
+    for observer, seen in ((one, ("small", "tall")), (two, ("middle",))):
+        for name in seen:
+            watch(observer, people[name].frames[:200])
+            observer.restart()
+    state, numbers = merge_observers(one, two, {}, ())
+    assert numbers == {0: 2}
+    merged = MotionObserver(names, 100.0, identity=rules)
+    merged.load_state(state)
+    for number, name in enumerate(("small", "tall", "middle")):
+        watch(merged, people[name].frames[:200])
+        assert merged.person == number
+        merged.restart()
+    assert merged.identity.n_people == 3
 
 
 def test_rigid_pairs_share_a_segment_and_keep_their_distance(people):

@@ -7,6 +7,7 @@ import pytest
 
 from mplearn import LearnerConfig, MotionLearner, Recording
 from mplearn.demonstrator import Person, demonstrate
+from mplearn.errors import InvalidValueError
 from mplearn.evaluation.streams import join_people
 from mplearn.learner import PersonChanged, Recognised, SegmentClosed
 from mplearn.merging import merge_learners as merge
@@ -84,3 +85,37 @@ def test_a_merged_learner_knows_everybody_and_goes_on(merged) -> None:
     moving = [e for e in events if isinstance(e, SegmentClosed) and e.placement]
     assert sum(isinstance(e, Recognised) for e in events) >= 0.8 * len(moving)
     assert resumed.tree.leaves == merged.tree.leaves
+
+
+@pytest.fixture(scope="module")
+def alone() -> dict[str, MotionLearner]:
+    """Learners that have seen one person each; two are the same one."""
+    seen = {"tall": ("tall", 2), "tall again": ("tall", 3), "small": ("small", 1)}
+    return {key: learned(performed(*who).sliced(0, 700)) for key, who in seen.items()}
+
+
+@pytest.mark.parametrize(
+    ("who", "names", "expected"),
+    [
+        (("tall", "tall again"), (), 1),
+        (("tall", "tall again"), ("ann", "ben"), 2),
+        (("tall", "tall again"), ("ann", ""), 1),
+        (("tall", "small"), (), 2),
+        (("tall", "small"), ("ann", "ann"), 1),
+        (("tall", "small", "tall again"), ("ann", "ben", "ben"), 2),
+    ],
+)
+def test_people_are_who_they_are_told_to_be_whatever_their_bodies(
+    alone, who, names, expected
+) -> None:
+    merged = merge([alone[each] for each in who], names)
+    assert len(merged.tree.people) == merged.watching.n_people == expected
+    assert sum(merged.tree.of(person).n_seen for person in merged.tree.people) == sum(
+        alone[each].tree.n_seen for each in who
+    )
+    assert MotionLearner.from_state(merged.state()).tree.people == merged.tree.people
+
+
+def test_as_many_names_as_learners_are_needed(alone) -> None:
+    with pytest.raises(InvalidValueError, match="each of 2 learners"):
+        merge([alone["tall"], alone["small"]], ["ann"])

@@ -120,6 +120,7 @@ def test_scoring_changes_nothing_and_survives_saving(library, tmp_path):
     version = library.version
     frames = next(demonstrations(0, 1, seed=7))
     scores = library.score_motion(frames), library.score_order(library.ids)
+    assert library.score_recognised(library.recognise(frames)) == scores[0]
     assert library.version == version
     loaded = PrimitiveLibrary.load(library.save(tmp_path / "scored.mplearn"))
     assert (loaded.score_motion(frames), loaded.score_order(loaded.ids)) == scores

@@ -174,7 +174,7 @@ class BodyIdentity:
             return found
         if not self._is_body(seen, middle):
             return NOBODY
-        return found if self.n_people < self.config.max_people else int(scores[:-1].argmax())
+        return found if self.n_people < self.bodies.room else int(scores[:-1].argmax())
 
     def misfits(self, frames: FloatArray, back: bool, like: int | None = None) -> BoolArray:
         """Say which frames show something else than most do, or than what came before.
@@ -213,7 +213,7 @@ class BodyIdentity:
     @property
     def newcomer(self) -> int:
         """Number of the next person who is new, or the last of those who can be told apart."""
-        return min(self.n_people, self.config.max_people - 1)
+        return min(self.n_people, self.bodies.room - 1)
 
     def skip(self, frames: int) -> None:
         """Let frames pass in which nothing was seen."""
@@ -256,7 +256,7 @@ class BodyIdentity:
 
     def meet(self, person: int) -> None:
         """Go on with another person, or the first; somebody new has the number `n_people`."""
-        if not 0 <= person <= min(self.n_people, self.config.max_people - 1):
+        if not 0 <= person <= self.newcomer:
             raise InvalidValueError(f"person must lie in [0, {self.n_people}], not {person}")
         self.leave()
         self.person = person

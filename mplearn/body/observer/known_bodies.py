@@ -18,7 +18,8 @@ class IdentityConfig:
     """What is assumed of people and markers.
 
     Attributes:
-        max_people: People told apart; one more is taken for the nearest of them.
+        max_people: People told apart in streams; one more is taken for the nearest of them. Where
+            what several learners know is merged, more may be known.
         look_s: How long a doubt lasts before it is decided [s].
         absent_s: After so long out of sight it may be anybody [s].
         memory_s: Over which the short memory of the distances reaches [s].
@@ -68,8 +69,8 @@ class BodiesState(State):
 
     Attributes:
         n_people: How many people are known.
-        means: Mean of each distance within each person's body, shape (max_people, K) [m].
-        blocks: Blocks of time learned of each person, shape (max_people,).
+        means: Mean of each distance within each person's body, shape (P, K), P people at most [m].
+        blocks: Blocks of time learned of each person, shape (P,).
         squares: Squares of the deviations of blocks from their person's mean, shape (K,) [m^2].
         counts: How many blocks those are, shape (K,).
     """
@@ -95,7 +96,7 @@ class KnownBodies:
 
     Attributes:
         n_people: How many people are known.
-        blocks: Blocks of time learned of each person, shape (max_people,).
+        blocks: Blocks of time learned of each person, shape (P,).
         given: Squares and counts that are assumed before anything was seen, shape (K,) each.
     """
 
@@ -108,6 +109,11 @@ class KnownBodies:
         self._squares = given * give**2  # deviations of blocks from their person's mean
         self._counts = np.full(len(give), given)
         self.given = self._squares.copy(), self._counts.copy()
+
+    @property
+    def room(self) -> int:
+        """How many people can be known, shape P of what is known of them."""
+        return len(self.blocks)
 
     def learn(self, person: int, mean: FloatArray) -> None:
         """Take a block into the person's means, and into how much all vary with posture."""
@@ -173,10 +179,11 @@ class KnownBodies:
         """Resume from what `state` returned.
 
         Raises:
-            StateError: It is of other markers, or of more people than are told apart.
+            StateError: It is of other markers, or has room for fewer people.
         """
-        shape = self._means.shape
-        require(state.means.shape == shape, "means", f"must have shape {shape}")
+        least, width = self.config.max_people, self._means.shape[1]
+        fits = len(state.means) >= least and state.means.shape[1] == width
+        require(fits, "means", f"must have shape ({least} or more, {width})")
         self.n_people = state.n_people
         self._means, self.blocks = state.means.copy(), state.blocks.copy()
         self._squares, self._counts = state.squares.copy(), state.counts.copy()
