@@ -1,8 +1,9 @@
 """The ``mplearn`` command: one sub-command a module in `mplearn_agents.commands`.
 
 Exit codes, of all commands: 0 done; 1 what was checked is not in order (``doctor``, ``export
---check``); 2 bad input, with one line on standard error; 130 interrupted (``learn`` writes what it
-has learned first; who looks at a live source ends it by Ctrl-C, which is no interruption).
+--check``); 2 bad input, with one line on standard error; 130 interrupted, 143 by SIGTERM (``learn``
+writes what it has learned first, and says 130 of either; who looks at a live source ends it by
+Ctrl-C, which is no interruption).
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from mplearn.errors import InvalidValueError, MPLearnError
-from mplearn_agents.terminal.exit_codes import BAD_INPUT, INTERRUPTED
+from mplearn_agents.terminal.exit_codes import BAD_INPUT, INTERRUPTED, SIGNALLED
 from mplearn_agents.terminal.inert import inert_output
 from mplearn_agents.terminal.interrupts import interrupted
 from mplearn_agents.terminal.plain_warnings import plain_warnings
@@ -26,7 +27,10 @@ from mplearn_agents.terminal.plain_warnings import plain_warnings
 from . import commands
 
 _OF_AN_OPTION = re.compile(r"argument (?P<option>--[\w-]+): (?P<problem>must .*)", re.DOTALL)
-_CODES = """exit codes: 0 done; 1 what was checked is not in order; 2 bad input; 130 interrupted"""
+_CODES = (
+    "exit codes: 0 done; 1 what was checked is not in order; 2 bad input; 130 interrupted (143 by "
+    "SIGTERM)"
+)
 
 
 class _Version(argparse.Action):
@@ -64,13 +68,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         except KeyboardInterrupt:
             pass
         except BaseException:  # a library that is interrupted on the way in raises what it likes
-            if not came.is_set():
+            if not came:
                 raise
         else:
-            if not came.is_set():
+            if not came:
                 return code
         print("mplearn: interrupted", file=sys.stderr)
-        return INTERRUPTED
+        return SIGNALLED + came[0] if came else INTERRUPTED
 
 
 def _run(argv: Sequence[str] | None) -> int:

@@ -304,7 +304,7 @@ def test_interrupted_there_is_no_traceback(library_file):
         "argv = ['perform', sys.argv[1], '--steps', '100000', '--dynamics', 'kinematic']\n"
         "sys.exit(cli.main(argv))"
     )
-    for wait_s in (0.05, 1.5):
+    for wait_s, number in ((0.05, signal.SIGINT), (1.0, signal.SIGTERM), (1.5, signal.SIGINT)):
         with subprocess.Popen(
             [sys.executable, "-c", program, str(library_file)],
             stdout=subprocess.PIPE,
@@ -314,9 +314,9 @@ def test_interrupted_there_is_no_traceback(library_file):
         ) as process:
             process.stdout.readline()
             time.sleep(wait_s)
-            process.send_signal(signal.SIGINT)
+            process.send_signal(number)
             _, err = process.communicate(timeout=60)
-        assert process.returncode == 130, err
+        assert process.returncode == 128 + number, err
         assert err == "mplearn: interrupted\n"
 
 

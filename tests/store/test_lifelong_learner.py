@@ -301,6 +301,43 @@ def test_the_last_hundred_can_be_undone(taught: MotionLearner) -> None:
     assert life.snapshot()[1].name == "name 129"
 
 
+def test_a_hundred_commands_of_every_kind_are_undone_to_the_bit_and_done_again(
+    taught: MotionLearner,
+) -> None:
+    life, rng = life_of(taught), np.random.default_rng(0)
+
+    def known() -> tuple[object, ...]:
+        learner = life.learner
+        labels = dict(life.labels.names), dict(life.labels.notes)
+        frozen = {each.id for each in learner.tree.nodes if each.frozen}
+        graph, seen = learner.graph.state(), learner.chain.state().segments
+        return life.snapshot().version, graph, seen, labels, frozen, learner.paused
+
+    moments = [known()]
+    while len(moments) <= 100:
+        leaves = life.learner.tree.leaves
+        one, two = (int(id) for id in rng.choice(leaves, 2))
+        name = f"name {len(moments)}"
+        cold = life.learner.tree.node(one).frozen
+        kinds = [Rename(one, name), Merge(one, two), Split(one), Delete(one)]
+        kinds += [Unfreeze(one) if cold else Freeze(one), Note(name, one)]
+        kinds += [Resume() if life.learner.paused else Pause()]
+        kind = rng.choice(len(kinds), p=[0.2, 0.15, 0.23, 0.02, 0.2, 0.1, 0.1])
+        try:
+            life.execute(kinds[kind])
+        except MPLearnError:  # frozen, or too few to be split, or merged with itself
+            continue
+        moments.append(known())
+    said = {entry.command.kind for entry in life.entries()}
+    assert {"merge", "split", "delete", "freeze", "rename", "note"} <= said
+    for moment in reversed(moments[:-1]):
+        life.undo()
+        assert known() == moment
+    for moment in moments[1:]:
+        life.redo()
+        assert known() == moment
+
+
 def test_names_follow_what_becomes_of_primitives(taught: MotionLearner) -> None:
     life = life_of(taught)
     life.execute(Rename(2, "wave"))

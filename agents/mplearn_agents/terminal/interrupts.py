@@ -12,26 +12,27 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 @contextmanager
-def interrupted() -> Iterator[threading.Event]:
-    """While this lasts, Ctrl-C raises `KeyboardInterrupt` and sets the event that it yields.
+def interrupted() -> Iterator[list[int]]:
+    """While this lasts, Ctrl-C and SIGTERM raise `KeyboardInterrupt`; yields the signals that came.
 
-    Libraries make another error of it while they are imported, or none: the event says what it was.
-    Outside the main thread it is never set.
+    Libraries make another error of it while they are imported, or none: the list says what it was.
+    Outside the main thread it stays empty.
     """
-    came = threading.Event()
+    came: list[int] = []
     if threading.current_thread() is not threading.main_thread():
         yield came
         return
 
     def handle(number: int, frame: FrameType | None) -> None:
-        came.set()
+        came.append(number)
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGINT, handle)
+    before = {each: signal.signal(each, handle) for each in _SIGNALS}
     try:
         yield came
     finally:
-        signal.signal(signal.SIGINT, before)
+        for each, handler in before.items():
+            signal.signal(each, handler)
 
 
 @contextmanager
