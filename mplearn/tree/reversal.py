@@ -145,9 +145,12 @@ class _Reversal:
         return old is None or bool(old.children) or _content(old) != _content(self.new[id])
 
     def _below(self, id: int) -> list[int]:
+        """Return what goes with a node: not what hangs on an inner one that stays."""
         found, pending = [], list(self.structure.nodes[id].children)
         while pending:
             at = pending.pop()
+            if at in self.new and self.new[at].children:
+                continue
             found.append(at)
             pending += self.structure.nodes[at].children
         return found
