@@ -28,7 +28,8 @@ class PeopleConfig:
             to this tension, unless its person has a leaf in it.
         reach: Distance up to which the next candidate counts in a tension.
         sided: A motion is another's mirror image, not the same, if its distance to the mirror image
-            is below its distance to the motion itself times this.
+            is below its distance to the motion itself times this; of groups of leaves both are
+            averages over all pairs.
         min_exemplars: Members from which on a cluster becomes a leaf while there are several
             people, if that is more than by the rules of the trees. Which leaves are one motion is
             judged by their means, and those of two or three are too rough for it; a newcomer's

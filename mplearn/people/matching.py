@@ -66,7 +66,7 @@ def solve(table: ShapeTable, known: Known, n_people: int, config: PeopleConfig) 
         direct, image = table.distances(levels, known.slots, config.posture)
         unit = unit_of(direct[np.ix_(known.firm, known.firm)], known.people[known.firm], config)
         if not np.isfinite(unit):
-            groups = _agglomerate(direct, known.together, ~known.together, 0.0, 1.0)
+            groups = _agglomerate(direct, direct, known.together, ~known.together, 0.0, 1.0, 0.0)
             break
         before, groups = groups, agglomerate(direct / unit, image / unit, known, config)
         if np.array_equal(before, groups):
@@ -114,7 +114,7 @@ def agglomerate(
 ) -> IntArray:
     """Join leaves by average link, the least doubtful first; of one person only what is very near.
 
-    What is clearly nearer to the mirror image is the same motion on the other side.
+    What is clearly nearer to the mirror image, on average, is the same motion on the other side.
 
     Args:
         direct: Distances in units, shape (n, n).
@@ -126,12 +126,20 @@ def agglomerate(
         The group of each leaf, named by its first one, shape (n,).
     """
     own = known.people[:, None] == known.people
-    barred = own & (direct > config.link_own) | (image < config.sided * direct) | known.apart
+    barred = own & (direct > config.link_own) | known.apart
     at = np.flatnonzero(known.firm | ~_covered(direct, own, known.firm))
     pairs = np.ix_(at, at)
     groups = np.arange(len(direct))
     groups[at] = at[
-        _agglomerate(direct[pairs], known.together[pairs], barred[pairs], config.link, config.reach)
+        _agglomerate(
+            direct[pairs],
+            image[pairs],
+            known.together[pairs],
+            barred[pairs],
+            config.link,
+            config.reach,
+            config.sided,
+        )
     ]
     return groups
 
@@ -147,16 +155,25 @@ def _covered(direct: FloatArray, own: BoolArray, firm: BoolArray) -> BoolArray:
 
 @njit(cache=True)
 def _agglomerate(
-    matrix: FloatArray, together: BoolArray, barred: BoolArray, link: float, reach: float
+    matrix: FloatArray,
+    image: FloatArray,
+    together: BoolArray,
+    barred: BoolArray,
+    link: float,
+    reach: float,
+    sided: float,
 ) -> IntArray:
-    """Join the pair of least doubt until all doubts exceed ``link``.
+    """Join the pair of least doubt until all doubts exceed ``link``; never mirror images.
 
     Each row remembers its best pair, and looks anew only where what its doubts follow from has
     changed: the pairs of few rows do with each join.
     """
     n = len(matrix)
     groups = np.arange(n)
-    total, sizes, mean = matrix.copy(), np.ones(n), matrix.copy()
+    totals = np.empty((2, n, n))
+    totals[0], totals[1] = matrix, image
+    sizes, means = np.ones(n), totals.copy()
+    mean, mirrored = means[0], means[1]
     barred = barred.copy()
     alive = np.arange(n)
     nearest, second = np.full(n, np.inf), np.full(n, np.inf)
@@ -166,7 +183,7 @@ def _agglomerate(
     for at in range(len(pinned)):
         i, j = groups[pinned[at, 0]], groups[pinned[at, 1]]
         if i != j:
-            alive = _joined(min(i, j), max(i, j), alive, groups, total, sizes, mean, barred)
+            alive = _joined(min(i, j), max(i, j), alive, groups, totals, sizes, means, barred)
     far = np.sqrt(link * reach)
     first = -1
     while True:
@@ -191,7 +208,7 @@ def _agglomerate(
                 others, doubts[i], partners[i] = alive, np.inf, -1
             for j in others:
                 d = mean[i, j]
-                if j > i and d <= far and not barred[i, j]:
+                if j > i and d <= far and not barred[i, j] and mirrored[i, j] >= sided * d:
                     next_i = second[i] if d <= nearest[i] else nearest[i]
                     next_j = second[j] if d <= nearest[j] else nearest[j]
                     doubt = d * d / max(min(next_i, next_j, reach), 1e-12)
@@ -204,7 +221,7 @@ def _agglomerate(
             return groups
         other = partners[first]
         nearer = np.minimum(mean[first], mean[other])
-        alive = _joined(first, other, alive, groups, total, sizes, mean, barred)
+        alive = _joined(first, other, alive, groups, totals, sizes, means, barred)
         for k in alive:
             stale[k] = nearer[k] <= second[k] or mean[first, k] <= second[k]
         stale[first] = True
@@ -216,9 +233,9 @@ def _joined(
     other: int,
     alive: IntArray,
     groups: IntArray,
-    total: FloatArray,
+    totals: FloatArray,
     sizes: FloatArray,
-    mean: FloatArray,
+    means: FloatArray,
     barred: BoolArray,
 ) -> IntArray:
     """Let one group take up another; return what is left."""
@@ -228,10 +245,13 @@ def _joined(
         if groups[k] == other:
             groups[k] = first
     for k in alive:
-        total[first, k] += total[other, k]
-        total[k, first] = total[first, k]
+        for part in range(2):
+            totals[part, first, k] += totals[part, other, k]
+            totals[part, k, first] = totals[part, first, k]
         barred[first, k] |= barred[other, k]
         barred[k, first] = barred[first, k]
         if k != first:
-            mean[first, k] = mean[k, first] = total[first, k] / (sizes[first] * sizes[k])
+            pairs = sizes[first] * sizes[k]
+            for part in range(2):
+                means[part, first, k] = means[part, k, first] = totals[part, first, k] / pairs
     return alive

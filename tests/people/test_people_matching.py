@@ -117,7 +117,7 @@ def test_left_and_right_stay_apart():
     assert same_groups(groups, np.array([0, 1, 2, 3, 1, 2]))
 
 
-def brute_force(matrix, barred, link, reach, pinned=()):
+def brute_force(matrix, image, barred, rules, pinned=()):
     """Average link over all pairs of groups, with nothing kept from one step to the next."""
     groups = [[i] for i in range(len(matrix))]
     for i, j in pinned:
@@ -126,16 +126,20 @@ def brute_force(matrix, barred, link, reach, pinned=()):
             groups.remove(other)
             one += other
     while True:
-        mean = np.array([[matrix[np.ix_(a, b)].mean() for b in groups] for a in groups])
+        mean, mirrored = (
+            np.array([[each[np.ix_(a, b)].mean() for b in groups] for a in groups])
+            for each in (matrix, image)
+        )
         np.fill_diagonal(mean, np.inf)
         best = (np.inf, None)
         for i in range(len(groups)):
             for j in range(i):
-                if not barred[np.ix_(groups[i], groups[j])].any():
+                sided = mirrored[i, j] < rules.sided * mean[i, j]
+                if not (sided or barred[np.ix_(groups[i], groups[j])].any()):
                     rest = np.concatenate((np.delete(mean[i], j), np.delete(mean[j], i)))
-                    doubt = mean[i, j] ** 2 / min(rest.min(initial=np.inf), reach)
+                    doubt = mean[i, j] ** 2 / min(rest.min(initial=np.inf), rules.reach)
                     best = min(best, (doubt, (j, i)))
-        if not best[0] <= link:
+        if not best[0] <= rules.link:
             return groups
         j, i = best[1]
         groups[j] += groups.pop(i)
@@ -172,13 +176,27 @@ def test_leaves_are_joined_as_by_brute_force(seed):
         for k in (seed % 3, seed % 5)
     )
     known = known_of(people, pinned, apart)
-    groups = agglomerate(matrix, np.full_like(matrix, np.inf), known, RULES)
+    image = matrix * rng.uniform(0.5, 2.0, size=matrix.shape) if seed % 2 else matrix + np.inf
+    image = np.maximum(image, image.T)
+    groups = agglomerate(matrix, image, known, RULES)
     barred = (people[:, None] == people) & (matrix > RULES.link_own) | known.apart
     wanted = np.empty(len(people), dtype=int)
-    found = brute_force(matrix, barred, RULES.link, RULES.reach, pinned)
+    found = brute_force(matrix, image, barred, RULES, pinned)
     for k, group in enumerate(found):
         wanted[group] = k
     assert same_groups(groups, wanted)
+
+
+def test_one_pair_near_its_mirror_image_parts_no_groups():
+    people = np.array([0, 1, 2, 3])
+    matrix = np.full((4, 4), 0.5)
+    matrix[[0, 1, 2, 3], [1, 0, 3, 2]] = 0.2
+    image = np.ones_like(matrix)
+    image[1, 2] = image[2, 1] = 0.3  # by chance: the others' say that it is the same side
+    assert len(set(agglomerate(matrix, image, known_of(people), RULES).tolist())) == 1
+    image[:2, 2:] = image[2:, :2] = 0.3
+    groups = agglomerate(matrix, image, known_of(people), RULES)
+    assert same_groups(groups, np.array([0, 0, 2, 2]))
 
 
 def test_what_a_person_said_counts_more():
