@@ -2,7 +2,8 @@
 
 **When a kernel is compiled again.** numba takes a kernel from its cache as long as the kernel's own
 file is as old as it was; what it calls in other files, and the constants it takes from there, are
-compiled into it and may have changed since. `njit` here looks at all of these, too.
+compiled into it and may have changed since. `njit` here looks at all of these, too. What cannot be
+read, as it is of classes that were renamed since, is compiled again as well; numba would raise.
 
 **Entrances.** For each kernel numba makes, besides the kernel, an entrance for Python and one for
 C, which take every array of every record apart: longer to compile than a short kernel itself.
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from contextlib import suppress
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, TypeVar, cast
 
@@ -90,7 +92,12 @@ class _Cache(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         self._look()
-        return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        try:
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except Exception:  # kept of arguments whose classes have other names now, or damaged
+            with suppress(OSError):
+                self._cache_file.flush()  # type: ignore[no-untyped-call]
+            return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         self._look()

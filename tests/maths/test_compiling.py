@@ -66,3 +66,39 @@ def test_a_kernel_is_compiled_again_where_what_it_calls_or_takes_has_changed(out
         renewed = outer(**changed)
         assert renewed(3.0) == result
         assert not renewed.stats.cache_hits
+
+
+TAKER = """
+from mplearn.maths.compiling import njit
+
+@njit(cache=True)
+def total(pair):
+    return pair.x + pair.y
+"""
+TAKEN = """
+from typing import NamedTuple
+
+class {name}(NamedTuple):
+    x: float
+    y: float
+"""
+
+
+def test_a_kernel_is_compiled_again_where_a_class_of_its_arguments_was_renamed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "taker.py").write_text(TAKER)
+    hits = []
+    for k, name in enumerate(("Pair", "Pair", "Couple", "Couple")):
+        taken = tmp_path / "taken.py"
+        taken.write_text(TAKEN.format(name=name))
+        os.utime(taken, ns=(0, 10**9 * (k + 1)))
+        for module in ("taker", "taken"):
+            monkeypatch.delitem(sys.modules, module, raising=False)
+        importlib.invalidate_caches()
+        total = importlib.import_module("taker").total
+        pair = getattr(importlib.import_module("taken"), name)
+        assert total(pair(1.0, 2.0)) == 3.0
+        hits.append(bool(total.stats.cache_hits))
+    assert hits == [False, True, False, True]
