@@ -19,7 +19,7 @@ LEFT, RIGHT, NEITHER = (cast("int", np.int64(side)) for side in (0, 1, -1))
 _LOWEST_M = 0.3  # of the COG, for the pendulum
 
 
-class Now(NamedTuple):
+class BodyState(NamedTuple):
     """One moment.
 
     Attributes:
@@ -54,7 +54,9 @@ class Now(NamedTuple):
 
 
 @kernel
-def sense(robot: ReferenceRobot, q: FloatArray, v: FloatArray, period_s: float, up: int) -> Now:
+def body_state_of(
+    robot: ReferenceRobot, q: FloatArray, v: FloatArray, period_s: float, up: int
+) -> BodyState:
     """Return the moment.
 
     Args:
@@ -93,7 +95,9 @@ def sense(robot: ReferenceRobot, q: FloatArray, v: FloatArray, period_s: float, 
             floor = min(floor, soles[side, :, 2].min())
     rate = np.sqrt(GRAVITY / max(cog[2] - floor, _LOWEST_M))
     dcm = cog[:2] + cog_rate[:2] / rate
-    return Now(q, v, pose, after, spin, cog, cog_rate, feet, foot_rate, soles, floor, rate, dcm)
+    return BodyState(
+        q, v, pose, after, spin, cog, cog_rate, feet, foot_rate, soles, floor, rate, dcm
+    )
 
 
 @kernel

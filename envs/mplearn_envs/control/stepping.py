@@ -18,8 +18,8 @@ from mplearn.recording import FloatArray
 from mplearn_envs.mechanics.reference import ReferenceRobot
 from mplearn_envs.mechanics.support import hull_margin
 
+from .body_state import LEFT, NEITHER, RIGHT, BodyState, sole_middle
 from .capture import Reach, choose_step, landing_place, nearest_inside, support_hull
-from .senses import LEFT, NEITHER, RIGHT, Now, sole_middle
 
 STANDS, SHIFTS, SWINGS = 0, 1, 2
 TOUCHES_M = 0.002  # so low a sole has landed
@@ -57,7 +57,7 @@ class StepLaw(NamedTuple):
     lift_m: float
 
 
-class Mind(NamedTuple):
+class StepState(NamedTuple):
     """What is remembered from one moment to the next; arrays, changed in place.
 
     Attributes:
@@ -82,121 +82,137 @@ class Mind(NamedTuple):
     foot_change: FloatArray
 
 
-def new_mind() -> Mind:
+def new_step_state() -> StepState:
     """Return what is remembered at first: nothing."""
-    return Mind(*(np.zeros(n) for n in (4, 3, 3, 2, 4, 4, 4)))
+    return StepState(*(np.zeros(n) for n in (4, 3, 3, 2, 4, 4, 4)))
 
 
 @kernel
-def swinging(mind: Mind) -> int:
+def swinging(stepping: StepState) -> int:
     """Return the side of the foot that is on its way, -1 for none."""
-    return int(mind.phase[1]) if mind.phase[0] == SWINGS else -1
+    return int(stepping.phase[1]) if stepping.phase[0] == SWINGS else -1
 
 
 @inlined
-def wake(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now, up: int) -> None:
+def begin_stepping(
+    law: StepLaw, robot: ReferenceRobot, stepping: StepState, now: BodyState, up: int
+) -> None:
     """Start to balance by steps.
 
     Args:
         law: What stepping goes by.
         robot: The reference robot.
-        mind: What is remembered; forgotten.
+        stepping: What is remembered; forgotten.
         now: The moment.
         up: Side of the foot that is in the air, -1 for none.
     """
-    for part in (mind.phase, mind.time, mind.place, mind.goal, mind.foot, mind.foot_rate):
+    for part in (
+        stepping.phase,
+        stepping.time,
+        stepping.place,
+        stepping.goal,
+        stepping.foot,
+        stepping.foot_rate,
+    ):
         part[:] = 0.0
-    mind.goal[:] = now.dcm
+    stepping.goal[:] = now.dcm
     if up >= 0:
         step = choose_step(robot.corners, now.feet, now.dcm, now.rate, law.reach, up)
-        _lift(robot, mind, now, up, step.time_s, step.place)
+        _lift(robot, stepping, now, up, step.time_s, step.place)
 
 
 @kernel
-def settled(law: StepLaw, mind: Mind, feet: FloatArray, for_s: float) -> bool:
+def settled(law: StepLaw, stepping: StepState, feet: FloatArray, for_s: float) -> bool:
     """Return whether both feet stand beside each other and the weight has rested between them.
 
     Args:
         law: What stepping goes by.
-        mind: What is remembered.
+        stepping: What is remembered.
         feet: Where the feet are: x, y [m] and yaw [rad], shape (2, 3).
         for_s: How long the weight must have rested [s].
     """
-    rests = mind.phase[0] == STANDS and mind.time[2] >= for_s
+    rests = stepping.phase[0] == STANDS and stepping.time[2] >= for_s
     return bool(rests and _astray(law, feet) < ASTRAY_M)
 
 
 @inlined
-def decide(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> tuple[float, float]:
+def plan_step(
+    law: StepLaw, robot: ReferenceRobot, stepping: StepState, now: BodyState
+) -> tuple[float, float]:
     """Think on by one control period; return where the zero-moment point shall be [m].
 
     Args:
         law: What stepping goes by.
         robot: The reference robot.
-        mind: What is remembered.
+        stepping: What is remembered.
         now: The moment.
     """
-    mind.time[0] += law.period_s
-    if mind.phase[0] == SWINGS:
-        side, left = int(mind.phase[1]), mind.time[1] - mind.time[0]
+    stepping.time[0] += law.period_s
+    if stepping.phase[0] == SWINGS:
+        side, left = int(stepping.phase[1]), stepping.time[1] - stepping.time[0]
         low = now.soles[side, :, 2].min() - now.floor
-        if (mind.time[0] > 0.6 * mind.time[1] and low < TOUCHES_M) or left < -_LATE_S:
-            mind.phase[0], mind.time[0], mind.time[2] = STANDS, 0.0, 0.0
-            mind.goal[:] = now.dcm
-    if mind.phase[0] != SWINGS:
+        if (stepping.time[0] > 0.6 * stepping.time[1] and low < TOUCHES_M) or left < -_LATE_S:
+            stepping.phase[0], stepping.time[0], stepping.time[2] = STANDS, 0.0, 0.0
+            stepping.goal[:] = now.dcm
+    if stepping.phase[0] != SWINGS:
         hull = support_hull(robot.corners, now.feet, NEITHER, 0.0)
-        landed = mind.phase[3] == 0.0 or mind.phase[0] == SHIFTS or mind.time[0] > 0.02
+        landed = stepping.phase[3] == 0.0 or stepping.phase[0] == SHIFTS or stepping.time[0] > 0.02
         if landed and hull_margin(hull, now.dcm[0], now.dcm[1]) < _LEAVES_M:
             step = choose_step(robot.corners, now.feet, now.dcm, now.rate, law.reach, NEITHER)
-            _lift(robot, mind, now, step.side, step.time_s, step.place)
-    if mind.phase[0] == SHIFTS:
-        side = int(mind.phase[1])
+            _lift(robot, stepping, now, step.side, step.time_s, step.place)
+    if stepping.phase[0] == SHIFTS:
+        side = int(stepping.phase[1])
         over = support_hull(robot.corners, now.feet, side, _LIFTS_M)
         if hull_margin(over, now.dcm[0], now.dcm[1]) > 0.0:
-            _lift(robot, mind, now, side, _BACK_S, _beside(law, now.feet, side))
-            mind.phase[2] = 1.0  # back
-    if mind.phase[0] == SWINGS:
-        return _on_one_foot(law, robot, mind, now)
-    return _on_both_feet(law, robot, mind, now)
+            _lift(robot, stepping, now, side, _BACK_S, _beside(law, now.feet, side))
+            stepping.phase[2] = 1.0  # back
+    if stepping.phase[0] == SWINGS:
+        return _on_one_foot(law, robot, stepping, now)
+    return _on_both_feet(law, robot, stepping, now)
 
 
 @inner_kernel
 def _lift(
     robot: ReferenceRobot,
-    mind: Mind,
-    now: Now,
+    stepping: StepState,
+    now: BodyState,
     side: int,
     time_s: float,
     place: FloatArray,
 ) -> None:
     """Begin a step, one to catch."""
-    mind.phase[0], mind.phase[1], mind.phase[2] = SWINGS, side, 0.0
-    mind.phase[3] += 1.0
-    mind.time[0], mind.time[1] = 0.0, time_s
-    mind.place[:] = place
-    mind.foot[:3], mind.foot[3] = now.pose.position[robot.stance.feet[side]], now.feet[side, 2]
-    mind.foot_rate[:3], mind.foot_rate[3] = now.foot_rate[side, :3], now.foot_rate[side, 5]
+    stepping.phase[0], stepping.phase[1], stepping.phase[2] = SWINGS, side, 0.0
+    stepping.phase[3] += 1.0
+    stepping.time[0], stepping.time[1] = 0.0, time_s
+    stepping.place[:] = place
+    stepping.foot[:3], stepping.foot[3] = (
+        now.pose.position[robot.stance.feet[side]],
+        now.feet[side, 2],
+    )
+    stepping.foot_rate[:3], stepping.foot_rate[3] = now.foot_rate[side, :3], now.foot_rate[side, 5]
 
 
 @inlined
-def _on_one_foot(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> tuple[float, float]:
+def _on_one_foot(
+    law: StepLaw, robot: ReferenceRobot, stepping: StepState, now: BodyState
+) -> tuple[float, float]:
     """Move the foot on; return where in the standing sole the zero-moment point shall be."""
-    side = int(mind.phase[1])
-    left = max(mind.time[1] - mind.time[0], 0.0)
+    side = int(stepping.phase[1])
+    left = max(stepping.time[1] - stepping.time[0], 0.0)
     sole = support_hull(robot.corners, now.feet, side, 0.5 * _INSET_M)
-    if mind.phase[2] == 1.0 and hull_margin(sole, now.dcm[0], now.dcm[1]) < -_LOST_M:
-        mind.phase[2] = 0.0
-    if mind.phase[2] == 0.0:
+    if stepping.phase[2] == 1.0 and hull_margin(sole, now.dcm[0], now.dcm[1]) < -_LOST_M:
+        stepping.phase[2] = 0.0
+    if stepping.phase[2] == 0.0:
         if left > _FIXED_S:
             place, _ = landing_place(
                 robot.corners, now.feet[1 - side], side, now.dcm, now.rate, left, law.reach
             )
-            mind.place[:] = place
+            stepping.place[:] = place
         x, y = now.dcm
     else:
-        mind.place[:] = _beside(law, now.feet, side)
+        stepping.place[:] = _beside(law, now.feet, side)
         landing = now.feet.copy()
-        landing[side] = mind.place
+        landing[side] = stepping.place
         here_x, here_y = sole_middle(robot, now.feet, 1 - side)
         there_x, there_y = sole_middle(robot, landing, side)
         growth = np.exp(now.rate * max(left, 0.1))
@@ -204,38 +220,44 @@ def _on_one_foot(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> t
         wanted_y = (1.0 - _INWARDS) * here_y + _INWARDS * there_y
         x = (wanted_x - growth * now.dcm[0]) / (1.0 - growth)
         y = (wanted_y - growth * now.dcm[1]) / (1.0 - growth)
-    _swing(law, robot, mind, now.floor)
+    _swing(law, robot, stepping, now.floor)
     return nearest_inside(sole, x, y)
 
 
 @inlined
-def _on_both_feet(law: StepLaw, robot: ReferenceRobot, mind: Mind, now: Now) -> tuple[float, float]:
+def _on_both_feet(
+    law: StepLaw, robot: ReferenceRobot, stepping: StepState, now: BodyState
+) -> tuple[float, float]:
     """Bring the weight between the feet or over one; return the wanted zero-moment point."""
     left_x, left_y = sole_middle(robot, now.feet, LEFT)
     right_x, right_y = sole_middle(robot, now.feet, RIGHT)
     share = 0.5
-    if mind.phase[0] == SHIFTS:
-        share = 0.0 if mind.phase[1] == 0.0 else 1.0
+    if stepping.phase[0] == SHIFTS:
+        share = 0.0 if stepping.phase[1] == 0.0 else 1.0
     x = share * left_x + (1.0 - share) * right_x
     y = share * left_y + (1.0 - share) * right_y
-    dx, dy = x - mind.goal[0], y - mind.goal[1]
+    dx, dy = x - stepping.goal[0], y - stepping.goal[1]
     far = np.hypot(dx, dy)
     if far > 0.0:
         go = min(_SHIFT_M_S * law.period_s, far) / far
-        mind.goal[0] += go * dx
-        mind.goal[1] += go * dy
+        stepping.goal[0] += go * dx
+        stepping.goal[1] += go * dy
     near = np.hypot(now.dcm[0] - x, now.dcm[1] - y) < _RESTS_M
-    mind.time[2] = mind.time[2] + law.period_s if near else 0.0
-    if mind.phase[0] == STANDS and mind.time[2] > _RESTS_S and _astray(law, now.feet) > ASTRAY_M:
-        mind.phase[0], mind.time[0], mind.time[2] = SHIFTS, 0.0, 0.0
-        if mind.phase[2] == 0.0:  # after a step that caught, the other foot follows
-            mind.phase[1] = 1.0 - mind.phase[1]
+    stepping.time[2] = stepping.time[2] + law.period_s if near else 0.0
+    if (
+        stepping.phase[0] == STANDS
+        and stepping.time[2] > _RESTS_S
+        and _astray(law, now.feet) > ASTRAY_M
+    ):
+        stepping.phase[0], stepping.time[0], stepping.time[2] = SHIFTS, 0.0, 0.0
+        if stepping.phase[2] == 0.0:  # after a step that caught, the other foot follows
+            stepping.phase[1] = 1.0 - stepping.phase[1]
     hull = support_hull(robot.corners, now.feet, NEITHER, _INSET_M)
     strong = 1.0 + law.gain / now.rate
     return nearest_inside(
         hull,
-        mind.goal[0] + strong * (now.dcm[0] - mind.goal[0]),
-        mind.goal[1] + strong * (now.dcm[1] - mind.goal[1]),
+        stepping.goal[0] + strong * (now.dcm[0] - stepping.goal[0]),
+        stepping.goal[1] + strong * (now.dcm[1] - stepping.goal[1]),
     )
 
 
@@ -260,20 +282,20 @@ def _beside(law: StepLaw, feet: FloatArray, side: int) -> FloatArray:
 
 
 @inlined
-def _swing(law: StepLaw, robot: ReferenceRobot, mind: Mind, floor: float) -> None:
+def _swing(law: StepLaw, robot: ReferenceRobot, stepping: StepState, floor: float) -> None:
     """Move the foot that steps on its way: up, and down to its place."""
     h = law.period_s
-    left = max(mind.time[1] - mind.time[0], _FIXED_S)
-    at, rate, change = mind.foot, mind.foot_rate, mind.foot_change
+    left = max(stepping.time[1] - stepping.time[0], _FIXED_S)
+    at, rate, change = stepping.foot, stepping.foot_rate, stepping.foot_change
     for i in range(2):
-        change[i] = _towards(at[i], rate[i], mind.place[i], max(left - 0.02, _LEAST_S))
-    half = 0.45 * mind.time[1]
-    rises = mind.time[0] < half
-    height = floor + robot.stance.foot_position[int(mind.phase[1]), 2]
+        change[i] = _towards(at[i], rate[i], stepping.place[i], max(left - 0.02, _LEAST_S))
+    half = 0.45 * stepping.time[1]
+    rises = stepping.time[0] < half
+    height = floor + robot.stance.foot_position[int(stepping.phase[1]), 2]
     height += law.lift_m if rises else -_DOWN_M
-    until = max(half - mind.time[0] if rises else left, _FIXED_S)
+    until = max(half - stepping.time[0] if rises else left, _FIXED_S)
     change[2] = _towards(at[2], rate[2], height, until)
-    change[3] = _towards(0.0, rate[3], wrap_angle(mind.place[2] - at[3]), left)
+    change[3] = _towards(0.0, rate[3], wrap_angle(stepping.place[2] - at[3]), left)
     rate += h * change
     at += h * rate
 

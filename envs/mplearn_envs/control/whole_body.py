@@ -29,8 +29,8 @@ from mplearn_envs.mechanics.velocity_ik import (
     jacobian_rows,
 )
 
-from .senses import Now, in_base
-from .stepping import SHIFTS, Mind, swinging
+from .body_state import BodyState, in_base
+from .stepping import SHIFTS, StepState, swinging
 
 # Gains [1/s^2, 1/s] and largest accelerations, of 30 rad/s for a foot on its way.
 _SWING = (900.0, 60.0)
@@ -44,7 +44,7 @@ _REACH = 0.985  # of the leg
 _TOUCHES_M = 0.006
 _PROBE_S = 1e-3
 _COG, _TURN = COG.start, ORIENTATION.start  # rows of the Jacobian
-_FORGETS, _OWED = 0.97, 0.4  # a period; share of the torque limit
+_FORGETS, _MOST_TORQUE = 0.97, 0.4  # a period; share of the torque limit
 _WRONG = 0.25  # share of a velocity's gain by which a servo may be wrong
 _STILL = 0.5  # (rad/s)^2: from slower joints less is learned
 _NEAR_LIMIT = 0.2  # share of the way to a joint's limit in one period
@@ -110,8 +110,8 @@ class Upper(NamedTuple):
 def wanted_acceleration(
     law: BodyLaw,
     robot: ReferenceRobot,
-    mind: Mind,
-    now: Now,
+    stepping: StepState,
+    now: BodyState,
     upper: Upper,
     zmp_x: float,
     zmp_y: float,
@@ -121,21 +121,21 @@ def wanted_acceleration(
     Args:
         law: What control goes by.
         robot: The reference robot.
-        mind: Which foot is where on its way.
+        stepping: Which foot is where on its way.
         now: The moment.
         upper: What the rest of the body does.
         zmp_x: Where the zero-moment point shall be [m].
         zmp_y: The same.
     """
     stance, period_s = robot.stance, law.period_s
-    swings = swinging(mind)
+    swings = swinging(stepping)
     change = np.empty(18)
     for side in range(2):
-        _foot(law, robot, mind, now, side, side == swings, change[6 * side : 6 * side + 6])
+        _foot(law, robot, stepping, now, side, side == swings, change[6 * side : 6 * side + 6])
     push = now.rate * now.rate
     change[_COG] = push * (now.cog[0] - zmp_x)
     change[_COG + 1] = push * (now.cog[1] - zmp_y)
-    height = _height(law, robot, mind, now, upper.base[0])
+    height = _height(law, robot, stepping, now, upper.base[0])
     lift = _HEIGHT[0] * (height + now.floor - now.q[2]) - _HEIGHT[1] * now.v[2]
     change[HEIGHT] = min(max(lift, -law.drop), law.rise)
     yaw = now.feet[0, 2] + 0.5 * wrap_angle(now.feet[1, 2] - now.feet[0, 2])
@@ -179,8 +179,8 @@ def wanted_acceleration(
 def _foot(
     law: BodyLaw,
     robot: ReferenceRobot,
-    mind: Mind,
-    now: Now,
+    stepping: StepState,
+    now: BodyState,
     side: int,
     swings: bool,
     out: FloatArray,
@@ -196,22 +196,24 @@ def _foot(
         up = now.pose.position[foot, 2] - now.floor - robot.stance.foot_position[side, 2]
         out[2] -= _STANDING[0] * max(up, 0.0)
         return
-    turn = rotation_error(turn_about_vertical(mind.foot[3], flat), now.pose.rotation[foot])
+    turn = rotation_error(turn_about_vertical(stepping.foot[3], flat), now.pose.rotation[foot])
     for i in range(3):
-        a = law.ahead * mind.foot_change[i]
-        a += _SWING[0] * (mind.foot[i] - now.pose.position[foot, i])
-        a += _SWING[1] * (mind.foot_rate[i] - rate[i])
+        a = law.ahead * stepping.foot_change[i]
+        a += _SWING[0] * (stepping.foot[i] - now.pose.position[foot, i])
+        a += _SWING[1] * (stepping.foot_rate[i] - rate[i])
         out[i] = min(max(a, -law.foot), law.foot)
-        wanted = mind.foot_rate[3] if i == 2 else 0.0
+        wanted = stepping.foot_rate[3] if i == 2 else 0.0
         a = _SWING[0] * turn[i] + _SWING[1] * (wanted - rate[3 + i])
         out[3 + i] = min(max(a, -law.foot_turn), law.foot_turn)
 
 
 @inlined
-def _height(law: BodyLaw, robot: ReferenceRobot, mind: Mind, now: Now, wanted: float) -> float:
+def _height(
+    law: BodyLaw, robot: ReferenceRobot, stepping: StepState, now: BodyState, wanted: float
+) -> float:
     """Return how high the base shall be over the floor, so that both legs will reach [m]."""
-    stance, swings = robot.stance, swinging(mind)
-    out = wanted - (law.crouch_m if mind.phase[3] > 0.0 else 0.0)
+    stance, swings = robot.stance, swinging(stepping)
+    out = wanted - (law.crouch_m if stepping.phase[3] > 0.0 else 0.0)
     for side in range(2):
         foot, thigh = stance.feet[side], stance.thighs[side]
         hip = now.pose.position[thigh]
@@ -220,10 +222,10 @@ def _height(law: BodyLaw, robot: ReferenceRobot, mind: Mind, now: Now, wanted: f
         for i in range(2):
             speed = (now.after.position[thigh, i] - hip[i]) / law.period_s
             if side == swings:
-                left = max(mind.time[1] - mind.time[0], 0.0)
-                d = hip[i] + left * speed - mind.place[i]
-            elif mind.phase[0] == SHIFTS:
-                d = hip[i] + mind.goal[i] - now.cog[i] - now.pose.position[foot, i]
+                left = max(stepping.time[1] - stepping.time[0], 0.0)
+                d = hip[i] + left * speed - stepping.place[i]
+            elif stepping.phase[0] == SHIFTS:
+                d = hip[i] + stepping.goal[i] - now.cog[i] - now.pose.position[foot, i]
             else:
                 speed -= (now.after.position[foot, i] - now.pose.position[foot, i]) / law.period_s
                 d = hip[i] + _AHEAD_S * speed - now.pose.position[foot, i]
@@ -237,7 +239,7 @@ def _height(law: BodyLaw, robot: ReferenceRobot, mind: Mind, now: Now, wanted: f
 
 
 @inlined
-def _cog_rate_of(robot: ReferenceRobot, now: Now, rate: FloatArray) -> FloatArray:
+def _cog_rate_of(robot: ReferenceRobot, now: BodyState, rate: FloatArray) -> FloatArray:
     """Return the COG's velocity that comes of the tracked hinges alone, shape (3,) [m/s]."""
     q = now.q.copy()
     for u in range(robot.upper.shape[0]):
@@ -251,12 +253,12 @@ def _cog_rate_of(robot: ReferenceRobot, now: Now, rate: FloatArray) -> FloatArra
 def command_legs(
     law: BodyLaw,
     robot: ReferenceRobot,
-    mind: Mind,
-    now: Now,
+    stepping: StepState,
+    now: BodyState,
     change: FloatArray,
     needed: FloatArray,
     command: FloatArray,
-    owed: FloatArray,
+    adapted: FloatArray,
 ) -> None:
     """Write the legs' servo commands.
 
@@ -266,16 +268,16 @@ def command_legs(
     Args:
         law: What control goes by.
         robot: The reference robot.
-        mind: Which foot is on its way.
+        stepping: Which foot is on its way.
         now: The moment.
         change: Wanted acceleration, layout of qacc, shape (6 + n,).
         needed: Generalised forces that make it without the ground's, same layout.
         command: Commands of all servos, shape (n,) [rad], in which the legs' are written.
-        owed: Of each joint, the velocity wanted for now [rad/s], the torque by which what the
+        adapted: Of each joint, the velocity wanted for now [rad/s], the torque by which what the
             robot believes of itself is wrong [N m], and the share of the velocity's gain by which
             it is, shape (3, n); brought up to date.
     """
-    stance, swings, period_s = robot.stance, swinging(mind), law.period_s
+    stance, swings, period_s = robot.stance, swinging(stepping), law.period_s
     points, sides = np.empty((8, 3)), np.empty(8, np.int64)
     n = 0
     for side in range(2):
@@ -301,18 +303,19 @@ def command_legs(
                 for i in range(3):
                     torque -= now.pose.axis[j, i] * turning[i]
         v = now.v[6 + j]
-        missed = owed[0, j] - v
+        missed = adapted[0, j] - v
         watch = law.watch if stance.leg_side[k] == swings else 0.0
-        owed[1, j] = _FORGETS * owed[1, j] + watch * missed
-        owed[1, j] = min(max(owed[1, j], -_OWED * law.torque[j]), _OWED * law.torque[j])
-        owed[2, j] += law.learns * missed * v / (v * v + _STILL)
-        owed[2, j] = min(max(owed[2, j], -_WRONG), _WRONG)
-        torque += owed[1, j] + owed[2, j] * law.damping[j] * v
+        most = _MOST_TORQUE * law.torque[j]
+        adapted[1, j] = _FORGETS * adapted[1, j] + watch * missed
+        adapted[1, j] = min(max(adapted[1, j], -most), most)
+        adapted[2, j] += law.learns * missed * v / (v * v + _STILL)
+        adapted[2, j] = min(max(adapted[2, j], -_WRONG), _WRONG)
+        torque += adapted[1, j] + adapted[2, j] * law.damping[j] * v
         torque = min(max(torque, -law.torque[j]), law.torque[j])
         angle = now.q[7 + j]
         rate = now.v[6 + j] + period_s * change[6 + j]
         rate = max(rate, _NEAR_LIMIT * (law.limits[j, 0] - angle) / period_s)
         rate = min(rate, _NEAR_LIMIT * (law.limits[j, 1] - angle) / period_s)
-        owed[0, j] = rate
+        adapted[0, j] = rate
         lead = (torque + law.damping[j] * rate) / law.stiffness[j]
         command[j] = angle + period_s * rate + lead

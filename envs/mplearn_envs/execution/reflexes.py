@@ -13,9 +13,17 @@ from mplearn.maths.rotation_kernels import turn_about_vertical
 from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix, roll_pitch_of
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.control.ankle_feedback import AnkleFeedback, correct, make_ankle_feedback
+from mplearn_envs.control.body_state import body_state_of
 from mplearn_envs.control.capture import Reach
-from mplearn_envs.control.senses import sense
-from mplearn_envs.control.stepping import Mind, StepLaw, decide, new_mind, settled, swinging, wake
+from mplearn_envs.control.stepping import (
+    StepLaw,
+    StepState,
+    begin_stepping,
+    new_step_state,
+    plan_step,
+    settled,
+    swinging,
+)
 from mplearn_envs.control.whole_body import BodyLaw, Upper, command_legs, wanted_acceleration
 from mplearn_envs.mechanics.gravity import holding_torques
 from mplearn_envs.mechanics.inverse_dynamics import free_model
@@ -78,7 +86,7 @@ class Pushes(NamedTuple):
 NO_PUSHES = Pushes(0, np.empty((0, 2), np.int64), np.empty((0, 3)))
 
 
-class Course(NamedTuple):
+class PlannedMotion(NamedTuple):
     """What a plan of K knots and N commands wants, as the loop needs it.
 
     Attributes:
@@ -98,7 +106,7 @@ class Course(NamedTuple):
     up: IntArray
 
 
-class Own(NamedTuple):
+class OwnModel(NamedTuple):
     """What the robot reckons with: its own model of itself, without the ground.
 
     Attributes:
@@ -126,7 +134,7 @@ class Balance(NamedTuple):
     """
 
     robot: ReferenceRobot
-    own: Own
+    own: OwnModel
     ankles: AnkleFeedback
     law: StepLaw
     body: BodyLaw
@@ -144,8 +152,8 @@ class Reflexes:
         self.reference = reference_robot(robot)
         self._model = free_model(robot)
         self._data = mujoco.MjData(self._model)
-        state = (getattr(self._data, name) for name in Own._fields[2:])
-        self._own = Own(self._model._address, self._data._address, *state)
+        state = (getattr(self._data, name) for name in OwnModel._fields[2:])
+        self._own = OwnModel(self._model._address, self._data._address, *state)
         limits = robot.position_limits.copy()
         for knee in robot.knees:
             j = robot.joint_names.index(knee)
@@ -188,7 +196,7 @@ class Reflexes:
         ankles = make_ankle_feedback(self.robot, plan)
         return Balance(self.reference, self._own, ankles, self.law, self.body)
 
-    def course(self, plan: Plan) -> Course:
+    def planned(self, plan: Plan) -> PlannedMotion:
         """Return what a plan wants."""
         q = plan.q
         roll, pitch = np.array([roll_pitch_of(row) for row in q[:, 3:7]]).T
@@ -196,7 +204,7 @@ class Reflexes:
         rate = np.gradient(hinges, plan.knot_s, axis=0)
         change = np.gradient(rate, plan.knot_s, axis=0)
         base = np.column_stack((q[:, 2], roll, pitch))
-        return Course(plan.commands, q, base, rate, change, plan.up.astype(np.int64))
+        return PlannedMotion(plan.commands, q, base, rate, change, plan.up.astype(np.int64))
 
     def arrival(self, plan: Plan, q: FloatArray) -> Reference:
         """Return the reference robot at rest where a robot that has stepped stands.
@@ -206,7 +214,7 @@ class Reflexes:
             q: How it stands, shape (7 + n,).
         """
         ref = self.reference
-        now = sense(ref, q, np.zeros(len(q) - 1), self.law.period_s, -1)
+        now = body_state_of(ref, q, np.zeros(len(q) - 1), self.law.period_s, -1)
         posture, ground = recentred(q, now.feet)
         rest = rest_reference(self.robot)
         end = plan.end.target
@@ -249,18 +257,18 @@ class Progress(NamedTuple):
 
     Attributes:
         knot: Of the plan, at which the robot is, shape (1,).
-        mind: What stepping remembers.
-        awake: 1 once the robot balances by steps, shape (1,).
+        stepping: What stepping remembers.
+        by_steps: 1 once the robot balances by steps, shape (1,).
         command: What the servos got last, shape (n,) [rad].
-        owed: What joints miss, see `command_legs`, shape (3, n).
+        adapted: What joints miss, see `command_legs`, shape (3, n).
         late: Commands that have not reached the servos yet, shape (lag, n) [rad].
     """
 
     knot: IntArray
-    mind: Mind
-    awake: IntArray
+    stepping: StepState
+    by_steps: IntArray
     command: FloatArray
-    owed: FloatArray
+    adapted: FloatArray
     late: FloatArray
 
 
@@ -272,16 +280,16 @@ def new_progress(command: FloatArray, lag: int) -> Progress:
         lag: By how many control periods commands come late.
     """
     late = np.repeat(command[None], lag, axis=0)
-    owed = np.zeros((3, len(command)))
-    knot, awake = np.zeros((2, 1), np.int64)
-    return Progress(knot, new_mind(), awake, command.copy(), owed, late)
+    adapted = np.zeros((3, len(command)))
+    knot, by_steps = np.zeros((2, 1), np.int64)
+    return Progress(knot, new_step_state(), by_steps, command.copy(), adapted, late)
 
 
 @kernel
-def send_watchful(
+def send_with_steps(
     simulated: Simulated,
     balance: Balance,
-    course: Course,
+    planned: PlannedMotion,
     pushes: Pushes,
     progress: Progress,
     track: Track,
@@ -294,7 +302,7 @@ def send_watchful(
     Args:
         simulated: The simulated robot.
         balance: How it keeps its balance.
-        course: What the plan wants.
+        planned: What the plan wants.
         pushes: What pushes the robot.
         progress: Where the robot is in the plan.
         track: Filled at the plan's knots after the first.
@@ -305,42 +313,44 @@ def send_watchful(
     """
     model, data, views = simulated.model, simulated.data, simulated.views
     robot, own, law, body = balance.robot, balance.own, balance.law, balance.body
-    mind, owed, h = progress.mind, progress.owed, law.period_s
-    n_knots = course.q.shape[0] - 1
-    n_steps = course.commands.shape[0] // n_knots
-    still = np.zeros(course.rate.shape[1])
+    stepping, adapted, h = progress.stepping, progress.adapted, law.period_s
+    n_knots = planned.q.shape[0] - 1
+    n_steps = planned.commands.shape[0] // n_knots
+    still = np.zeros(planned.rate.shape[1])
     for knot in range(progress.knot[0] + 1, last + 1):
         at = min(knot, n_knots)
         for step in range((knot - 1) * n_steps, knot * n_steps):
-            views.ctrl[:] = course.commands[min(step, n_knots * n_steps - 1)]
+            views.ctrl[:] = planned.commands[min(step, n_knots * n_steps - 1)]
             views.xfrc_applied[pushes.body, :3] = 0.0
             for p in range(pushes.steps.shape[0]):
                 if pushes.steps[p, 0] <= step < pushes.steps[p, 1]:
                     views.xfrc_applied[pushes.body, :3] += pushes.force[p]
             mj_step1(model, data)
-            woken = False
-            if progress.awake[0] == 0:
+            begins = False
+            if progress.by_steps[0] == 0:
                 mj_subtree_velocity(model, data)
-                woken = correct(balance.ankles, step, views) > ASTRAY_M
-            if woken:
-                progress.awake[0] = 1
-            if progress.awake[0] == 1:
-                up = course.up[at] if woken else swinging(mind)
-                now = sense(robot, views.qpos.copy(), views.qvel.copy(), h, up)
-                if woken:
-                    wake(law, robot, mind, now, up)
-                    owed[0], owed[1] = now.v[6:], 0.0
-                zmp_x, zmp_y = decide(law, robot, mind, now)
+                begins = correct(balance.ankles, step, views) > ASTRAY_M
+            if begins:
+                progress.by_steps[0] = 1
+            if progress.by_steps[0] == 1:
+                up = planned.up[at] if begins else swinging(stepping)
+                now = body_state_of(robot, views.qpos.copy(), views.qvel.copy(), h, up)
+                if begins:
+                    begin_stepping(law, robot, stepping, now, up)
+                    adapted[0], adapted[1] = now.v[6:], 0.0
+                zmp_x, zmp_y = plan_step(law, robot, stepping, now)
                 over = knot > n_knots
                 upper = Upper(
-                    course.base[at],
-                    still if over else course.rate[at],
-                    still if over else course.change[at],
+                    planned.base[at],
+                    still if over else planned.rate[at],
+                    still if over else planned.change[at],
                 )
-                change = wanted_acceleration(body, robot, mind, now, upper, zmp_x, zmp_y)
+                change = wanted_acceleration(body, robot, stepping, now, upper, zmp_x, zmp_y)
                 own.qpos[:], own.qvel[:], own.qacc[:] = views.qpos, views.qvel, change
                 mj_inverse(own.model, own.data)
-                command_legs(body, robot, mind, now, change, own.qfrc_inverse, views.ctrl, owed)
+                command_legs(
+                    body, robot, stepping, now, change, own.qfrc_inverse, views.ctrl, adapted
+                )
             progress.command[:] = views.ctrl
             if progress.late.shape[0] > 0:
                 slot = step % progress.late.shape[0]
@@ -350,13 +360,13 @@ def send_watchful(
         progress.knot[0] = knot
         if knot <= n_knots:
             track.q[knot], track.v[knot] = views.qpos, views.qvel
-        drop = _DROP_M if progress.awake[0] == 1 else FALL_DROP_M
-        if has_fallen(views.qpos, course.q[at], drop):
+        drop = _DROP_M if progress.by_steps[0] == 1 else FALL_DROP_M
+        if has_fallen(views.qpos, planned.q[at], drop):
             return True, True
         if knot >= n_knots:
-            if progress.awake[0] == 0:
+            if progress.by_steps[0] == 0:
                 return False, True
             feet = places(robot.tree, robot.stance.feet, views.qpos.reshape(1, -1))[0]
-            if settled(law, mind, feet, RESTS_S):
+            if settled(law, stepping, feet, RESTS_S):
                 return False, True
     return False, False

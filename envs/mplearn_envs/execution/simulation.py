@@ -21,7 +21,7 @@ from mplearn_envs.robot.feet import sole_corners
 
 from .bodies import NOMINAL, Body, body_model, draw_pushes, embody
 from .mujoco_loop import Simulated, Track, send
-from .reflexes import LONGEST_S, NO_PUSHES, Pushes, Reflexes, new_progress, send_watchful
+from .reflexes import LONGEST_S, NO_PUSHES, Pushes, Reflexes, new_progress, send_with_steps
 from .tracking_report import FALL_DROP_M, assess, has_fallen
 from .tracking_report import TrackingReport as TrackingReport
 
@@ -168,11 +168,11 @@ class Simulation:
         progress = new_progress(self.data.ctrl, self._drawn.lag)
         track = Track.begin(self.data, n_knots)
         robot = Simulated.of(self.model, self.data, self._feet)
-        what = robot, reflexes.balance(plan), reflexes.course(plan), pushes, progress
+        what = robot, reflexes.balance(plan), reflexes.planned(plan), pushes, progress
         fallen, over = False, False
         while not over and progress.knot[0] < longest:
             last = min(int(progress.knot[0]) + at_once, longest)
-            fallen, over = send_watchful(*what, track, last)
+            fallen, over = send_with_steps(*what, track, last)
             self._update_positions()
             if on_frame is not None:
                 on_frame()
@@ -180,7 +180,7 @@ class Simulation:
         done = int(progress.knot[0])
         known = min(done, n_knots) + 1
         report = self._assess(plan, track, known, fallen)
-        if report.fallen or not progress.awake[0]:
+        if report.fallen or not progress.by_steps[0]:
             return report
         end = reflexes.arrival(plan, self.data.qpos)
         back = reflexes.return_commands(end, progress.command)
@@ -194,7 +194,7 @@ class Simulation:
         return report._replace(
             fallen=self._diverged() or has_fallen(self.data.qpos, end.q, FALL_DROP_M),
             duration_s=done * plan.knot_s + len(back) * reflexes.law.period_s,
-            n_steps=int(progress.mind.phase[3]),
+            n_steps=int(progress.stepping.phase[3]),
             end=end,
         )
 
