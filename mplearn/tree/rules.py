@@ -169,7 +169,7 @@ def split_mixed(structure: Structure, leaf: Node, when: int) -> Change:
     return structure.split(leaf, [[leaf.members[i] for i in branch] for branch in branches], when)
 
 
-def shed_strangers(structure: Structure, leaf: Node, when: int) -> Change:
+def shed_outliers(structure: Structure, leaf: Node, when: int) -> Change:
     """Let a leaf keep its core only where it is wider than motions lie apart.
 
     While little was known its radius reached other motions, which it took in. What is no part of
@@ -185,10 +185,10 @@ def shed_strangers(structure: Structure, leaf: Node, when: int) -> Change:
         return Change()
     usual = nearest_usual(matrix[np.ix_(core, core)])
     away = [g for g in groups if matrix[np.ix_(g, core)].min() > config.split_gap * usual]
-    strangers = [leaf.members[i] for group in away for i in group]
-    if not strangers:
+    outliers = [leaf.members[i] for group in away for i in group]
+    if not outliers:
         return Change()
-    return structure.shed(leaf, strangers).then(form_primitives(structure, structure.root, when))
+    return structure.shed(leaf, outliers).then(form_primitives(structure, structure.root, when))
 
 
 def merge_duplicates(structure: Structure, matches: Sequence[Match], when: int) -> Change:

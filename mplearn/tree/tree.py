@@ -40,7 +40,7 @@ from .rules import (
     forget_chances,
     form_primitives,
     merge_duplicates,
-    shed_strangers,
+    shed_outliers,
     split_mixed,
 )
 
@@ -344,7 +344,7 @@ class PrimitiveTree:
         if node.id == ROOT or self.config.local:
             change = form_primitives(structure, node, self.n_seen)
         else:
-            change = shed_strangers(structure, node, self.n_seen)
+            change = shed_outliers(structure, node, self.n_seen)
             recognised = recognised and (number, ROOT) not in change.moved
             if not change.moved:
                 change = split_mixed(structure, node, self.n_seen)
