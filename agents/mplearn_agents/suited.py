@@ -33,7 +33,9 @@ class Suited:
 
 SUITED = {
     "goal": Suited(_PATHS),
-    "follow": Suited(("mirror",), ("search",), "feature", 80_000),
+    "follow": Suited(
+        ("mirror", "hindsight", "experienced", "oracle"), ("search",), "feature", 80_000
+    ),
     "recite": Suited(_PATHS),
     "free": Suited(),
 }

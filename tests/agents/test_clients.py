@@ -1,8 +1,8 @@
 """Other people's reinforcement learning: they make it, step it and keep to its masks.
 
-Stable-Baselines3, sb3-contrib and RLlib are in `test_compliance`, Minari in `test_offline`. These
-here are in no extra, for some pin what others do not: each test is skipped where its client is not
-installed.
+Stable-Baselines3 and sb3-contrib are in `test_compliance`, RLlib in `test_rllib`, Minari in
+`test_offline`. These here are the extra `clients`, and d3rlpy, which pins another gymnasium: each
+test is skipped where its client is not installed.
 """
 
 import importlib

@@ -34,6 +34,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of v1: with whom to play; agents are trained with 'train'",
     )
     parser.add_argument(
+        "--changes",
+        nargs="+",
+        default=["none"],
+        help="of v1's task follow: what changes meanwhile: none, growing, habits, people, all "
+        "(default: none)",
+    )
+    parser.add_argument(
         "--bodies",
         nargs="+",
         default=["nominal"],
@@ -100,6 +107,7 @@ def run(args: argparse.Namespace) -> None:
         env=args.env,
         people=tuple(args.people),
         bodies=tuple(args.bodies),
+        changes=tuple(args.changes),
         speeds=tuple(args.speeds),
     )
     comparisons = [comparison]

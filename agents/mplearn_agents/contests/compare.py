@@ -23,6 +23,11 @@ from mplearn_agents.episodes import Episode
 
 COLUMNS = ("task", "dynamics", "policy", "return", "share of the best", "success", "falls", "time")
 CONFIDENCE = 0.95
+ORACLE = "oracle"
+REGRET = (
+    " The regret is what the return misses, in the same episodes, of that of the oracle, who knows "
+    "the graph."
+)
 
 
 def compare(
@@ -84,21 +89,25 @@ def _table(
     comparison: Comparison, task: str, played: Mapping[str, Sequence[Sequence[Sequence[Episode]]]]
 ) -> Table:
     """Return a task's table; ``played``: the episodes of each contestant, seed and game."""
-    games = comparison.games
+    games, regrets = comparison.games(task), ORACLE in played
     rows = [
-        (task, game.name, name, *_cells([games[k] for games in of_seeds]))
+        (
+            *(task, game.name, name, *_cells([games[k] for games in of_seeds])),
+            *([_regret(of_seeds, played[ORACLE], k)] if regrets else []),
+        )
         for k, game in enumerate(games)
         for name, of_seeds in played.items()
     ]
     return Table(
         f"Task {task!r} in {comparison.env}: {len(comparison.seeds)} seeds",
-        COLUMNS,
+        (*COLUMNS, "regret") if regrets else COLUMNS,
         tuple(rows),
         f"Mean over seeds and its {100 * CONFIDENCE:.0f} % interval (Student's t), of "
         f"{comparison.episodes} kinematic or {comparison.simulated_episodes} simulated episodes a "
         f"seed (so few of {', '.join(SLOW)}, too). The return is discounted by time; of the best "
         f"return that is possible, holding is 0 % and all of it 100 %. Agents are "
-        f"trained kinematically, one a seed, for {comparison.steps_of(task)} macro steps.",
+        f"trained kinematically, one a seed, for {comparison.steps_of(task)} macro steps."
+        + (REGRET if regrets else ""),
     )
 
 
@@ -115,6 +124,21 @@ def _cells(results: Sequence[Sequence[Episode]]) -> tuple[str, ...]:
         with_interval(100 * means(lambda e: e.fallen), " %", 1),
         with_interval(means(lambda e: e.duration_s), " s", 1),
     )
+
+
+def _regret(
+    results: Sequence[Sequence[Sequence[Episode]]],
+    oracle: Sequence[Sequence[Sequence[Episode]]],
+    game: int,
+) -> str:
+    """Return what returns miss of the oracle's; both by seed, game and episode."""
+    missed = [
+        np.mean(
+            [best.return_ - own.return_ for own, best in zip(of[game], known[game], strict=True)]
+        )
+        for of, known in zip(results, oracle, strict=True)
+    ]
+    return with_interval(np.array(missed))
 
 
 def _wall_table(task: str, played: Mapping[str, Sequence[Sequence[Sequence[Episode]]]]) -> Table:

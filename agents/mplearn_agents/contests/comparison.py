@@ -14,6 +14,7 @@ from mplearn_agents.suited import NEEDS_TASK, SUITED, suited
 from mplearn_envs.execution.bodies import BodyName
 from mplearn_envs.execution.modes import Dynamics
 from mplearn_envs.tasks import TASKS
+from mplearn_envs.varied.changes import CHANGES
 from mplearn_envs.varied.people import SPLITS
 
 DYNAMICS = get_args(Dynamics)
@@ -41,6 +42,8 @@ class Comparison:
         env: Version of the environment.
         people: Of v1: with whom it is played, one game each. Agents are trained with "train".
         speeds: Among which speeds everyone chooses with the primitive, the usual one first.
+        changes: Of v1's task ``follow``: levels of what changes meanwhile, one game each; see
+            `mplearn_envs.varied.changes`.
         bodies: Levels of what the body is like, simulated; see `mplearn_envs.execution.bodies`.
     """
 
@@ -57,6 +60,7 @@ class Comparison:
     env: EnvVersion = "v0"
     people: tuple[str, ...] = ("train", "test")
     bodies: tuple[str, ...] = ("nominal",)
+    changes: tuple[str, ...] = ("none",)
     speeds: tuple[float, ...] = USUAL_SPEED
 
     def __post_init__(self) -> None:
@@ -66,17 +70,30 @@ class Comparison:
             ("dynamics", DYNAMICS),
             ("people", SPLITS),
             ("bodies", get_args(BodyName)),
+            ("changes", CHANGES),
         ):
             unknown = [name for name in getattr(self, what) if name not in allowed]
             if unknown:
                 raise InvalidValueError(f"{what} must be among {tuple(allowed)}, not {unknown}")
+        if self.changes != ("none",) and self.env != "v1":
+            raise InvalidValueError("changes are those of people of v1: compare with env='v1'")
         if len(self.seeds) < 2:
             raise InvalidValueError(f"an interval needs at least 2 seeds, not {self.seeds}")
 
-    @property
-    def games(self) -> tuple[Game, ...]:
-        """What everyone plays."""
-        return self._games("")
+    def games(self, task: str, name: str = "") -> tuple[Game, ...]:
+        """Return what is played of a task.
+
+        Args:
+            task: The task.
+            name: By whom; who thinks long plays fewer episodes.
+        """
+        return tuple(
+            Game(dynamics, self._n(name, dynamics), body, people, changes)
+            for dynamics in self.dynamics
+            for body in (self.bodies if dynamics == "simulated" else ("nominal",))
+            for people in (self.people if self.env == "v1" else (None,))
+            for changes in (self.changes if task == "follow" else ("none",))
+        )
 
     @property
     def n_contests(self) -> int:
@@ -93,7 +110,7 @@ class Comparison:
         ]
         out = {}
         for name in [*policies, *trainings]:
-            games = self._games(name)
+            games = self.games(task, name)
             training = trainings.get(name)
             out[name] = [
                 Contest(
@@ -113,15 +130,6 @@ class Comparison:
     def steps_of(self, task: str) -> int:
         """Return the macro steps of a training."""
         return suited(task).steps if self.steps is None else self.steps
-
-    def _games(self, name: str) -> tuple[Game, ...]:
-        """Return what a contestant plays."""
-        return tuple(
-            Game(dynamics, self._n(name, dynamics), body, people)
-            for dynamics in self.dynamics
-            for body in (self.bodies if dynamics == "simulated" else ("nominal",))
-            for people in (self.people if self.env == "v1" else (None,))
-        )
 
     def _n(self, name: str, dynamics: str) -> int:
         slow = dynamics == "simulated" or name in SLOW

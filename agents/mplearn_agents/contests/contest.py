@@ -28,18 +28,21 @@ class Game:
         episodes: How many.
         body: What the body is like, see `mplearn_envs.execution.bodies`.
         people: Of v1: with whom; None elsewhere.
+        changes: Of v1's task ``follow``: what changes, see `mplearn_envs.varied.changes`.
     """
 
     dynamics: str
     episodes: int
     body: str = "nominal"
     people: str | None = None
+    changes: str = "none"
 
     @property
     def name(self) -> str:
         """What tables call it."""
         body = "" if self.body == "nominal" else f" {self.body}"
-        return f"{self.dynamics}{body}" + (f", {self.people}" if self.people else "")
+        changes = "" if self.changes == "none" else f", {self.changes} changes"
+        return f"{self.dynamics}{body}" + (f", {self.people}" if self.people else "") + changes
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,11 @@ class Contest:
     def _played(self, game: Game, folder: Path) -> list[Episode]:
         task = FreeTask(ceiling=True) if self.task == "free" else self.task
         options: dict[str, Any] = {"task": task, "dynamics": game.dynamics, "body": game.body}
-        options |= {"library": self.library} if self.env == "v0" else {"people": game.people}
+        options |= (
+            {"library": self.library}
+            if self.env == "v0"
+            else {"people": game.people, "changes": game.changes}
+        )
         options["actions"] = {"speeds": self.speeds}
         name = f"mplearn/PrimitiveHumanoid-{self.env}"
         env = gymnasium.make(name, disable_env_checker=True, **options)

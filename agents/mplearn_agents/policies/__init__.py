@@ -6,18 +6,32 @@ from typing import Any
 
 import gymnasium
 
+from mplearn_envs.tasks import FollowTask
+
 from .base import Policy as Policy
 from .base import legal_actions as legal_actions
 from .base import transition_prior as transition_prior
 from .experienced import Experienced as Experienced
 from .greedy import Greedy as Greedy
+from .hindsight import Foresight as Foresight
+from .hindsight import Hindsight as Hindsight
 from .imitation import Imitation as Imitation
 from .mirror import Mirror as Mirror
+from .outlooks import experienced_follower as experienced_follower
+from .outlooks import hindsight as hindsight
+from .outlooks import oracle as oracle
 from .path_to_goal import PathToGoal as PathToGoal
 from .path_to_goal import PathToTask as PathToTask
 from .random_walk import RandomWalk as RandomWalk
 from .search import Search as Search
 from .uniform import UniformLegal as UniformLegal
+
+
+def experienced(env: gymnasium.Env[Any, Any]) -> Policy:
+    """Return who has explored first, and acts on what was found out, whatever the task wants."""
+    follows = isinstance(env.unwrapped.task, FollowTask)  # type: ignore[attr-defined]
+    return experienced_follower(env) if follows else Experienced.for_env(env)
+
 
 #: All policies by name, each made for an environment.
 POLICIES: dict[str, Callable[[gymnasium.Env[Any, Any]], Policy]] = {
@@ -29,7 +43,9 @@ POLICIES: dict[str, Callable[[gymnasium.Env[Any, Any]], Policy]] = {
     "short-path": partial(PathToTask.for_env, prefer="short"),
     "quick-path": partial(PathToTask.for_env, prefer="quick"),
     "pooled-path": partial(PathToTask.for_env, prefer="quick", pooled=True),
-    "experienced": Experienced.for_env,
+    "experienced": experienced,
     "mirror": lambda _: Mirror(),
+    "hindsight": hindsight,
+    "oracle": oracle,
     "search": Search.for_env,
 }

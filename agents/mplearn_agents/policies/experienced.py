@@ -11,7 +11,7 @@ this, value iteration finds what to do, for whatever goal.
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -112,12 +112,7 @@ class Experienced(Policy):
         """
         from mplearn_envs.tasks import ReciteTask
 
-        if env.spec is None:
-            raise InvalidValueError("a twin needs env.spec, which gymnasium.make supplies")
-        options = {**env.spec.kwargs, "dynamics": "kinematic", "render_mode": None}
-        if hasattr(env.unwrapped, "people"):
-            options["people"] = "train"
-        twin = gymnasium.make(env.spec.id, **options, disable_env_checker=True)
+        twin = twin_of(env)
         experience = explore(twin, steps, seed)
         twin.close()
         task: Any = env.unwrapped.task  # type: ignore[attr-defined]
@@ -193,19 +188,40 @@ class Experienced(Policy):
         return values
 
 
-def explore(env: gymnasium.Env[Any, Any], steps: int, seed: int = 0) -> Experience:
+def twin_of(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
+    """Return a kinematic twin to explore; where there are several people, with those of "train".
+
+    Raises:
+        InvalidValueError: The environment was made otherwise than by `gymnasium.make`.
+    """
+    if env.spec is None:
+        raise InvalidValueError("a twin needs env.spec, which gymnasium.make supplies")
+    options = {**env.spec.kwargs, "dynamics": "kinematic", "render_mode": None}
+    if hasattr(env.unwrapped, "people"):
+        options["people"] = "train"
+    return gymnasium.make(env.spec.id, **options, disable_env_checker=True)
+
+
+def explore(
+    env: gymnasium.Env[Any, Any],
+    steps: int,
+    seed: int = 0,
+    watch: Callable[[Mapping[str, Any]], None] = lambda _: None,
+) -> Experience:
     """Return what is found out by trying in each place what was tried there least.
 
     Args:
         env: The environment.
         steps: Macro steps.
         seed: Of the episodes, and of what is tried first.
+        watch: Told of each observation.
     """
     actor: Any = env.unwrapped
     experience = Experience(actor.capacity, int(actor.action_space.n))
     rng = np.random.default_rng(seed)
     observation, info = env.reset(seed=seed)
     for _ in range(steps):
+        watch(observation)
         place, legal = int(observation["current_primitive"]), _legal(info, experience.capacity)
         action = HOLD
         if legal:

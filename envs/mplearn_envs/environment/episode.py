@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from mplearn.library import PrimitiveLibrary
 from mplearn_envs.execution.performer import PerformerState
 from mplearn_envs.execution.sensors import Measured
 from mplearn_envs.mechanics.reference import Reference
@@ -62,6 +63,20 @@ class Episode(NamedTuple):
         return Episode(measured, choices, current, history, self.time_s + duration_s)
 
 
+class Seen(NamedTuple):
+    """What the robot has seen of its demonstrator.
+
+    Attributes:
+        library: The primitives, with the transitions that were seen.
+        ids: Ids of the primitives that were seen.
+        n_motions: How many motions, since the episode began.
+    """
+
+    library: PrimitiveLibrary
+    ids: frozenset[int]
+    n_motions: int = 0
+
+
 class EpisodeState(NamedTuple):
     """All that the future of an episode depends on."""
 
@@ -70,3 +85,4 @@ class EpisodeState(NamedTuple):
     task: Task
     streams: RandomStreams
     person: int = -1  # whose graph counts, where there are several
+    seen: Seen | None = None  # what the robot has seen, where that grows

@@ -316,6 +316,11 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
 
     # ---- inside
 
+    @property
+    def _version(self) -> str:
+        """What tells libraries apart."""
+        return self.library.version
+
     def _begun(self) -> Episode:
         """Return the episode, over or not."""
         if self._episode is None:
@@ -386,7 +391,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
             "transition_prior": choices.prior_at(self._n_speeds),
             "infeasible": infeasible,
             "dead_end": choices.dead_end,
-            "library_version": self.library.version,
+            "library_version": self._version,
             "primitive": -1 if current is None else current,
             "primitive_name": "" if current is None else self.library[current].name,
             "task": report,

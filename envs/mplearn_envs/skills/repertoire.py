@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Hashable
+from collections.abc import Collection, Hashable
 from typing import Any, NamedTuple
 from weakref import WeakValueDictionary
 
@@ -95,8 +95,14 @@ class Repertoire:
         """Who performs."""
         return self.skills.robot
 
-    def update(self, library: PrimitiveLibrary) -> tuple[int, ...]:
+    def update(
+        self, library: PrimitiveLibrary, known: Collection[int] | None = None
+    ) -> tuple[int, ...]:
         """Take a newer snapshot; primitives that live on keep their slots.
+
+        Args:
+            library: The snapshot.
+            known: Ids of those that a walk may begin with; None: all of them.
 
         Returns:
             Ids of primitives for which there was no slot: they cannot be chosen.
@@ -111,6 +117,7 @@ class Repertoire:
             left_out = self._slots.update(library.ids)
             self.slots = self._slots.of
             self.ids = tuple(sorted(self.slots))
+            self._known = self.ids if known is None else tuple(sorted(known))
             self._after: dict[int, Choices] = {}
             self._starts: FloatArray | None = None
         return left_out
@@ -132,6 +139,10 @@ class Repertoire:
     def primitive(self, slot: int) -> int | None:
         """Return the id of the primitive in a slot; None for hold and for free slots."""
         return self._slots.primitive(slot)
+
+    def begins_with(self, id: int) -> bool:
+        """Return whether a walk may begin with a primitive, where it starts near enough."""
+        return id in self._known
 
     @property
     def feasible_ids(self) -> tuple[int, ...]:
@@ -171,7 +182,7 @@ class Repertoire:
             return self._choices({})
         with self.skills.lock:
             gaps = self._gaps(reference)
-            near = sorted(self.ids, key=lambda id: (gaps[id], id))
+            near = sorted(self._known, key=lambda id: (gaps[id], id))
             # no more is judged than is needed
             first = next((id for id in near if self._starts_on(id, reference.lifted)), None)
             other_feet = first is None

@@ -10,6 +10,7 @@ from mplearn.errors import InvalidValueError
 from .base import Choice as Choice
 from .base import Scene as Scene
 from .base import Task as Task
+from .base import Ways as Ways
 from .follow import FollowTask as FollowTask
 from .free import FreeTask as FreeTask
 from .goal import GoalTask as GoalTask

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from gymnasium import spaces
@@ -33,6 +33,18 @@ class Choice(NamedTuple):
     history: tuple[int, ...]
 
 
+class Ways(Protocol):
+    """How a demonstrator goes on who is there while the robot acts."""
+
+    def prior(self, before: int, time_s: float) -> FloatArray:
+        """Return how likely each slot comes next, shape (capacity,).
+
+        Args:
+            before: Slot of what was performed before.
+            time_s: Time in the episode [s].
+        """
+
+
 class Scene(NamedTuple):
     """Where an episode is between two actions.
 
@@ -48,6 +60,7 @@ class Scene(NamedTuple):
         choices: What may be done next.
         discount: Per second.
         hold_s: Duration of holding [s].
+        ways: How the demonstrator goes on, where that is not what the repertoire says.
     """
 
     repertoire: Repertoire
@@ -61,6 +74,7 @@ class Scene(NamedTuple):
     choices: Choices
     discount: float
     hold_s: float
+    ways: Ways | None = None
 
 
 class Task(ABC):

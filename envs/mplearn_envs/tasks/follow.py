@@ -110,15 +110,15 @@ class FollowTask(Task):
             NoPathError: There is nothing that the robot could do too.
         """
         repertoire = scene.repertoire
-        self._repertoire, self._rng = repertoire, scene.rng
+        self._repertoire, self._rng, self.ways = repertoire, scene.rng, scene.ways
         if scene.choices.dead_end:
             raise NoPathError("the demonstrator can begin with nothing that the robot can do")
         self._first = scene.choices
-        if self._library is repertoire.library:
+        known = self._library
+        self._look_at(repertoire)
+        if self._library is known:
             self._predicted.pop((), None)
         else:
-            self._library = repertoire.library
-            self._predicted: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
             self._usual_s = {
                 id: repertoire.skills.duration_s(id) / self.pace for id in repertoire.feasible_ids
             }
@@ -166,6 +166,7 @@ class FollowTask(Task):
 
     def arrive(self, scene: Scene) -> dict[str, float]:
         """Let time pass: more is recognised."""
+        self._look_at(scene.repertoire)
         self._time_s = scene.time_s
         self._go_on(scene.time_s)
         self._n_recognised = int(np.searchsorted(self._known_s, scene.time_s, side="right"))
@@ -189,20 +190,48 @@ class FollowTask(Task):
             **self._scale.report(),
         }
 
+    def usual_s(self, id: int) -> float:
+        """Return how long a motion usually takes the demonstrator [s]."""
+        return self._usual_s[id]
+
+    def recognised(self, time_s: float) -> list[int]:
+        """Return the ids of what is recognised by a time that has come, in its order."""
+        return self._ids[: int(np.searchsorted(self._known_s, time_s, side="right"))]
+
+    def likely(self, slot: int, time_s: float) -> FloatArray:
+        """Return how the demonstrator really goes on, shape (capacity,): for oracles.
+
+        Args:
+            slot: Of what was performed before.
+            time_s: Time in the episode [s].
+        """
+        if self.ways is not None:
+            return self.ways.prior(slot, time_s)
+        return self._following(self._repertoire.primitive(slot)).prior
+
     # ---- the demonstrator
+
+    def _look_at(self, repertoire: Repertoire) -> None:
+        """Take what the robot knows by now."""
+        self._repertoire = repertoire
+        if self._library is not repertoire.library:
+            self._library = repertoire.library
+            self._predicted: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
 
     def _go_on(self, time_s: float) -> None:
         """Perform until after a time."""
         repertoire = self._repertoire
         while not self._ends_s or self._ends_s[-1] <= time_s:
-            prior = self._following(self._ids[-1] if self._ids else None).prior
+            began_s = self._ends_s[-1] if self._ends_s else 0.0
+            prior = self._first.prior
+            if self._ids:
+                prior = self.likely(repertoire.slots[self._ids[-1]], began_s)
             slot = int(np.searchsorted(np.cumsum(prior), self._rng.random(), side="right"))
             id = repertoire.primitive(min(slot, int(np.flatnonzero(prior)[-1])))
             assert id is not None  # `_following` never leaves hold alone
             lasts_s = self._usual_s[id] * float(
                 np.exp(self.variation * self._rng.standard_normal())
             )
-            began_s = self._ends_s[-1] if self._ends_s else 0.0
             self._known_s.append(began_s + self.recognised_after * lasts_s)
             self._ends_s.append(began_s + lasts_s)
             self._ids.append(id)
