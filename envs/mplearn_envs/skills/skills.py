@@ -159,7 +159,8 @@ class Skills:
             return self._known[id]
 
     def _renew(self, id: int) -> None:
-        generated = self.library.generate([id], style=self.style)
+        rng = np.random.default_rng(id)  # of styles that draw: the same motion everywhere
+        generated = self.library.generate([id], style=self.style, rng=rng)
         frames = self.frames_of(generated)
         if self.upper_body:
             frames = self._standing(frames)

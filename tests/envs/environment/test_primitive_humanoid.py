@@ -1,11 +1,13 @@
 """The environment: masks and priors, macro steps, what they earn."""
 
+import gymnasium
 import numpy as np
 import pytest
 from standing_env import SLOT, legal, make, walk
-from standing_library import MOTIONS
+from standing_library import MOTIONS, standing_library
 
 from mplearn.errors import InvalidValueError
+from mplearn.generation import STYLES
 from mplearn_envs.tasks import Choice, FreeTask, Task
 
 # ---- what may come next
@@ -177,3 +179,18 @@ def test_balance_is_reported():
     *_, info = env.step(SLOT["bow down"])
     assert info["cog_deviation_m"] < 0.01 and np.rad2deg(info["tracking_rmse_rad"]) < 1.0
     assert info["zmp_margin_m"] > 0.05
+
+
+@pytest.mark.parametrize("style", sorted(STYLES))
+def test_each_style_is_performed_and_the_same_everywhere(style):
+    """Of those that draw samples, too."""
+    starts = []
+    for _ in range(2):
+        library = standing_library(("arms up", "arms down"))
+        given = {"library": library, "dynamics": "kinematic", "motion": {"style": style}}
+        env = gymnasium.make("mplearn/PrimitiveHumanoid-v0", **given)
+        _, info = env.reset(seed=0)
+        observation, *_, info = env.step(int(np.flatnonzero(info["action_mask"])[-1]))
+        assert info["primitive"] >= 0 and info["duration_s"] > 0.5
+        starts.append(observation["posture"].tobytes())
+    assert starts[0] == starts[1]
