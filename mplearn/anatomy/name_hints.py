@@ -12,6 +12,12 @@ _SIDES = (
     ("gauche", "droite"),
     ("izquierda", "derecha"),
     ("izq", "der"),
+    ("gauche", "droit"),
+    ("sinistr", "destr"),
+    ("esquerd", "direit"),
+    ("лев", "прав"),
+    ("左", "右"),
+    ("왼", "오른"),
     ("li", "re"),
     ("l", "r"),
 )

@@ -138,7 +138,7 @@ JOINTS_MIDDLE = {
 # joints that are called after the bone below them, as skeletons have them
 BONES_SIDED = {
     "shoulder": "arm upperarm uarm uparm humerus shldr",
-    "elbow": "forearm foarm farm lowerarm lowarm lfarm radius",
+    "elbow": "forearm foarm farm lowerarm lowarm lfarm larm radius",
     "wrist": "hand wrist",
     "hip": "upleg upperleg thigh femur",
     "knee": "leg lowerleg lowleg shin shank calf tibia",

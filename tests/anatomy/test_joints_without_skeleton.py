@@ -26,6 +26,8 @@ _MIDDLE = {
     "Xsens": "Pelvis L5 T8 Neck Head",
     "CMU": "root lowerback thorax lowerneck head",
     "Biped": "Pelvis Spine Spine1 Neck Head",
+    "Theia": "pelvis abdomen torso neck head",
+    "Chinese": "臀 腰 胸 颈 头",
 }
 _SIDED = {
     "LAFAN1": ("LeftShoulder LeftArm LeftForeArm LeftHand", "LeftUpLeg LeftLeg LeftFoot LeftToe"),
@@ -34,6 +36,8 @@ _SIDED = {
               "LeftUpperLeg LeftLowerLeg LeftFoot LeftToe"),
     "CMU": ("lclavicle lhumerus lradius lhand", "lfemur ltibia lfoot ltoes"),
     "Biped": ("L_Clavicle L_UpperArm L_Forearm L_Hand", "L_Thigh L_Calf L_Foot L_Toe0"),
+    "Theia": ("l_clav l_uarm l_larm l_hand", "l_thigh l_shank l_foot l_toes"),
+    "Chinese": ("左肩 左上臂 左前臂 左手", "左大腿 左小腿 左脚 左趾"),
 }
 # fmt: on
 
@@ -41,7 +45,7 @@ _SIDED = {
 def names_in(dialect: str) -> list[str]:
     middle = _MIDDLE[dialect].split()
     arms, legs = (part.split() for part in _SIDED[dialect])
-    other = {"Left": "Right", "L": "R", "l": "r"}
+    other = {"Left": "Right", "L": "R", "l": "r", "左": "右"}
     side = next(word for word in other if arms[0].startswith(word))
 
     def right(names: list[str]) -> list[str]:

@@ -420,7 +420,7 @@ def test_whole_seconds_and_nanoseconds(
 
 
 @pytest.mark.parametrize("long", [True, False])
-@pytest.mark.parametrize("who", ["person_id", "trackingId", "body"])
+@pytest.mark.parametrize("who", ["person_id", "trackingId", "person"])
 def test_people_in_rows_of_their_own_are_takes_of_their_own(
     tmp_path: Path, standing: Recording, points: np.ndarray, who: str, long: bool
 ) -> None:
@@ -445,6 +445,22 @@ def test_people_in_rows_of_their_own_are_takes_of_their_own(
     assert first.markers[:n_frames] == pytest.approx(points[kept], abs=1e-5, nan_ok=True)
     assert second.markers[5:] == pytest.approx(points[kept] + 1.0, abs=1e-5, nan_ok=True)
     assert np.isnan(first.markers[n_frames:]).all() and np.isnan(second.markers[:5]).all()
+
+
+def test_frames_in_steps_are_told(tmp_path: Path, standing: Recording, points: np.ndarray) -> None:
+    path = tmp_path / "a.csv"
+    text = table(points, standing.marker_names, clock=lambda i: str(2 * i))
+    path.write_text("fps,50\n" + text.replace("time", "frame", 1))
+    check(path, points, standing.marker_names, "numbered in steps of 2")
+
+
+def test_times_that_stand_still_are_none(
+    tmp_path: Path, standing: Recording, points: np.ndarray
+) -> None:
+    path = tmp_path / "a_50hz.csv"
+    text = table(points, standing.marker_names, clock=lambda i: f"{i},0.0")
+    path.write_text(text.replace("time", "frame,time", 1))
+    check(path, points, standing.marker_names)
 
 
 def test_several_rows_of_one_point_are_refused(

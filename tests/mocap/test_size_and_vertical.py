@@ -163,6 +163,15 @@ def test_inches_and_the_unit_of_cmus_conversions(
     assert find_unit(points / true_m, names, 1.0).unit_m == true_m
 
 
+def test_numbers_that_no_one_measured_have_no_unit(
+    standing: tuple[np.ndarray, tuple[str, ...]],
+) -> None:
+    points, names = standing
+    with np.errstate(all="ignore"):
+        found = find_unit(points * 1e308, names, 1.0, says_so=False)
+    assert not found.fits
+
+
 @settings(max_examples=60, deadline=None)
 @given(
     seed=st.integers(0, 10_000),

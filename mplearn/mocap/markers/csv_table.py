@@ -228,7 +228,10 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
         cut_off=sheet.cut_off,
     )
     place = {column: k for k, column in enumerate([*clocks, *wanted])}
-    in_order = columns.who is None and columns.points is None
+    several = len(set(texts.get("person", ()))) > 1 and (are_markers or columns.points is not None)
+    if several and "who" not in texts:
+        texts["who"] = texts.pop("person")
+    in_order = columns.points is None and "who" not in texts
     numbers = [i for i in columns.frames if _counts(found[:, place[i]], in_order=in_order)]
     if wanted == measured and not are_markers:  # what is only called a number of frames is measured
         wanted = [i for i in clocks if i in columns.frames and i not in numbers] + wanted
@@ -237,7 +240,7 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
     if not all(columns.names[i] for i in wanted):
         raise bad_file(path, f"columns named {list(columns.names[:6])}", "names, each different")
     times = [(found[:, place[i]], columns.time_unit_s(i)) for i in clocks if i in columns.times]
-    times = [(seconds, unit_s) for seconds, unit_s in times if not np.isnan(seconds).all()]
+    times = [(seconds, unit_s) for seconds, unit_s in times if _goes_on(seconds)]
     if fine_at is not None and len(times) == 1 and _counts(times[0][0]):  # as ROS has stamps
         times = [(times[0][0] + fine_s * found[:, place[fine_at]], 1.0)]
     if not times:  # as pandas writes an index of times
@@ -300,6 +303,12 @@ def _in_si(table: _Table, wanted: list[int], columns: Columns, findings: Finding
             "degrees or millimetres, write (deg) or (mm) behind their names"
         )
     return replace(table, values=values)
+
+
+def _goes_on(seconds: FloatArray) -> bool:
+    """Whether a column holds times at all, and not the same one in every row."""
+    known = seconds[~np.isnan(seconds)]
+    return bool(len(known) and (len(seconds) == 1 or np.ptp(known) > 0))
 
 
 def _counts(values: FloatArray, *, in_order: bool = True) -> bool:
@@ -435,19 +444,29 @@ def _clock(
     rate_hz = rate_hz or rate_beside(path, findings)
     if rate_hz is None or not 0 < rate_hz < np.inf:
         raise bad_file(path, "no rate", f"a column 'time' [s], or {option('rate_hz')}")
+    step = 1.0 if times or table.numbers is None else _usual_step(table.numbers)
+    if step > 1 and hints.rate_hz is None:
+        findings.warn(
+            f"frames are numbered in steps of {step:g}, and {rate_hz:g} Hz is taken for "
+            f"the rate of those that are there; {option('rate_hz')} settles it"
+        )
     return rate_hz, clock
 
 
 def _by_numbers(path: Path, numbers: FloatArray) -> Clock:
     """Return where rows lie by the numbers of their frames, which have a usual step."""
     steps = np.diff(numbers)
-    usual = float(np.median(steps))
+    usual = _usual_step(numbers)
     places = (numbers - numbers[0]) / (usual or 1.0)
     off = (places != np.rint(places)) | (np.concatenate([[1.0], steps]) <= 0)
     if off.any() or places[-1] > 10 * len(numbers) + 1000:
         row = int(np.argmax(off))
         raise bad_file(path, f"frame {numbers[row]:g} in row {row + 1}", "evenly numbered frames")
     return Clock(np.nan, places, False)
+
+
+def _usual_step(numbers: FloatArray) -> float:
+    return float(np.median(np.diff(numbers))) if len(numbers) > 1 else 1.0
 
 
 def _same_steps(one: FloatArray, other: FloatArray) -> bool:

@@ -194,7 +194,7 @@ def _unit_of_an_adult(points: FloatArray, names: tuple[str, ...]) -> float | Non
         for side in [s for s in "lr" if (a, s) in centres and (b, s) in centres] or [""]:
             if (a, side) in centres and (b, side) in centres:
                 apart = np.linalg.norm(centres[a, side] - centres[b, side], axis=1)
-                apart = apart[apart > 0]
+                apart = apart[(apart > 0) & np.isfinite(apart)]
                 if len(apart):
                     ratios.append(length_m / float(np.median(apart)))
     return float(np.median(ratios)) if len(ratios) >= 2 else None
