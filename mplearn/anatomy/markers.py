@@ -31,7 +31,6 @@ LEVEL = 0.15  # of the stature: as high as its landmark, at most so far off
 FLAT_NECK = 0.03  # of the stature: a neck no higher above the shoulders is their middle
 FLAT_PELVIS = 0.012  # of the stature: a pelvis farther from the middle of the hips is not that
 HEADS = (0.4, 1.7)  # how far the middle of the skull is on the way to a head: to its top, or base
-MANY = 1000  # more than the landmarks that a label may mean
 SHOULDERS, HIPS = ("shoulder_l", "shoulder_r"), ("hip_l", "hip_r")
 
 
@@ -194,9 +193,9 @@ def _settled_first(
     Of joints, ``foot``, which is the ankle where nothing else is, chooses before ``toe``.
     """
 
-    def rank(label: str) -> tuple[bool, int]:
+    def rank(label: str) -> tuple[bool, bool, int]:
         count = len(candidates[label])
-        return label not in seen, -count if naming != "skin" and count > 1 else count - MANY
+        return label not in seen, count > 1, count if naming == "skin" else -count
 
     return sorted(candidates, key=rank)
 
@@ -211,11 +210,11 @@ def _of_the_toes(
     if tuple(free) != toes or not label_of.keys() >= set(leg):
         return free[0]
     ankle, knee = (at[label_of[place]] for place in leg)
-    share = _apart(at[label], ankle) / _apart(ankle, knee)
-    if not np.isfinite(share):
+    foot, shank = _apart(at[label], ankle), _apart(ankle, knee)
+    if not (foot > 0 and shank > 0):
         return free[0]
     usual = {toe: _usual(toe, leg[0]) / _usual(*leg) for toe in toes}
-    return min(toes, key=lambda toe: abs(np.log(usual[toe] / max(share, 1e-3))))
+    return min(toes, key=lambda toe: abs(np.log(usual[toe] * shank / foot)))
 
 
 def _share_of_head(found: Mapping[str, str], at: Mapping[str, FloatArray]) -> float | None:
@@ -232,7 +231,8 @@ def _share_of_head(found: Mapping[str, str], at: Mapping[str, FloatArray]) -> fl
     on_us = dict(zip(landmarks.names, places, strict=True))
     ours, our_hips = (0.5 * (on_us[a] + on_us[b]) for a, b in (SHOULDERS, HIPS))
     usual = np.linalg.norm(on_us["skull"] - ours) / np.linalg.norm(ours - our_hips)
-    share = float(usual * _apart(shoulders, hips) / _apart(where["skull"], shoulders))
+    far = _apart(where["skull"], shoulders)
+    share = float(usual * _apart(shoulders, hips) / far) if far > 0 else np.inf
     return share if HEADS[0] < share < HEADS[1] else None
 
 

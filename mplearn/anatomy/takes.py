@@ -43,7 +43,8 @@ def recognise(recording: Recording, *, names: Mapping[str, str] | None = None) -
     Args:
         recording: Markers [m], or joint positions, best with the joints' axes
             (`Hints.joint_axes`). Points without a skeleton that hang together by bones are joints,
-            whatever their names are those of among markers.
+            whatever their names are those of among markers; where these are no whole body, or do
+            not hang together, names tell.
         names: Place of the body by point, for what is known better; "" leaves a point out.
 
     Raises:

@@ -1,5 +1,6 @@
 """Markers with the labels of other systems are the same person."""
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -39,6 +40,18 @@ def test_key_points_are_the_same_person(truth, name, noise_m):
     angles, points = truth.errors(body.apply(noisy))
     assert np.median(angles) < 3.0
     assert np.median(points) < 15.0
+
+
+def test_points_that_lie_on_each_other_end_nothing(truth):
+    recording = labelled("joints of SMPL", truth.body, truth.postures[:5], 25.0, off_m=0.0)
+    one = np.repeat(recording.markers[:, :1], len(recording.marker_names), axis=1)
+    with suppress(BodyError):
+        recognise(replace(recording, frames=one.reshape(5, -1)))
+    names = recording.marker_names
+    for pair in (("left_ankle", "left_knee"), ("left_foot", "left_ankle"), ("head", "neck")):
+        markers = recording.markers.copy()
+        markers[:, names.index(pair[0])] = markers[:, names.index(pair[1])]
+        recognise(replace(recording, frames=markers.reshape(5, -1)))
 
 
 def test_joints_that_keep_their_distances_by_chance_are_known_by_their_names(truth):

@@ -211,6 +211,9 @@ TABLES: dict[str, Change] = {
     "two rows of names": lambda s: two_rows(s, named=True),
     "two rows of names, no name of the index": lambda s: two_rows(s, named=False),
     "a remark below": lambda s: s + "\nEnd of file\n",
+    "a text in front, and lines of nothing": lambda s: re.sub(
+        r"(?m)^", "walk,", s.strip()
+    ).replace("walk,", "trial,", 1).replace("\n", "\n\n") + "\n",
     "means below": lambda s: s + "\nMean,1,2,3\n",
     "bones": lambda s: by_points(s, "time,Bone,X,Y,Z"),
     "kinds of joints": lambda s: by_points(s, "time,jointType,x,y,z"),

@@ -198,9 +198,11 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
 
     def rows() -> Iterator[tuple[int, list[str]]]:
         last = header.start
+        begins: bool | None = None  # whether the first row begins with a number
         for line, cells in sheet.rows(header.start):
             begin = next(cell for cell in cells if cell.strip())
-            if clocks and line > last + 1 and last > header.start and not is_number(begin):
+            begins = is_number(begin) if begins is None else begins
+            if begins and line > last + 1 and last > header.start and not is_number(begin):
                 findings.note(
                     f"what stands from line {line} on, {begin.strip()[:40]!r}, is left out"
                 )
@@ -240,7 +242,9 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
     if not all(columns.names[i] for i in wanted):
         raise bad_file(path, f"columns named {list(columns.names[:6])}", "names, each different")
     times = [(found[:, place[i]], columns.time_unit_s(i)) for i in clocks if i in columns.times]
-    times = [(seconds, unit_s) for seconds, unit_s in times if _goes_on(seconds)]
+    times = [(x, unit_s) for x, unit_s in times if not np.isnan(x).all()]
+    if numbers:  # beside which a clock may stand still
+        times = [(x, unit_s) for x, unit_s in times if len(x) == 1 or np.ptp(x) != 0]
     if fine_at is not None and len(times) == 1 and _counts(times[0][0]):  # as ROS has stamps
         times = [(times[0][0] + fine_s * found[:, place[fine_at]], 1.0)]
     if not times:  # as pandas writes an index of times
@@ -305,12 +309,6 @@ def _in_si(table: _Table, wanted: list[int], columns: Columns, findings: Finding
     return replace(table, values=values)
 
 
-def _goes_on(seconds: FloatArray) -> bool:
-    """Whether a column holds times at all, and not the same one in every row."""
-    known = seconds[~np.isnan(seconds)]
-    return bool(len(known) and (len(seconds) == 1 or np.ptp(known) > 0))
-
-
 def _counts(values: FloatArray, *, in_order: bool = True) -> bool:
     """Whether a column holds numbers of frames: whole, and never going back."""
     return bool(
@@ -346,13 +344,19 @@ def _of_day(path: Path, texts: list[str]) -> FloatArray:
     return np.array(times, dtype=np.float64)
 
 
-def _by_points(path: Path, table: _Table, columns: Columns) -> _Table:
-    """Return a table with a row for each point as one with a row for each frame."""
-    keys = table.numbers if table.numbers is not None else None
+def _keys(path: Path, table: _Table, what: str) -> FloatArray:
+    """Return what tells the frames apart in a table with several rows for each, shape (R,)."""
+    keys = table.numbers
     if keys is None and table.times:
         keys = table.times[0][0]
     if keys is None or np.isnan(keys).any():
-        raise bad_file(path, "a row for each point, without frames or times", "a column 'frame'")
+        raise bad_file(path, f"a row for each {what}, without frames or times", "a column 'frame'")
+    return keys
+
+
+def _by_points(path: Path, table: _Table, columns: Columns) -> _Table:
+    """Return a table with a row for each point as one with a row for each frame."""
+    keys = _keys(path, table, "point")
     frames, first, row = np.unique(keys, return_index=True, return_inverse=True)
     of_points = table.texts["point"]
     if len(set(who := table.texts.get("who", []))) > 1:
@@ -392,14 +396,10 @@ def _by_points(path: Path, table: _Table, columns: Columns) -> _Table:
 def _by_people(path: Path, table: _Table) -> _Table:
     """Return a table with a row for each frame, of one with a row for each person in it."""
     assert table.markers is not None
-    keys = table.numbers if table.numbers is not None else None
-    if keys is None and table.times:
-        keys = table.times[0][0]
     who = table.texts["who"]
     people = {name: k for k, name in enumerate(dict.fromkeys(who))}
     which = np.array([people[name] for name in who], dtype=np.int64)
-    if keys is None or np.isnan(keys).any():
-        raise bad_file(path, f"{len(people)} people without frames or times", "a column 'frame'")
+    keys = _keys(path, table, "person")
     frames, first, row = np.unique(keys, return_index=True, return_inverse=True)
     if len(frames) * len(people) > 4 * len(keys) + 1000:
         raise bad_file(path, f"{len(people)} people in {len(frames)} frames", "most people in each")

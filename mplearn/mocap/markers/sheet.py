@@ -33,6 +33,7 @@ _STEP = re.compile(
     re.I,
 )
 _RATES_HZ = (1.0, 10_000.0)
+_LONGEST = 500  # characters of a remark
 _OPENS = ("[", "(", "{")
 _TRIPLE = re.compile(
     r"\s*[\[({]\s*"
@@ -213,6 +214,9 @@ def find_header(sheet: Sheet) -> Header:
 
 def _said_rate(line: str) -> float | None:
     """Return the rate that a remark says [1/s], perhaps by its step in time, if it says one."""
+    line = line.rstrip(" ,;\t")
+    if len(line) > _LONGEST:
+        return None
     found = _RATE.search(line)
     hertz = _HERTZ.findall(line)
     step = _STEP.search(line)
