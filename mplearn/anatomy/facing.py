@@ -59,6 +59,6 @@ def check_facing(name: str, at: Mapping[str, FloatArray]) -> None:
     if cosines and np.mean(cosines) < MIRRORED:
         raise MirroredError(
             f"{name!r} is mirrored: with left and right as the labels say, feet and face point "
-            f"backwards; is an axis turned round, or are the labels exchanged? {option('names')} "
-            "says which marker sits where"
+            f"backwards; are the axes left-handed ({option('mirrored')}), or are the labels "
+            f"exchanged? {option('names')} says which marker sits where"
         )

@@ -45,8 +45,8 @@ def limbs_left_first(
             seen = ", ".join(f"{why} {value:+.1f}" for why, value in votes)
             raise MirroredError(
                 f"{name!r} is mirrored: its names call the one side left, and by the way it faces "
-                f"it is the right one ({seen}); is an axis turned round, or are the names "
-                f"exchanged? {option('names')} says which joint is which"
+                f"it is the right one ({seen}); are the axes left-handed ({option('mirrored')}), "
+                f"or are the names exchanged? {option('names')} says which joint is which"
             )
         if abs(facing) <= FACES and not said:
             raise BodyError(

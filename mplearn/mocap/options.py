@@ -12,6 +12,7 @@ _COMMAND_LINE = {
     "rate_hz": "--rate",
     "skeleton": "--skeleton",
     "angle_unit": "--angles",
+    "mirrored": "--mirrored",
     "names": "--map",
     "person": "--person",
 }

@@ -31,6 +31,8 @@ class Hints:
         up_axis: The file's axis that points up: ``"x"``, ``"y"``, ``"z"``, or ``"-x"``, ...
         skeleton: The ASF file that belongs to an AMC file.
         angle_unit: What the angles of a BVH or AMC file are in: ``"degrees"`` or ``"radians"``.
+        mirrored: Whether the file's axes are left-handed, as those of Unity and Unreal are: then
+            people would be mirrored, and one axis is turned round.
         joint_axes: With joint positions, also how each joint is turned: three points more
             (``Head>x``), 0.1 m along axes that turn with it.
 
@@ -44,6 +46,7 @@ class Hints:
     up_axis: str | None = None
     skeleton: Path | str | None = None
     angle_unit: str | None = None
+    mirrored: bool = False
     joint_axes: bool = False
 
     def __post_init__(self) -> None:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from known_person import RATE_HZ, Truth
+from rigs import Rig, write_rig
 
 from mplearn.anatomy import recognise
 from mplearn.body import human_body, marker_set
-from mplearn.errors import RecordingError
+from mplearn.errors import BodyError, RecordingError
 from mplearn.mocap import Hints, open_recording
 from mplearn.mocap.skeletons.joint_arrays import LAYOUTS
 
@@ -113,3 +115,33 @@ def test_without_a_rate_the_option_is_named(
     np.save(tmp_path / "a.npy", joints("COCO", landmarks))
     with pytest.raises(RecordingError, match="rate_hz"):
         open_recording(tmp_path / "a.npy")
+
+
+def test_left_handed_axes_are_turned_round_where_that_is_said(
+    tmp_path: Path, truth: Truth, landmarks: dict[str, np.ndarray]
+) -> None:
+    path = tmp_path / "a.npy"
+    np.save(path, joints("MediaPipe", landmarks) * (1.0, -1.0, 1.0))
+    with pytest.raises(BodyError, match=r"left-handed \(Hints\(mirrored="):
+        recognise(open_recording(path, hints=Hints(rate_hz=RATE_HZ)))
+    right = open_recording(path, hints=Hints(rate_hz=RATE_HZ, mirrored=True))
+    angles, off_mm = truth.errors(recognise(right).apply(right))
+    assert np.median(angles) < 3.0 and np.median(off_mm) < 15.0
+
+
+def test_a_skeleton_is_turned_round_as_a_whole(tmp_path: Path, truth: Truth) -> None:
+    path = write_rig(tmp_path / "a.bvh", truth.body, truth.postures[:60], RATE_HZ, Rig())
+    hints = Hints(joint_axes=True)
+    plain = open_recording(path, positions=True, hints=hints)
+    turned = open_recording(path, positions=True, hints=replace(hints, mirrored=True))
+    assert turned.markers == pytest.approx(plain.markers * (1.0, -1.0, 1.0))
+    assert plain.skeleton is not None and turned.skeleton is not None
+    assert turned.skeleton.offsets == pytest.approx(plain.skeleton.offsets * (1.0, -1.0, 1.0))
+    with pytest.raises(BodyError, match=r"left-handed \(Hints\(mirrored="):
+        recognise(turned)
+
+
+def test_angles_are_not_mirrored(tmp_path: Path, truth: Truth) -> None:
+    path = write_rig(tmp_path / "a.bvh", truth.body, truth.postures[:5], RATE_HZ, Rig())
+    with pytest.raises(RecordingError, match="left-handed"):
+        open_recording(path, hints=Hints(mirrored=True))

@@ -36,6 +36,11 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         help="what angles of BVH and AMC files are in (default: found from the motion)",
     )
     group.add_argument(
+        "--mirrored",
+        action="store_true",
+        help="their axes are left-handed, as those of Unity and Unreal: people would be mirrored",
+    )
+    group.add_argument(
         "--map",
         type=Path,
         metavar="FILE",
@@ -93,6 +98,7 @@ def hints_of(args: argparse.Namespace, *, joint_axes: bool = False) -> Hints:
         up_axis=args.up,
         skeleton=args.skeleton,
         angle_unit=args.angles,
+        mirrored=args.mirrored,
         joint_axes=joint_axes,
     )
 
