@@ -98,6 +98,13 @@ def until(check: Callable[[], Any], timeout_s: float = PATIENCE_S, what: str = "
         time.sleep(0.03)
 
 
+def drawn_seldom(page: Any) -> None:
+    """Draw a page eight times a second: without a graphics card sixty cost a core."""
+    page.add_init_script(
+        "window.requestAnimationFrame = (f) => setTimeout(() => f(performance.now()), 125)"
+    )
+
+
 class Teacher:
     """Stands before the cameras and looks at the page.
 
@@ -215,6 +222,7 @@ def session(
     picture: Callable[[Any, str], None] = lambda page, name: None,
     size: tuple[int, int] = (1280, 720),
     theme: str = "light",
+    begin: Callable[[Any], None] = lambda page: None,
     end: Callable[[Any], None] = lambda page: None,
 ) -> dict[str, Any]:
     """Replay the experiment; return what the page shows at its end.
@@ -225,11 +233,13 @@ def session(
         picture: Takes the page at certain moments, and what they are called.
         size: Of the page [px].
         theme: Light or dark.
-        end: What else is done on the page at the end.
+        begin: What is done to the page before it is opened.
+        end: What else is done on it at the end.
     """
     with live("ndjson:0") as (url, _):
         page = opened.new_page(viewport={"width": size[0], "height": size[1]})
         page.add_init_script(f"localStorage.theme ||= '{theme}'")
+        begin(page)
         teacher = Teacher(page, speed)
         page.goto(url)
         to = until(teacher.listening, what="the learner waits for frames")

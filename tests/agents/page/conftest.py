@@ -22,8 +22,11 @@ def chromium():
 
 
 @pytest.fixture
-def new_page(chromium):
-    """Open pages on which nothing goes wrong unseen."""
+def new_page(chromium, request):
+    """Open pages on which nothing goes wrong unseen; a module says whether ``DRAWN_SELDOM``."""
+    from benchmarks.teaching_session import drawn_seldom
+
+    seldom = getattr(request.module, "DRAWN_SELDOM", False)
     opened, errors = [], []
 
     def wrong(message):  # of lost connections the browser itself complains
@@ -33,6 +36,8 @@ def new_page(chromium):
         context = chromium.new_context(viewport={"width": width, "height": height})
         context.add_init_script(f"localStorage.theme ||= '{theme}'")
         page = context.new_page()
+        if seldom:
+            drawn_seldom(page)
         opened.append(context)
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.on("console", lambda m: errors.append(m.text) if wrong(m) else None)

@@ -6,9 +6,10 @@ import psutil
 import pytest
 
 pytest.importorskip("uvicorn", reason="needs the extra 'ui'")
-from benchmarks.teaching_session import NAMES, live, session, until
+from benchmarks.teaching_session import NAMES, drawn_seldom, live, session, until
 
 STARTED_S = 120  # compiling, the first time
+DRAWN_SELDOM = True  # how pages are drawn is tested where no learner and no robot run beside
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +142,7 @@ def test_the_robot_walks_goes_and_stops(address, new_page):
 
 def test_experiment_4_1_of_the_paper(chromium):
     """Four primitives are taught, then their order: figures 6 and 7 of [Kulic2012]."""
-    found = session(chromium, speed=10)
+    found = session(chromium, speed=10, begin=drawn_seldom)
     assert found["learned"] == (4, 0)
     assert sorted(found["meanings"].values()) == sorted(NAMES.values())
     assert sorted(found["tree"]) == sorted(NAMES.values())
