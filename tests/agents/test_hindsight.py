@@ -156,6 +156,14 @@ def test_a_certain_demonstrator_is_followed_to_the_end():
     assert policy.act(observation, info) == 0
 
 
+@pytest.mark.parametrize("policy", [lambda _: Mirror(), hindsight])
+def test_where_one_chooses_the_speed_the_usual_one_is_taken(policy):
+    env = make("none", actions={"speeds": (1.0, 0.7)}, task=FollowTask(deadline_s=8.0))
+    usual = make("none", task=FollowTask(deadline_s=8.0))
+    episodes = [play(each, policy(each), 1, 3) for each in (env, usual)]
+    assert episodes[0] == episodes[1] and not episodes[0][0].illegal
+
+
 def test_other_tasks_and_wrong_foresight_are_refused():
     env = make("none", task="goal")
     with pytest.raises(InvalidValueError, match="needs the task 'follow'"):

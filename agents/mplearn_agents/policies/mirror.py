@@ -27,12 +27,13 @@ class Mirror(Policy):
         """
         mask = legal_actions(info)
         seen = observation["task"]
-        if len(seen) != 3 * mask.size + 2:
+        capacity = (len(seen) - 2) // 3  # the mask has a block of so many for each speed
+        if len(seen) != 3 * capacity + 2 or capacity < 2 or mask.size % capacity:
             raise InvalidValueError(
-                f"this policy needs the task 'follow', which shows {3 * mask.size + 2} numbers, "
-                f"not {len(seen)}"
+                "this policy needs the task 'follow', which shows 3 C + 2 numbers for C slots, "
+                f"not {len(seen)} for {mask.size} actions"
             )
-        recognised = seen[: mask.size]
+        recognised = seen[:capacity]
         slot = int(np.argmax(recognised))
         under_way = recognised[slot] > 0 and seen[-2] < 1.0
         return slot if under_way and mask[slot] else HOLD

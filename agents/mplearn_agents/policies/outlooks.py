@@ -97,7 +97,7 @@ class _Corrected(Outlook):
             return
         if self._last and began_s - self._began_s < longest_s:
             self._ways[self._last, seen.slot] += 1.0
-        if not self._ways[seen.slot].any() or self._last == HOLD:
+        if not self._ways[seen.slot].any() or self._last == HOLD:  # what the robot has seen before
             self._ways[seen.slot] += seen.next
         self._last, self._began_s = seen.slot, began_s
 
@@ -125,8 +125,7 @@ class KnowsWhatItMay(_Corrected):
         task, repertoire = follow_task(env), actor.repertoire
         self._env, self._version = actor, ""
         self.grows = repertoire.growing
-        self._pooled = hasattr(actor, "people")
-        ways = _pooled(repertoire) if self._pooled else _graph(repertoire)
+        ways = _pooled(repertoire) if hasattr(actor, "people") else _graph(repertoire)
         usual_s = _usual_s(repertoire, task.pace)
         super().__init__(ways, usual_s, own_times(repertoire, ways), task.pace * usual_s)
 

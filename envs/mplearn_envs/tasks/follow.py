@@ -190,10 +190,6 @@ class FollowTask(Task):
             **self._scale.report(),
         }
 
-    def usual_s(self, id: int) -> float:
-        """Return how long a motion usually takes the demonstrator [s]."""
-        return self._usual_s[id]
-
     def recognised(self, time_s: float) -> list[int]:
         """Return the ids of what is recognised by a time that has come, in its order."""
         return self._ids[: int(np.searchsorted(self._known_s, time_s, side="right"))]
