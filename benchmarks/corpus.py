@@ -10,7 +10,8 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ import numpy as np
 from mplearn.corpus import Corpus, Progress, learn_corpus, recognise_corpus
 from mplearn.demonstrator import PRIMITIVES, Person, demonstrate, drawn_sequencing, markov_walk
 from mplearn.recording import Recording
+from mplearn.tables import SegmentTable
 
 
 def write_csv(recording: Recording, path: Path) -> None:
@@ -35,19 +37,26 @@ def write_csv(recording: Recording, path: Path) -> None:
 
 def make(folder: Path, people: int, takes: int, kinds: int, motions: int, rate_hz: float) -> None:
     """Make the recordings that are not there yet."""
+    for person, who, take, script in scripts(people, takes, kinds, motions):
+        path = folder / person.name / f"take-{take:04d}.csv"
+        if not path.exists():
+            shown = demonstrate(script, seed=1000 * who + take, person=person, rate_hz=rate_hz)
+            write_csv(replace(shown.recording, name=path.stem), path)
+
+
+def scripts(
+    people: int, takes: int, kinds: int, motions: int
+) -> Iterator[tuple[Person, int, int, list[str]]]:
+    """Yield who performs which take, and what it shows."""
     names = round_of(kinds)
     for who in range(people):
         rng = np.random.default_rng((7, who))
         person = Person.random(rng, f"person-{who:02d}")
         order = drawn_sequencing(np.random.default_rng(3), names, person=rng)
         for take in range(takes):
-            path = folder / person.name / f"take-{take:04d}.csv"
-            if path.exists():
-                continue
             walk = markov_walk(np.random.default_rng((who, take)), order)
             script = [name for name, _ in zip(walk, range(motions), strict=False)]
-            shown = demonstrate(script, seed=1000 * who + take, person=person, rate_hz=rate_hz)
-            write_csv(replace(shown.recording, name=path.stem), path)
+            yield person, who, take, script
 
 
 def round_of(kinds: int) -> list[str]:
@@ -102,6 +111,29 @@ def run(argv: Sequence[str] | None = None) -> None:
     print(
         f"recognised: {known} of {len(found.table)} segments in {found.n_takes} takes, "
         f"{found.n_takes / took_s:.2f} takes a second"
+    )
+    shown = scripts(args.people, args.takes, args.kinds, args.motions)
+    say_right(found.table, {f"{who.name}/take-{k:04d}": script for who, _, k, script in shown})
+
+
+def say_right(table: SegmentTable, shown: Mapping[str, list[str]]) -> None:
+    """Say how well a table knows what takes show, of those that are cut into as many motions."""
+    found: defaultdict[str, list[int | None]] = defaultdict(list)
+    for row in table:
+        found[row.take].append(row.primitive)
+    cut = [take for take, ids in found.items() if len(ids) == len(shown[take])]
+    pairs = [pair for take in cut for pair in zip(found[take], shown[take], strict=True)]
+    votes: defaultdict[int, Counter[str]] = defaultdict(Counter)
+    for id, kind in pairs:
+        if id is not None:
+            votes[id][kind] += 1
+    most = [counts.most_common(1)[0] for counts in votes.values()]
+    known, right = sum(counts.total() for counts in votes.values()), sum(n for _, n in most)
+    print(
+        f"{len(cut)} takes are cut into as many motions as they show: of {len(pairs)} motions "
+        f"{known / max(1, len(pairs)):.1%} are recognised, {right / max(1, len(pairs)):.1%} as "
+        f"what they are, {1 - right / max(1, known):.1%} of those recognised as another; "
+        f"{len({kind for kind, _ in most})} kinds own a primitive"
     )
 
 
