@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,8 @@ from ..library import RecognisedSegment, SegmentTable
 from ..recording import FloatArray
 
 Unit: TypeAlias = Literal["person", "take"]
+
+_NUMBER = re.compile(r"([0-9]+)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +66,14 @@ def grouped(table: SegmentTable, unit: Unit) -> dict[str, dict[str, list[Recogni
 
 
 def names_of(table: SegmentTable) -> tuple[str, ...]:
-    """Return the names of the primitives that a table holds, in order."""
-    return tuple(sorted({row.name for row in table if row.name}))
+    """Return the names of the primitives that a table holds, in order: P2 before P10."""
+    return tuple(sorted({row.name for row in table if row.name}, key=_natural))
+
+
+def _natural(name: str) -> tuple[list[tuple[int, str]], str]:
+    """Return what names are ordered by: numbers in them by their size, all else as text."""
+    parts = [part.lstrip("0") if k % 2 else part for k, part in enumerate(_NUMBER.split(name))]
+    return [(len(part) if k % 2 else 0, part) for k, part in enumerate(parts)], name
 
 
 def _measured(

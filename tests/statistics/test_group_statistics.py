@@ -48,6 +48,12 @@ TABLE = SegmentTable(
 )
 
 
+def test_primitives_come_in_the_order_in_which_people_count() -> None:
+    order = ["P", "P1", "P01x", "P2", "P10", "P10 a", "P10 b", "P٣", "b2", "b10", "²"]
+    table = SegmentTable([row("t", 0.0, 1.0, name) for name in reversed(order)])
+    assert list(durations(table).primitives) == list(transitions(table).primitives) == order
+
+
 def test_measures_are_what_one_counts() -> None:
     assert repetitions(TABLE).of("anna", "bow") == 3
     assert repetitions(TABLE).of("ben", "bow") == 0
