@@ -3,7 +3,7 @@
 Exit codes, of all commands: 0 done; 1 what was checked is not in order (``doctor``, ``export
 --check``); 2 bad input, with one line on standard error; 130 interrupted, 143 by SIGTERM (``learn``
 writes what it has learned first, and says 130 of either; who looks at a live source ends it by
-Ctrl-C, which is no interruption).
+either, which is no interruption).
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
 """Learning live on the command line: events as they come, an orderly end, a sender."""
 
+import asyncio
 import json
 import os
 import signal
@@ -21,7 +22,7 @@ from mplearn.sources.played import PlayedSource
 from mplearn_agents.cli import main
 from mplearn_agents.learning.live import SOURCES, learn_live
 from mplearn_agents.terminal.event_lines import change_text
-from mplearn_agents.terminal.interrupts import asked_to_stop
+from mplearn_agents.terminal.interrupts import asked_to_stop, python_interrupts
 
 ENV = {**os.environ, "NO_COLOR": "1", "COLUMNS": "120"}
 RUN = [sys.executable, "-m", "mplearn_agents.cli"]
@@ -228,6 +229,15 @@ def test_what_was_learned_before_a_source_broke_is_kept(
     assert "what was learned before is written" in told.out
     assert not kept[1].with_name("life.db-wal").exists()  # it was closed
     assert len(PrimitiveLibrary.load(kept[0])) == len(PrimitiveLibrary.load(kept[1])) > 0
+
+
+def test_sigterm_ends_an_event_loop_as_ctrl_c_does() -> None:
+    async def wait() -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+        await asyncio.sleep(30.0)
+
+    with pytest.raises(KeyboardInterrupt), python_interrupts():
+        asyncio.run(wait())
 
 
 def test_the_first_wish_to_stop_is_noted_and_the_second_interrupts() -> None:

@@ -31,7 +31,8 @@ _STATUS_S = 0.25
 
 def perform(connection: Connection) -> None:
     """Perform until the other end of the connection is closed: what a process runs."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for each in (signal.SIGINT, signal.SIGTERM):  # who serves the page ends it
+        signal.signal(each, signal.SIG_IGN)
     outbox = Outbox(connection)
     try:
         Stage(connection, outbox).run()

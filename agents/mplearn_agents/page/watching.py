@@ -61,7 +61,8 @@ class Watch:
 
 def watch(settings: Watch, connection: Connection) -> None:
     """Watch and learn until the other end of the connection is closed: what a process runs."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for each in (signal.SIGINT, signal.SIGTERM):  # who serves the page ends it
+        signal.signal(each, signal.SIG_IGN)
     outbox = Outbox(connection)
     try:
         Watcher(settings, connection, outbox).run()

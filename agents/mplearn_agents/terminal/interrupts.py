@@ -39,16 +39,22 @@ def interrupted() -> Iterator[list[int]]:
 def python_interrupts() -> Iterator[None]:
     """While this lasts, Ctrl-C goes to Python's own handler: asyncio takes it over from no other.
 
-    Outside the main thread nothing changes.
+    SIGTERM is Ctrl-C then. Outside the main thread nothing changes.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    handlers = (signal.default_int_handler, interrupt)
+    before = {each: signal.signal(each, by) for each, by in zip(_SIGNALS, handlers, strict=True)}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for each, handler in before.items():
+            signal.signal(each, handler)
 
 
 @contextmanager
