@@ -99,6 +99,10 @@ class TreeConfig:
             while no larger cluster is below it.
         pair_extent: And below this share of how far each is from standing still, which is small
             only where they are like each other in shape; inf for no such bound.
+        sequence_share: Two that came in a sequence that came twice, so that what was before both,
+            or after both, is alike as well, are less likely alike by chance: where they are far
+            from all that is known they become a node below this share of the scale; 0 for
+            `pair_share` alone.
         confirmed: Members from which on a primitive is sure; with fewer it is provisional.
         patience: A provisional primitive that nothing has joined after so many further segments is
             forgotten; after four times as many as there are primitives, if that is more.
@@ -158,6 +162,7 @@ class TreeConfig:
     min_exemplars: int = 2
     pair_share: float = newer(0.6, absent=1.0)
     pair_extent: float = newer(1.1, absent=math.inf)
+    sequence_share: float = newer(0.8, absent=0.0)
     confirmed: int = newer(3, absent=1)
     patience: int = newer(64, absent=64)
     reach: float = 1.5
@@ -194,6 +199,7 @@ class TreeConfig:
             extent_share=math.inf,
             pair_share=1.0,
             pair_extent=math.inf,
+            sequence_share=0.0,
             confirmed=1,
             young_reach=0.0,
             least_reach=0.0,
@@ -228,6 +234,7 @@ class TreeConfig:
             "max_chains": 1,
             "scale_power": 0,
             "scale_floor": 0,
+            "sequence_share": 0,
             "min_exemplars": 2,
             "confirmed": 1,
             "patience": 1,

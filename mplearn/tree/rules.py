@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..recording import FloatArray, IntArray
+from ..recording import BoolArray, FloatArray, IntArray
 from .exemplars.spread import moments
 from .nodes.clustering import clusters_below, gap, nearest_usual, separation, two_branches
 from .nodes.node import Node
@@ -65,7 +65,8 @@ def _clusters(
 
     Executions of one motion are nearer to each other than they are to no motion at all. Two that
     are near each other say less than three that are: pairs count only where there is no larger
-    cluster, and must be the nearer.
+    cluster, and must be the nearer; less so where they came in a sequence that came twice, and are
+    nothing that is known.
 
     Args:
         structure: The tree.
@@ -76,15 +77,55 @@ def _clusters(
     config, least = structure.config, structure.least
     extents = np.minimum(structure.memory.bank.extents(members), _FAR)
     sizes = np.sqrt(np.multiply.outer(extents, extents))
+    alike = np.minimum(config.extent_share * sizes, limit)
 
-    def found(limit: float, share: float, least: int) -> list[IntArray]:
-        most = np.clip(np.minimum(share * sizes, limit), 1e-12, _FAR)
-        return clusters_below(matrix / most, 1.0, least)
+    def found(most: FloatArray, least: int) -> list[IntArray]:
+        return clusters_below(matrix / np.clip(most, 1e-12, _FAR), 1.0, least)
 
-    groups = found(limit, config.extent_share, max(least, 3))
+    groups = found(alike, max(least, 3))
     if groups or least > 2:
         return groups
-    return found(config.pair_share * limit, config.pair_extent, least)
+    nearer = config.pair_extent * sizes
+    most = np.minimum(nearer, config.pair_share * limit)
+    twice = np.minimum(nearer, config.sequence_share * limit)
+    loose = (most < matrix) & (matrix <= twice)
+    if loose.any():
+        loose &= _came_in_sequence(structure, members, matrix <= alike)
+        for i in np.flatnonzero(loose.any(axis=0)).tolist():
+            if not _is_new(structure, members[i], limit):
+                loose[i], loose[:, i] = False, False
+        most = np.where(loose, twice, most)
+    return found(most, least)
+
+
+def _came_in_sequence(structure: Structure, members: Sequence[int], alike: BoolArray) -> BoolArray:
+    """Return which two of what waits belong to a sequence that came twice, shape (n, n).
+
+    What came just before both, or just after both, waits too and is alike, or is in one leaf. What
+    follows itself is no sequence.
+
+    Args:
+        structure: The tree.
+        members: Numbers of the segments that wait, as they came.
+        alike: Which of them may be one motion, shape (n, n).
+    """
+    numbers = np.asarray(members)
+    places = {number: i for i, number in enumerate(members)}
+    apart = np.abs(numbers[:, None] - numbers) > 1
+    twice = np.zeros_like(apart)
+    for step in (-1, 1):
+        beside = [number + step for number in members]
+        at = np.array([places.get(number, -1) for number in beside], np.int64)
+        homes = structure.homes(beside)
+        twice |= (at >= 0)[:, None] & (at >= 0) & alike[np.ix_(at, at)]
+        twice |= (homes != ROOT)[:, None] & (homes[:, None] == homes)
+    return np.asarray(apart & twice)
+
+
+def _is_new(structure: Structure, number: int, limit: float) -> bool:
+    """Return whether a segment that waits is farther than a limit from all that is known."""
+    matches = structure.index.search(structure.memory.bank[number], structure.memory.bank)
+    return not matches or matches[0].ratio * structure.index.radius(matches[0].node) > limit
 
 
 def _leaf_of(structure: Structure, members: Sequence[int], limit: float) -> Node | None:

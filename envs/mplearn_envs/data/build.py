@@ -16,6 +16,7 @@ import numpy as np
 from mplearn import LabelledSegment, LearnerConfig, MotionLearner, PrimitiveLibrary, Segment
 from mplearn.demonstrator import PRIMITIVES, demonstrate, markov_script
 from mplearn.learner import PrimitiveBorn, Recognised
+from mplearn.tree import TreeConfig
 
 PATH = Path(__file__).parent / "default.mplearn"
 SEED = 1
@@ -28,7 +29,8 @@ def build_default() -> PrimitiveLibrary:
     script = markov_script(N_MOTIONS, np.random.default_rng(SEED), balance=BALANCE)
     demonstration = demonstrate(script, SEED)
     recording = demonstration.recording
-    config = LearnerConfig(recording.channels, recording.rate_hz, scaffolding=False)  # v0's
+    rules = replace(TreeConfig(), sequence_share=0.0)  # version 0's, as is the next line
+    config = LearnerConfig(recording.channels, recording.rate_hz, scaffolding=False, tree=rules)
     learner = MotionLearner(config)
     votes: defaultdict[int, Counter[str]] = defaultdict(Counter)
     for event in (*learner.learn_many(recording.frames), *learner.end_stream()):

@@ -36,6 +36,7 @@ from mplearn.demonstrator import (
 from mplearn.learner import Recognised, SegmentClosed
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import LabelledSegment, Segment
+from mplearn.tree import TreeConfig
 from mplearn_envs.mechanics.reference import rest_reference
 from mplearn_envs.robot import humanoid
 from mplearn_envs.skills.repertoire import Repertoire
@@ -88,7 +89,8 @@ def taught(people: Collection[int], n_motions: int = N_SHOWN) -> MotionLearner:
     learner: MotionLearner | None = None
     for person in people:
         recording = shown_by(person, n_motions).recording
-        config = LearnerConfig(recording.channels, RATE_HZ, scaffolding=False)  # of the version
+        rules = replace(TreeConfig(), sequence_share=0.0)  # version 1's, as is the next line
+        config = LearnerConfig(recording.channels, RATE_HZ, scaffolding=False, tree=rules)
         learner = learner or MotionLearner(config)
         for _ in learner.learn_recording(recording, at_once=len(recording.frames)):
             pass

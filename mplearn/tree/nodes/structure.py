@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...recording import FloatArray
+from ...recording import FloatArray, IntArray
 from ..config import TreeConfig
 from ..exemplars.memory import SegmentMemory
 from ..placement import ROOT, Change, Merge, Reparent, Split
@@ -68,6 +68,17 @@ class Structure:
     def groups(self) -> dict[int, Sequence[int]]:
         """Numbers of the segments in each node."""
         return {id: node.members for id, node in self.nodes.items()}
+
+    def homes(self, numbers: Sequence[int]) -> IntArray:
+        """Return the ids of the nodes that the search knows these segments in, shape (n,).
+
+        `ROOT` where it knows one in none.
+        """
+        homes, wanted = dict.fromkeys(numbers, ROOT), set(numbers)
+        for id, members in zip(self.index.ids.tolist(), self.index.members, strict=True):
+            if not wanted.isdisjoint(members):
+                homes.update((number, id) for number in wanted.intersection(members))
+        return np.array([homes[number] for number in numbers], np.int64)
 
     def remeasured(self, matrices: Mapping[int, FloatArray]) -> None:
         """Take over distances in the nodes that were measured again."""
