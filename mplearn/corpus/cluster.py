@@ -34,10 +34,12 @@ class RayTasks:
         self._ray: Any = require("ray", "cluster")
         self._own = not self._ray.is_initialized()
         if self._own:
+            kinds = (ConnectionError, ValueError, RuntimeError, self._ray.exceptions.RayError)
             try:
                 self._ray.init(address=address or "local", log_to_driver=False)
-            except (ConnectionError, ValueError, RuntimeError) as error:
-                raise CorpusError(f"no Ray cluster at {address!r}: {error}") from error
+            except kinds as error:
+                where = f"no Ray cluster at {address!r}" if address else "Ray does not start here"
+                raise CorpusError(f"{where}: {_story(error)}") from error
 
     def submit(self, work: Callable[..., T], *args: Any) -> Future[T]:
         """Have ``work(*args)`` done by one of the cluster's workers."""
@@ -50,6 +52,20 @@ class RayTasks:
         """Leave the cluster, or end the one that was started here."""
         if self._own:
             self._ray.shutdown()
+
+
+def _story(error: BaseException | None) -> str:
+    """Return what an error says, and what it was raised from, once each.
+
+    Ray names what it misses, a token (``RAY_AUTH_MODE``) for instance, in either.
+    """
+    told: list[str] = []
+    while error is not None:
+        text = " ".join(str(error).split()) or type(error).__name__
+        if not any(text in other for other in told):
+            told.append(text)
+        error = error.__cause__ or (None if error.__suppress_context__ else error.__context__)
+    return "; ".join(told)
 
 
 def _pass_on(done: Future[T], to: Future[T]) -> None:

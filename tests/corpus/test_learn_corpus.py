@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import psutil
@@ -29,7 +30,7 @@ from mplearn.corpus import (
     learn_corpus,
     recognise_corpus,
 )
-from mplearn.corpus.cluster import _pass_on
+from mplearn.corpus.cluster import RayTasks, _pass_on
 from mplearn.corpus.executors import Here
 from mplearn.corpus.shard import ShardJournal
 from mplearn.errors import CorpusError, InvalidValueError, RecordingError
@@ -149,6 +150,32 @@ def test_what_ray_says_of_an_error_is_left_out() -> None:
         done.set_exception(error)
         _pass_on(done, to)
         assert to.exception() is told
+
+
+@pytest.mark.parametrize("address", ["", "head:6379"])
+def test_the_cause_that_ray_gives_is_named(monkeypatch: pytest.MonkeyPatch, address: str) -> None:
+    class RayError(Exception):
+        """What errors of Ray are, but for those of Python."""
+
+    class Ray:
+        exceptions = SimpleNamespace(RayError=RayError)
+
+        def __init__(self, error: Exception, cause: Exception | None) -> None:
+            self.error, self.cause = error, cause
+
+        def is_initialized(self) -> bool:
+            return False
+
+        def init(self, **_: object) -> None:
+            raise self.error from self.cause
+
+    token = RayError("RAY_AUTH_MODE=token,\n  but no token was found")
+    for error, cause in ((token, None), (RuntimeError(""), token), (ConnectionError("x"), token)):
+        ray = Ray(error, cause)
+        monkeypatch.setattr("mplearn.corpus.cluster.require", lambda *_, ray=ray: ray)
+        with pytest.raises(CorpusError, match="RAY_AUTH_MODE=token, but no token was found") as e:
+            RayTasks(address)
+        assert ("at 'head:6379'" if address else "does not start here") in str(e.value)
 
 
 def _writer_of(into: Path) -> int:
