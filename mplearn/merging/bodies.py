@@ -30,13 +30,9 @@ def merge_bodies(
     """
     mine, theirs, config = first.state(), second.state(), first.config
     numbers = dict(known)
-    pairs = [
-        (_likeness(first, mine, theirs, i, j), i, j)
-        for i in range(mine.n_people)
-        if i not in apart and i not in numbers.values()
-        for j in range(theirs.n_people)
-        if j not in numbers
-    ]
+    free = [i for i in range(mine.n_people) if i not in apart and i not in numbers.values()]
+    others = [j for j in range(theirs.n_people) if j not in numbers]
+    pairs = _likenesses(first, mine, theirs, [(i, j) for i in free for j in others])
     for likeness, i, j in sorted(pairs, reverse=True):
         if likeness > config.caution and j not in numbers and i not in numbers.values():
             numbers[j] = i
@@ -66,20 +62,31 @@ def _summed(
     return mine.squares + (theirs.squares - squares), mine.counts + (theirs.counts - counts)
 
 
-def _likeness(bodies: KnownBodies, mine: BodiesState, theirs: BodiesState, i: int, j: int) -> float:
-    """Return how much better one body than two explains what was seen here and there [nat]."""
-    one, two = mine.means[i], theirs.means[j]
-    given_squares, given_counts = bodies.given
-    squares = mine.squares + theirs.squares - given_squares
-    variance = squares / (mine.counts + theirs.counts - given_counts)
-    doubt = 1.0 + 4.0 / max(mine.blocks[i], 1.0) + 4.0 / max(theirs.blocks[j], 1.0)
+def _likenesses(
+    bodies: KnownBodies, mine: BodiesState, theirs: BodiesState, pairs: list[tuple[int, int]]
+) -> list[tuple[float, int, int]]:
+    """Return for pairs how much better one body than two explains what was seen here and there.
+
+    In nat, before the number of the one here and that of the one there.
+    """
+    if not pairs:
+        return []
+    squares, counts = _summed(bodies, mine, theirs)
+    variance = squares / counts
     people = np.concatenate((mine.means[: mine.n_people], theirs.means[: theirs.n_people]))
     usual = np.nanmean(people, axis=0)
     anybody = bodies.anybody(usual) + variance
     slips = bodies.config.slips
-    same = [bodies.fit(a, b, doubt * variance, slips) for a, b in ((one, two), (two, one))]
-    new = [bodies.fit(each, usual, anybody, 0.5) for each in (one, two)]
-    return 0.5 * (sum(same) - sum(new))
+    found = []
+    for i, j in pairs:
+        one, two = mine.means[i], theirs.means[j]
+        doubt = 1.0 + 4.0 / max(mine.blocks[i], 1.0) + 4.0 / max(theirs.blocks[j], 1.0)
+        same = [bodies.fit(a, b, doubt * variance, slips) for a, b in ((one, two), (two, one))]
+        new = [bodies.fit(each, usual, anybody, 0.5) for each in (one, two)]
+        likeness = 0.5 * (sum(same) - sum(new))
+        if likeness == likeness:  # of who came and went at once no distance is known
+            found.append((likeness, i, j))
+    return found
 
 
 def _add(merged: BodiesState, person: int, mean: FloatArray, blocks: float) -> None:

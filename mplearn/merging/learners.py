@@ -89,9 +89,10 @@ def _merged(learners: Iterable[MotionLearner], names: Sequence[str]) -> tuple[Mo
     all_of_them = list(learners)
     if not all_of_them:
         raise InvalidValueError("at least one learner is needed to merge")
-    if names and len(names) != len(all_of_them):
+    if isinstance(names, str) or (names and len(names) != len(all_of_them)):
+        given = repr(names) if isinstance(names, str) else len(names)
         raise InvalidValueError(
-            f"a name of each of {len(all_of_them)} learners' people is needed, not {len(names)}"
+            f"a name of each of {len(all_of_them)} learners' people is needed, not {given}"
         )
     first, *others = all_of_them
     for other in others:

@@ -10,6 +10,7 @@ from mplearn.body.observer.observer import BLOCK_FRAMES
 from mplearn.demonstrator import Person, demonstrate
 from mplearn.errors import BodyError, InvalidValueError
 from mplearn.merging import merge_observers
+from mplearn.merging.bodies import merge_bodies
 from mplearn.recording import Recording
 
 SIZES = {"small": 1.58, "middle": 1.70, "tall": 1.84}
@@ -159,6 +160,24 @@ def test_merged_observers_know_more_people_than_one_tells_apart(people):
         assert merged.person == number
         merged.restart()
     assert merged.identity.n_people == 3
+
+
+@pytest.mark.parametrize("at", [0, 1, 2])
+def test_who_came_and_went_at_once_is_matched_with_nobody(people, at):
+    names = people["small"].marker_names
+    one, two = (BodyIdentity(names, 100.0).bodies for _ in range(2))
+    seen = {
+        name: distances_of(take.markers[50], rigid_pairs(names)[0]) for name, take in people.items()
+    }
+    for bodies, order in ((one, ["small", "middle"]), (two, ["middle", "small"])):
+        order.insert(at, "nobody")
+        bodies.n_people = len(order)
+        for person, name in enumerate(order):
+            for _ in range(20 * (name in seen)):
+                bodies.learn(person, seen[name])
+    first = [k for k in range(3) if k != at]
+    _, numbers = merge_bodies(one, two, {}, ())
+    assert numbers == {first[0]: first[1], first[1]: first[0], at: 3}
 
 
 def test_rigid_pairs_share_a_segment_and_keep_their_distance(people):

@@ -119,3 +119,5 @@ def test_people_are_who_they_are_told_to_be_whatever_their_bodies(
 def test_as_many_names_as_learners_are_needed(alone) -> None:
     with pytest.raises(InvalidValueError, match="each of 2 learners"):
         merge([alone["tall"], alone["small"]], ["ann"])
+    with pytest.raises(InvalidValueError, match="not 'ab'"):
+        merge([alone["tall"], alone["small"]], "ab")

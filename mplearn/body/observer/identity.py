@@ -257,7 +257,7 @@ class BodyIdentity:
     def meet(self, person: int) -> None:
         """Go on with another person, or the first; somebody new has the number `n_people`."""
         if not 0 <= person <= self.newcomer:
-            raise InvalidValueError(f"person must lie in [0, {self.n_people}], not {person}")
+            raise InvalidValueError(f"person must lie in [0, {self.newcomer}], not {person}")
         self.leave()
         self.person = person
         self.bodies.n_people = max(self.n_people, person + 1)
