@@ -28,6 +28,7 @@ from .markers.trc import TRCReader
 from .markers.ui_prmd import UIPRMDReader
 from .markers.xdf import XDFReader
 from .people import each_person
+from .placing.handedness import right_handed
 from .reader import Hints, Reader, joined
 from .registry import reader_for, reader_of, register_reader, suffixes
 from .resample import resample
@@ -325,25 +326,10 @@ def _read(
         if part.report is None:
             part = replace(part, report=ReadReport(take.reader.format, part.rate_hz))
         if hints is not None and hints.mirrored:
-            part = _mirrored(file, part)
+            part = right_handed(file, part)
         parts.append(part)
     recording = parts[0] if len(parts) == 1 else joined(take.name, parts)
     return recording if rate_hz is None else resample(recording, rate_hz)
-
-
-def _mirrored(path: Path, recording: Recording) -> Recording:
-    """Return points whose axes were left-handed, with y, to the left, turned round."""
-    if not recording.is_markers:
-        raise bad_file(path, "channels that are no points", "points, if axes are left-handed")
-    skeleton, turn = recording.skeleton, np.array((1.0, -1.0, 1.0))
-    assert recording.report is not None
-    notes = (*recording.report.notes, "its axes are taken as left-handed: one is turned round")
-    return replace(
-        recording,
-        frames=(recording.markers * turn).reshape(len(recording), -1),
-        skeleton=None if skeleton is None else replace(skeleton, offsets=skeleton.offsets * turn),
-        report=replace(recording.report, notes=notes),
-    )
 
 
 def _say(recording: Recording, path: Path) -> None:

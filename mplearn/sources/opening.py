@@ -48,7 +48,8 @@ def open_source(
         name: What, as ``"recording:walk.bvh"`` or ``"demonstrator"``; `source_kinds` lists all.
         observe: ``"robot"``: a body is recognised in markers or joints, as in files; or
             ``"positions"`` of markers and joints, or the stream's own ``"channels"``.
-        hints: What the stream does not say about itself: its unit, its vertical axis.
+        hints: What the stream does not say about itself: its unit, its vertical axis, whether its
+            axes are left-handed.
         names: Place of the body by marker or joint, for what is known better.
         at_hz: Frames per second of what is yielded [1/s], or what gives it for the stream's own
             rate, as `mplearn.learner.learnable_rate`; the stream's own where None.

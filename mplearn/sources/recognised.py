@@ -12,6 +12,7 @@ from ..anatomy import BodyMap, recognise
 from ..errors import MPLearnError
 from ..mocap.findings import Findings
 from ..mocap.markers.names import chosen_names
+from ..mocap.placing.handedness import OTHER_HAND, right_handed
 from ..mocap.placing.space import Space, placed
 from ..recording import BoolArray, FloatArray, IntArray, Recording, marker_channels
 from .registry import Wanted
@@ -33,7 +34,8 @@ class Sight:
     Attributes:
         labels: The stream's names of the K points that are used.
         unit_m: Length of the stream's unit [m].
-        turn: Rotation from the stream's axes to z up, shape (3, 3).
+        turn: From the stream's axes to z up, shape (3, 3): a rotation, with one axis turned round
+            where they are left-handed.
         body: Which point is which place; None where positions are learned.
         channels: Names of what comes out.
         report: What was found, a sentence each.
@@ -352,6 +354,9 @@ class RecognisedSource(Source):
                 skeleton=skeleton,
                 report=told,
             )
+            if hints.mirrored:
+                recording, turn = right_handed(path, recording), OTHER_HAND @ turn
+                told = recording.report or told
             report = [f"warning: {text}" for text in told.warnings] + list(told.notes)
         if self._wanted.observe == "positions":
             return Sight(labels, unit_m, turn, None, recording.channels, tuple(report))

@@ -30,6 +30,22 @@ def test_what_the_caller_says_wins(session: Recording) -> None:
     np.testing.assert_array_equal(frames_of(items), session.frames[:200])
 
 
+@pytest.mark.parametrize("observe", ["positions", "robot"])
+def test_left_handed_axes_are_turned_round_where_that_is_said(
+    session: Recording, observe: str
+) -> None:
+    unity = session.markers[:300][..., [1, 2, 0]] * [-1.0, 1.0, 1.0]  # x right, y up, z ahead
+    stream = Stream(session.channels, 100.0, unit_m=1.0, up="y")
+    hints = Hints(mirrored=True)
+    items = seen(blocks(stream, unity.reshape(300, -1)), hints=hints, observe=observe)
+    found, areas = frames_of(items).reshape(300, -1, 3), []
+    for each in (found, session.markers[:300]):  # triangles of markers, from above
+        one, other = each[:, :-2] - each[:, 1:-1], each[:, 2:] - each[:, 1:-1]
+        areas.append(np.cross(one, other)[..., 2])
+    np.testing.assert_allclose(*areas, atol=1e-9)
+    assert any("left-handed" in text for text in texts_of(items, "body"))
+
+
 def test_a_subjects_prefix_falls_away(session: Recording) -> None:
     names = tuple(f"Anna:{name}" for name in session.marker_names)
     items = seen(blocks(Stream(marker_channels(names), 100.0), session.frames[:300]))
