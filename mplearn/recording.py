@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -202,18 +202,22 @@ class Recording:
         if frames.ndim != 2:
             raise RecordingError(f"frames must have shape (T, D), not {frames.shape}")
         given: object = self.channels
-        if isinstance(given, str) or not isinstance(given, Collection):
+        if isinstance(given, (str, set, frozenset)) or not isinstance(given, Collection):
             raise RecordingError(f"channels must be names, one a column, not {given!r:.80}")
         if frames.shape[1] != len(self.channels):
             raise RecordingError(
                 f"{frames.shape[1]} columns need as many channel names, not {len(self.channels)}"
             )
-        number = isinstance(self.rate_hz, (int, float, np.integer, np.floating))
-        if not (number and np.isfinite(self.rate_hz) and self.rate_hz > 0):
-            raise RecordingError(f"rate_hz must be positive and finite, not {self.rate_hz!r:.80}")
+        rate: Any = self.rate_hz
+        if isinstance(rate, np.ndarray) and rate.ndim == 0:  # as an archive of NumPy has it
+            rate = rate.item()
+        number = isinstance(rate, (int, float, np.integer, np.floating))
+        if not (number and np.isfinite(rate) and rate > 0):
+            raise RecordingError(f"rate_hz must be a positive, finite number, not {rate!r:.80}")
         if np.isinf(frames).any():
             raise RecordingError("frames hold infinite values; a missing measurement is NaN")
         object.__setattr__(self, "frames", frames)
+        object.__setattr__(self, "rate_hz", rate)
         object.__setattr__(self, "channels", tuple(self.channels))
         object.__setattr__(self, "labels", tuple(self.labels))
 

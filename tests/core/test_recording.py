@@ -44,7 +44,8 @@ def test_slices_shift_labels_and_drop_cut_ones() -> None:
         (np.full((3, 1), np.inf), 100.0, ("a",), "infinite"),
         (np.zeros((3, 2)), ("a", "b"), 100.0, "channels must be names, one a column, not 100.0"),
         (np.zeros((3, 2)), 100.0, "ab", "'ab'"),
-        (np.zeros((3, 1)), "100", ("a",), "'100'"),
+        (np.zeros((3, 1)), "100", ("a",), "a positive, finite number, not '100'"),
+        (np.zeros((3, 2)), 100.0, {"a", "b"}, "names, one a column"),
         ([["a"]], 100.0, ("a",), "numbers"),
     ],
 )
@@ -53,6 +54,12 @@ def test_a_recording_refuses_what_is_not_one(
 ) -> None:
     with pytest.raises(RecordingError, match=said):
         Recording(frames, rate, channels)
+
+
+def test_a_rate_may_be_as_numpy_keeps_it() -> None:
+    recording = Recording(np.zeros((3, 1)), np.array(50.0), ("a",))  # type: ignore[arg-type]
+    assert recording.rate_hz == 50.0
+    assert isinstance(recording.rate_hz, float)
 
 
 @pytest.mark.parametrize("kind", [Segment, lambda s, e: LabelledSegment(s, e, "x")])
