@@ -100,9 +100,9 @@ class TreeConfig:
         pair_extent: And below this share of how far each is from standing still, which is small
             only where they are like each other in shape; inf for no such bound.
         sequence_share: Two that came in a sequence that came twice, so that what was before both,
-            or after both, is alike as well, are less likely alike by chance: where they are far
-            from all that is known they become a node below this share of the scale; 0 for
-            `pair_share` alone.
+            or after both, is alike as well, are less likely alike by chance: where each is farther
+            than the scale from the node that it fits best they become a node below this share of
+            the scale; 0 for `pair_share` alone.
         confirmed: Members from which on a primitive is sure; with fewer it is provisional.
         patience: A provisional primitive that nothing has joined after so many further segments is
             forgotten; after four times as many as there are primitives, if that is more.

@@ -109,21 +109,20 @@ def _came_in_sequence(structure: Structure, members: Sequence[int], alike: BoolA
         members: Numbers of the segments that wait, as they came.
         alike: Which of them may be one motion, shape (n, n).
     """
-    numbers = np.asarray(members)
+    numbers = np.asarray(members, np.int64)
     places = {number: i for i, number in enumerate(members)}
     apart = np.abs(numbers[:, None] - numbers) > 1
     twice = np.zeros_like(apart)
-    for step in (-1, 1):
-        beside = [number + step for number in members]
-        at = np.array([places.get(number, -1) for number in beside], np.int64)
-        homes = structure.homes(beside)
+    beside = [*(numbers - 1).tolist(), *(numbers + 1).tolist()]
+    waits = np.array([places.get(number, -1) for number in beside], np.int64).reshape(2, -1)
+    for at, home in zip(waits, structure.homes(beside).reshape(2, -1), strict=True):
         twice |= (at >= 0)[:, None] & (at >= 0) & alike[np.ix_(at, at)]
-        twice |= (homes != ROOT)[:, None] & (homes[:, None] == homes)
+        twice |= (home != ROOT)[:, None] & (home[:, None] == home)
     return np.asarray(apart & twice)
 
 
 def _is_new(structure: Structure, number: int, limit: float) -> bool:
-    """Return whether a segment that waits is farther than a limit from all that is known."""
+    """Return whether a segment that waits is farther than a limit from what it fits best."""
     matches = structure.index.search(structure.memory.bank[number], structure.memory.bank)
     return not matches or matches[0].ratio * structure.index.radius(matches[0].node) > limit
 

@@ -49,6 +49,18 @@ def test_what_comes_in_a_sequence_twice_is_learned_though_each_is_less_alike(see
     assert [all(homes(without, TOGETHER, seed, each)) for each in off] == apart
 
 
+def test_homes_are_the_leaves_that_hold_segments() -> None:
+    rng = np.random.default_rng(0)
+    tree = PrimitiveTree(TreeConfig(), D, RATE_HZ)
+    for k in range(36):
+        tree.insert(motion(k % 6, rng))
+    held = {n: node.id for node in tree.nodes[1:] if not node.children for n in node.members}
+    assert len(set(held.values())) == 6
+    asked = list(range(-1, 38))
+    found = tree._structure.homes(asked).tolist()
+    assert found == [held.get(number, 0) for number in asked]
+
+
 @given(
     numbers=st.lists(st.integers(0, 30), unique=True, max_size=12).map(sorted),
     in_leaf=st.dictionaries(st.integers(0, 31), st.integers(1, 3)),
