@@ -70,7 +70,7 @@ def without_unseen(points: FloatArray) -> FloatArray:
     """
     gone = not_seen(points)
     found = np.where(gone[..., None], np.nan, points)
-    always = np.flatnonzero(gone.all(axis=0))
+    always = np.flatnonzero((points == 0.0).all(axis=(0, 2)))
     others = found[~np.isnan(found).all(axis=(1, 2))]
     if len(always) == 1 and len(others):
         others = np.delete(others, always, axis=1)

@@ -109,6 +109,32 @@ def test_what_is_no_array_of_joints(tmp_path: Path, shape: tuple[int, ...]) -> N
         open_recording(tmp_path / "a.npy", hints=Hints(rate_hz=RATE_HZ))
 
 
+def in_a_picture(points: np.ndarray, size: float) -> np.ndarray:
+    """Where points that are 3 m before a camera are in a picture, shape (T, J, 2), y down."""
+    depth = 3.0 - points[..., 0] + np.nanmean(points[..., 0], axis=1, keepdims=True)
+    across = points[..., 1] - np.nanmean(points[..., 1], axis=1, keepdims=True)
+    return size * np.stack([0.5 + across / depth, 0.5 + (1.0 - points[..., 2]) / depth], axis=2)
+
+
+def test_pixels_with_confidences_are_no_places(
+    tmp_path: Path, landmarks: dict[str, np.ndarray]
+) -> None:
+    flat = in_a_picture(joints("COCO", landmarks), 1080.0)
+    sure = np.random.default_rng(0).uniform(0.6, 1.0, size=(*flat.shape[:2], 1))
+    np.save(tmp_path / "a.npy", np.concatenate([flat, sure], axis=2))
+    with pytest.raises(RecordingError, match="how sure each is"):
+        open_recording(tmp_path / "a.npy", hints=Hints(rate_hz=RATE_HZ))
+
+
+def test_shares_of_a_picture_are_told(tmp_path: Path, landmarks: dict[str, np.ndarray]) -> None:
+    points = joints("MediaPipe", landmarks)
+    depth = 0.3 * (points[..., :1] - np.nanmean(points[..., 0], axis=1)[:, None, None])
+    np.save(tmp_path / "a.npy", np.concatenate([in_a_picture(points, 1.0), depth], axis=2))
+    take = open_recording(tmp_path / "a.npy", hints=Hints(rate_hz=RATE_HZ))
+    assert take.report is not None
+    assert any("landmarks in a picture" in text for text in take.report.warnings)
+
+
 def test_without_a_rate_the_option_is_named(
     tmp_path: Path, landmarks: dict[str, np.ndarray]
 ) -> None:

@@ -461,3 +461,20 @@ def test_coordinates_of_opensim_are_radians_and_metres(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace("endheader", ""))
     with pytest.raises(RecordingError, match="endheader"):
         open_recording(path)
+
+
+@pytest.mark.parametrize(
+    "name", ["pelvis_tx", "knee_ty_r", "/jointset/ground_pelvis/pelvis_tz/value", "femur_r_X"]
+)
+def test_lengths_among_angles_of_opensim_stay_metres(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "ik.mot"
+    path.write_text(f"ik\ninDegrees=yes\nendheader\ntime\ta\t{name}\n0\t180\t1\n0.01\t90\t2\n")
+    take = open_recording(path)
+    assert take.frames == pytest.approx(np.array([[np.pi, 1.0], [np.pi / 2, 2.0]]))
+
+
+def test_a_table_of_quaternions_of_opensim_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "imu.sto"
+    path.write_text("DataType=Quaternion\nendheader\ntime\tpelvis\n0\t1,0,0,0\n0.01\t1,0,0,0\n")
+    with pytest.raises(RecordingError, match="quaternion"):
+        open_recording(path)

@@ -362,6 +362,18 @@ def test_a_point_from_which_all_is_counted_is_there(
     assert not np.isnan(read.markers[:, names.index("LASI")]).any()
 
 
+def test_around_where_all_is_counted_from_a_marker_may_be_unseen_too(
+    tmp_path: Path, standing: Recording, points: np.ndarray
+) -> None:
+    names = standing.marker_names
+    middle = points - np.nanmean(points, axis=(0, 1))
+    middle[:, names.index("LANK")] = np.nan
+    path = tmp_path / "a.csv"
+    path.write_text(table(middle, names, missing="-1"))
+    read = open_recording(path, hints=Hints(up_axis="z"))
+    assert "LANK" not in read.marker_names or np.isnan(read.markers[:, names.index("LANK")]).all()
+
+
 def test_points_of_a_picture_with_a_depth_of_zero_are_told(
     tmp_path: Path, standing: Recording, points: np.ndarray
 ) -> None:
@@ -448,6 +460,70 @@ def test_people_in_rows_of_their_own_are_takes_of_their_own(
     assert first.markers[:n_frames] == pytest.approx(points[kept], abs=1e-5, nan_ok=True)
     assert second.markers[5:] == pytest.approx(points[kept] + 1.0, abs=1e-5, nan_ok=True)
     assert np.isnan(first.markers[n_frames:]).all() and np.isnan(second.markers[:5]).all()
+
+
+def test_rows_of_nobody_are_left_out(
+    tmp_path: Path, standing: Recording, points: np.ndarray
+) -> None:
+    """A tracker that writes frames in which nobody is tracked, before, between and after others."""
+    names, shown = standing.marker_names, points[GONE.stop :]
+    (head, *rows) = table(shown, names, clock=str).splitlines()
+    lines = [head.replace("time", "frame,trackingId", 1)]
+    nobody = "," * 3 * len(names)
+    for i, row in enumerate(rows):
+        (frame, rest) = row.split(",", 1)
+        lines += [f"{frame},,{rest}" if i in (2, 9) else f"{frame},{1 + i % 2},{rest}"]
+    lines += [f"{len(rows)},{nobody}"]
+    path = tmp_path / "a_50hz.csv"
+    path.write_text("\n".join(lines) + "\n")
+    people = open_recordings(path)
+    assert [each.person for each in people] == ["1", "2"]
+    assert len(people[0]) == len(rows)
+    assert people[0].report is not None
+    assert "3 rows that name nobody left out" in people[0].report.notes
+
+
+def test_who_would_be_where_in_a_table_of_no_markers_is_a_channel(tmp_path: Path) -> None:
+    head = ",".join(["time", "track_id", "m_x", "m_y", "m_z", *(f"knee_{k}" for k in range(8))])
+    rows = (",".join([f"{i / 50:.2f}", str(1 + i % 2), *["0.5"] * 11]) for i in range(20))
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([head, *rows]) + "\n")
+    read = open_recording(path)
+    assert read.channels[0] == "track_id"
+    assert read.frames[:, 0].tolist() == [1.0, 2.0] * 10
+
+
+def test_names_that_come_again_below_an_empty_line_end_nothing(
+    tmp_path: Path, standing: Recording, points: np.ndarray
+) -> None:
+    head, *rows = table(points, standing.marker_names).splitlines()
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([head, *rows[:20], "", head, *rows[20:]]) + "\n")
+    check(path, points, standing.marker_names, "repeats the names")
+
+
+@pytest.mark.parametrize("damaged", ["[0.1, 0.2]", "[0.1, 0.2, 0.3", "[0.1, 0.2, 0.3, 0.4]"])
+def test_a_cell_that_does_not_hold_three_numbers_is_named(
+    tmp_path: Path, standing: Recording, points: np.ndarray, damaged: str
+) -> None:
+    lines = in_brackets(table(points, standing.marker_names), "[{}, {}, {}]").splitlines()
+    lines[5] = re.sub(r'"\[[^"]*"', f'"{damaged}"', lines[5], count=1)
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(RecordingError, match=re.escape(damaged)):
+        open_recording(path)
+
+
+@pytest.mark.parametrize(
+    "remark", ["Low-pass filter frequency: 6 Hz", "Analog rate,1000", "EMG sampling rate: 2000"]
+)
+def test_rates_of_something_else_are_not_the_frames(
+    tmp_path: Path, standing: Recording, points: np.ndarray, remark: str
+) -> None:
+    path = tmp_path / "a_50hz.csv"
+    text = table(points, standing.marker_names, clock=str).replace("time", "frame", 1)
+    path.write_text(f"{remark}\n{text}")
+    check(path, points, standing.marker_names)
 
 
 def test_frames_in_steps_are_told(tmp_path: Path, standing: Recording, points: np.ndarray) -> None:

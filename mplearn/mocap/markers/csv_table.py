@@ -37,7 +37,7 @@ from ...recording import FloatArray, IntArray, LabelledSegment, Recording, marke
 from ..clock import Clock, even_clock, in_seconds
 from ..files import bad_file, head_text, read_text, stem
 from ..findings import Findings
-from ..numbers import measured_rows, without_unseen
+from ..numbers import measured_rows, says_missing, without_unseen
 from ..options import option
 from ..placing.size import named_unit
 from ..placing.space import Space, placed
@@ -45,6 +45,7 @@ from ..rates import rate_beside
 from ..reader import Hints, Reader
 from .columns import MEDIAPIPE_POSE, Columns, angle_factor, meaning_of, numbered_triples
 from .names import chosen_names
+from .pictures import warn_of_pictures
 from .sheet import Header, Sheet, find_header, is_number
 
 _MARKERS_SHARE = 0.5  # of a table's columns, without what else a marker has: it is one of markers
@@ -90,7 +91,7 @@ class CSVReader(Reader):
         header = find_header(sheet)
         columns = meaning_of(header.names)
         _check_names(path, columns)
-        table = _read(sheet, header, columns, findings)
+        table = _of_somebody(_read(sheet, header, columns, findings), findings)
         if columns.points is not None:
             table = _by_points(path, table, columns)
         elif len(set(table.texts.get("who", ()))) > 1:
@@ -116,7 +117,7 @@ class CSVReader(Reader):
         kept, names = chosen_names(path, table.markers, seen, findings)
         points = points[:, kept]
         space = replace(self.usual, unit_m=table.unit_m or 1.0, says_unit=table.unit_m is not None)
-        _warn_of_pictures(points, names, findings)
+        warn_of_pictures(points, names, findings)
         at = placed(path, points, names, rate_hz, space, hints, findings)
         return Recording(
             at.points.reshape(len(points), -1),
@@ -168,12 +169,9 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
     textual = dict(columns.texts)
     if columns.points is not None:
         textual["point"] = columns.points
-    if columns.who is not None:
-        textual["who"] = columns.who
     for i in columns.times:  # times of the day are texts
         if i < len(first) and first[i].strip() and not is_number(first[i]):
             textual[f"time {i}"] = i
-    texts: dict[str, list[str]] = {name: [] for name in textual}
     markers = [i for axes in columns.markers.values() for i in axes]
     measured = [i for i in columns.measured if i not in textual.values()]
     others = set(measured) - columns.of_markers - set(markers)
@@ -184,6 +182,12 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
         wanted = [next(i for i in measured if columns.names[i].lower() == a) for a in "xyz"]
     else:
         wanted = measured
+    of_points = are_markers or columns.points is not None
+    if columns.who is not None and of_points:
+        textual["who"] = columns.who
+    elif columns.who is not None:  # who would be where no places are is measured, too
+        wanted = measured = sorted([*measured, columns.who])
+    texts: dict[str, list[str]] = {name: [] for name in textual}
     fine_at, fine_s = columns.fine or (None, 0.0)
     clocks = [
         *columns.times,
@@ -202,15 +206,16 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
         for line, cells in sheet.rows(header.start):
             begin = next(cell for cell in cells if cell.strip())
             begins = is_number(begin) if begins is None else begins
+            if cells[0].strip() == header.names[0] and cells[0].strip() and not is_number(cells[0]):
+                findings.note(f"line {line} repeats the names: left out")
+                last = line
+                continue
             if begins and line > last + 1 and last > header.start and not is_number(begin):
                 findings.note(
                     f"what stands from line {line} on, {begin.strip()[:40]!r}, is left out"
                 )
                 return
             last = line
-            if cells[0].strip() == header.names[0] and cells[0].strip() and not is_number(cells[0]):
-                findings.note(f"line {line} repeats the names: left out")
-                continue
             if textual:
                 while len(cells) > n_columns and not cells[-1].strip():
                     cells.pop()
@@ -230,8 +235,7 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
         cut_off=sheet.cut_off,
     )
     place = {column: k for k, column in enumerate([*clocks, *wanted])}
-    several = len(set(texts.get("person", ()))) > 1 and (are_markers or columns.points is not None)
-    if several and "who" not in texts:
+    if of_points and len(set(texts.get("person", ()))) > 1 and "who" not in texts:
         texts["who"] = texts.pop("person")
     in_order = columns.points is None and "who" not in texts
     numbers = [i for i in columns.frames if _counts(found[:, place[i]], in_order=in_order)]
@@ -393,6 +397,22 @@ def _by_points(path: Path, table: _Table, columns: Columns) -> _Table:
     )
 
 
+def _of_somebody(table: _Table, findings: Findings) -> _Table:
+    """Return a table without the rows that name nobody, where others name people."""
+    who = table.texts.get("who", [])
+    kept = [row for row, name in enumerate(who) if not says_missing(name)]
+    if len(kept) in (0, len(who)):
+        return table
+    findings.note(f"{len(who) - len(kept)} rows that name nobody left out")
+    return replace(
+        table,
+        values=table.values[kept],
+        times=tuple((times[kept], unit_s) for times, unit_s in table.times),
+        numbers=None if table.numbers is None else table.numbers[kept],
+        texts={name: [each[row] for row in kept] for name, each in table.texts.items()},
+    )
+
+
 def _by_people(path: Path, table: _Table) -> _Table:
     """Return a table with a row for each frame, of one with a row for each person in it."""
     assert table.markers is not None
@@ -474,19 +494,6 @@ def _same_steps(one: FloatArray, other: FloatArray) -> bool:
         return False
     steps, others = np.diff(one), np.diff(other)
     return bool(abs(others.sum() - steps.sum()) <= _SAME_STEP * abs(steps.sum()))
-
-
-def _warn_of_pictures(points: FloatArray, names: tuple[str, ...], findings: Findings) -> None:
-    """Warn of landmarks in a picture: MediaPipe gives shares of its width and height too."""
-    if len(set(names) & set(MEDIAPIPE_POSE)) < len(MEDIAPIPE_POSE) // 2:
-        return
-    flat = points[..., :2]
-    inside = (flat > -0.2) & (flat < 1.2)
-    if np.mean(inside[~np.isnan(flat)]) > 0.99 and np.nanmin(flat) > -0.2:
-        findings.warn(
-            "these look like landmarks in a picture (shares of its width and height), whose depth "
-            "and size mean little: world landmarks [m] are needed"
-        )
 
 
 def _segments(

@@ -26,7 +26,7 @@ _RATE = re.compile(
     re.I,
 )
 _HERTZ = re.compile(r"(\d+(?:\.\d+)?)\s*(?:hz|fps)\b", re.I)
-_OTHER_RATE = re.compile(r"filter|pass|cut.?off|analog|emg|force", re.I)
+_OTHER_RATE = re.compile(r"filter|(?:low|high|band)[\s_-]*pass|cut.?off|analog|emg|force", re.I)
 _STEP = re.compile(
     r"\b(?:dt|time[\s_-]*step|(?:frame|sampl(?:e|ing))[\s_-]*(?:time|period|interval))\b"
     r"[^\d\n]{0,12}?(\d*\.?\d+)\s*(m?s)?\W*$",
@@ -35,6 +35,7 @@ _STEP = re.compile(
 _RATES_HZ = (1.0, 10_000.0)
 _LONGEST = 500  # characters of a remark
 _OPENS = ("[", "(", "{")
+_OPEN_NUMBER = re.compile(r"\s*[\[({][^\d]*\d")
 _TRIPLE = re.compile(
     r"\s*[\[({]\s*"
     + r"[\s,;]+".join(rf"(?:[\"']?{a}[\"']?\s*[:=]\s*)?([-+.\deE]+|nan|none|null)" for a in "xyz")
@@ -81,10 +82,10 @@ class Sheet:
         telling = next((t for t, n in zip(bare, most, strict=True) if 0 < max(most) <= 2 * n), "")
         separator = max(separators, key=telling.count) if telling else ""
         sheet = cls(path, lines, separator, False)
-        cells = [cell for i in range(min(len(lines), _LOOK)) for cell in sheet.cells(i)]
+        some_rows = [sheet.cells(i) for i in range(min(len(lines), _LOOK))]
+        cells = [cell for row in some_rows for cell in row]
         commas = sum(bool(_DECIMAL_COMMA.fullmatch(cell)) for cell in cells)
         points = sum(bool(_DECIMAL_POINT.fullmatch(cell)) for cell in cells)
-        some_rows = [sheet.cells(i) for i in range(min(len(lines), _LOOK))]
         triples = {i for row in some_rows for i, cell in enumerate(row) if _three(cell)}
         cut_off = bool(text) and text[-1] not in "\r\n"
         return cls(path, lines, separator, commas > points, cut_off, frozenset(triples))
@@ -118,7 +119,8 @@ class Sheet:
             elif cell.strip() and not is_number(cell) and not cell.lstrip().startswith(_OPENS):
                 spread += [f"{cell.strip()}.{axis}" for axis in "xyz"]
             else:
-                spread += _three(cell) or ["", "", ""]
+                damaged = _OPEN_NUMBER.match(cell)  # stays, and is refused as no number
+                spread += _three(cell) or [cell if damaged else "", "", ""]
         return spread
 
     def rows(self, start: int, stop: int | None = None) -> Iterator[tuple[int, list[str]]]:
@@ -220,6 +222,8 @@ def _said_rate(line: str) -> float | None:
     found = _RATE.search(line)
     hertz = _HERTZ.findall(line)
     step = _STEP.search(line)
+    if found and _OTHER_RATE.search(line[: found.start()]):
+        return None
     if found:
         rate_hz = float(found[1])
     elif len(hertz) == 1 and not _OTHER_RATE.search(line):

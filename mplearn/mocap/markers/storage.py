@@ -16,7 +16,9 @@ from .sheet import Sheet
 
 _END = "endheader"
 _MOST_LINES = 200  # above the table
-_LENGTH = re.compile(r".*_t[xyz]|time", re.I)  # translations among coordinates
+_LENGTH = re.compile(  # pelvis_ty, knee_tx_r, .../pelvis_ty/value; of a body's place: femur_r_X
+    r"time|.*_[tp]?[xyz](_[lr])?(/value|/speed)?", re.I
+)
 
 
 class StorageReader(CSVReader):
@@ -37,6 +39,8 @@ class StorageReader(CSVReader):
         end = heads.index(_END)
         parts = (head.partition("=") for head in heads[:end])
         said = {name.strip(): value.strip() for name, _, value in parts}
+        if said.get("datatype", "double") not in ("double", "vec3"):
+            raise bad_file(path, f"a table of {said['datatype']}", "numbers (double), or Vec3")
         begin = next((i for i in range(end + 1, len(lines)) if lines[i].strip()), len(lines))
         # the lines of the header stay as empty ones: messages tell of lines in the file
         table = ["\n"] * begin + [_tabbed(line) for line in lines[begin:]]

@@ -16,6 +16,7 @@ from ...recording import FloatArray, Recording, marker_channels
 from ..files import bad_file, stem, suffix
 from ..findings import Findings
 from ..markers.columns import MEDIAPIPE_POSE
+from ..markers.pictures import hold_scores, warn_of_pictures
 from ..numbers import without_unseen
 from ..options import option
 from ..placing.space import Space, placed
@@ -128,12 +129,20 @@ class JointArrayReader(Reader):
         if rate_hz is None:
             raise bad_file(path, "no rate", f"one in its name, or {option('rate_hz')}")
         points = without_unseen(points)
+        if hold_scores(points):
+            raise bad_file(
+                path,
+                "pixels, and as third numbers how sure each is: points of a picture",
+                "places in space, (frames, joints, 3)",
+            )
         layout = _layout(path, points)
         names = tuple(LAYOUTS[layout].split())
         findings.note(f"{points.shape[1]} joints: those of {layout}")
         if points.shape[1] > len(names):
             findings.leave_out([f"{points.shape[1] - len(names)} points of hands, face and others"])
-        at = placed(path, points[:, : len(names)], names, rate_hz, USUAL, hints, findings)
+        points = points[:, : len(names)]
+        warn_of_pictures(points, names, findings)
+        at = placed(path, points, names, rate_hz, USUAL, hints, findings)
         return Recording(
             at.points.reshape(len(points), -1),
             rate_hz,
