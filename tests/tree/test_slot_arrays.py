@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -37,6 +38,16 @@ def test_slots_hold_what_was_written_whatever_came_and_went(steps):
             kept.gather(slots, which), np.array(expected).reshape(-1, *kept.shapes[which])
         )
     assert kept.n_slots <= max(1, len(steps))
+
+
+@pytest.mark.parametrize("n_slots", [5, slot_arrays.BLOCK + 5])
+def test_rows_lie_side_by_side_however_many_blocks_there_are(n_slots):
+    kept = SlotArrays((1,))
+    known = np.zeros(n_slots, [("id", np.int64), ("slot", np.int64)])
+    known["slot"] = [kept.take() for _ in range(n_slots)]
+    parts = list(kept.parted(known["slot"]))
+    assert len(parts) == len(kept.blocks) == -(-n_slots // slot_arrays.BLOCK)
+    assert all(rows.flags.c_contiguous for _, rows, _ in parts)
 
 
 def learned(config):

@@ -74,9 +74,13 @@ class SlotArrays:
     def parted(
         self, slots: IntArray
     ) -> Iterator[tuple[tuple[FloatArray, ...], IntArray, IntArray]]:
-        """Yield the blocks that hold some slots: arrays, rows there, positions among the slots."""
+        """Yield the blocks that hold some slots: arrays, rows there, positions among the slots.
+
+        Rows lie side by side, however many blocks there are, for compiled loops are compiled once
+        more for rows that do not.
+        """
         if len(self.blocks) == 1:
-            yield self.blocks[0], slots, np.arange(len(slots))
+            yield self.blocks[0], np.ascontiguousarray(slots), np.arange(len(slots))
             return
         block, row = np.divmod(slots, BLOCK)
         order = np.argsort(block, kind="stable")
