@@ -473,6 +473,24 @@ def test_lengths_among_angles_of_opensim_stay_metres(tmp_path: Path, name: str) 
     assert take.frames == pytest.approx(np.array([[np.pi, 1.0], [np.pi / 2, 2.0]]))
 
 
+@pytest.mark.parametrize(
+    "names",
+    [
+        "pelvis_tilt pelvis_list pelvis_rotation pelvis_tx pelvis_ty pelvis_tz hip_flexion_r",
+        "pelvis_Ox pelvis_Oy pelvis_Oz pelvis_X pelvis_Y pelvis_Z femur_r_Ox",
+    ],
+)
+def test_places_among_angles_of_opensim_are_no_markers(tmp_path: Path, names: str) -> None:
+    path = tmp_path / "ik.mot"
+    rows = (f"{i / 100}\t90\t90\t90\t1\t2\t3\t90" for i in range(3))
+    head = "ik\ninDegrees=yes\nendheader\n" + "\t".join(["time", *names.split()])
+    path.write_text("\n".join([head, *rows]) + "\n")
+    take = open_recording(path)
+    right = np.pi / 2
+    assert take.channels == tuple(names.split())
+    assert take.frames[0] == pytest.approx([right, right, right, 1.0, 2.0, 3.0, right])
+
+
 def test_a_table_of_quaternions_of_opensim_is_named(tmp_path: Path) -> None:
     path = tmp_path / "imu.sto"
     path.write_text("DataType=Quaternion\nendheader\ntime\tpelvis\n0\t1,0,0,0\n0.01\t1,0,0,0\n")

@@ -214,7 +214,7 @@ def meaning_of(header: Sequence[str]) -> Columns:
         names = tuple(axes.get(i, name) for i, name in enumerate(names))
         ways = tuple(times), tuple(frames), texts
         return Columns(names, units, *ways, {}, (), (), best, tuple(rates), who, fine)
-    markers, doubled = _markers(names, free)
+    markers, doubled = _markers(names, [i for i in free if angle_factor(units[i]) is None])
     used = {i for columns in markers.values() for i in columns}
     confidences = [i for i in free if i not in used and _CONFIDENCE.fullmatch(names[i])]
     return Columns(

@@ -74,6 +74,10 @@ class CSVReader(Reader):
         """
         return Sheet.of(path, read_text(path))
 
+    def columns(self, header: Header) -> Columns:
+        """Return what the columns mean."""
+        return meaning_of(header.names)
+
     def accepts(self, path: Path) -> bool:
         """Whether it is called a table, or is a text that begins like one of markers."""
         if not path.name.lower().removesuffix(".gz").endswith(".txt"):
@@ -89,7 +93,7 @@ class CSVReader(Reader):
         findings = Findings(self.format)
         sheet = self.sheet(path)
         header = find_header(sheet)
-        columns = meaning_of(header.names)
+        columns = self.columns(header)
         _check_names(path, columns)
         table = _of_somebody(_read(sheet, header, columns, findings), findings)
         if columns.points is not None:

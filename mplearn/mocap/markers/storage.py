@@ -7,12 +7,14 @@ of a model, as inverse kinematics gives them, are channels in radians and metres
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from ..files import bad_file, read_text
 from ..placing.space import Space
+from .columns import Columns, meaning_of
 from .csv_table import CSVReader
-from .sheet import Sheet
+from .sheet import Header, Sheet
 
 _END = "endheader"
 _MOST_LINES = 200  # above the table
@@ -53,6 +55,16 @@ class StorageReader(CSVReader):
                 re.sub(r"(?<=\t)[^\t\r\n]+", r"[\g<0>]", row) for row in table[begin + 1 :]
             ]
         return Sheet.of(path, "".join(table), separators="\t")
+
+    def columns(self, header: Header) -> Columns:
+        """Return what the columns mean: markers only where all are, for a root is at a place, too.
+
+        Of ``pelvis_tilt, ..., pelvis_tx, pelvis_ty, pelvis_tz, knee_angle_r`` none is a marker.
+        """
+        found = meaning_of(header.names)
+        if {*found.measured} <= {i for axes in found.markers.values() for i in axes}:
+            return found
+        return replace(found, markers={}, doubled=(), confidences=(), who=None, fine=None)
 
 
 def _tabbed(line: str) -> str:
