@@ -267,16 +267,16 @@ class VariedHumanoidEnv(MacroStepEnv):
             raise InvalidValueError(
                 f"the state is of person {state.person}, and here are {self.people}"
             )
-        if (state.seen is None) != (self.changes.watched is None):
+        ways = state.task.ways if isinstance(state.task, FollowTask) else None
+        if (ways.changes if isinstance(ways, ChangingPerson) else NOTHING) != self.changes:
             raise InvalidValueError("the state is of an environment with other changes")
         self._turn_to(state.person)
         if state.seen is not None:
             self._seen = state.seen
             self._growing.update(state.seen.library, state.seen.ids)
         super().load_state(state)
-        if self.changes != NOTHING:
-            assert isinstance(self.task, FollowTask)
-            self._changing = cast(ChangingPerson, self.task.ways)
+        if isinstance(self.task, FollowTask):
+            self._changing = cast("ChangingPerson | None", self.task.ways)
         return self._observation(), self._info()
 
     def _info(

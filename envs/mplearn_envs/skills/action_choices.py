@@ -39,6 +39,13 @@ class Choices(NamedTuple):
         return np.append(self.prior, np.zeros((n_speeds - 1) * len(self.prior)))
 
 
+def drawn_slot(weights: FloatArray, rng: np.random.Generator) -> int:
+    """Return a slot, drawn by weights of any sum above 0, shape (capacity,)."""
+    total = np.cumsum(weights)
+    slot = int(np.searchsorted(total, rng.random() * total[-1], side="right"))
+    return min(slot, int(np.flatnonzero(weights)[-1]))
+
+
 def choose_among(
     weights: Mapping[int, float],
     refused: Mapping[int, tuple[str, ...]],

@@ -12,7 +12,7 @@ from mplearn.errors import InvalidValueError, NoPathError
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import FloatArray
 from mplearn_envs.execution.tracking_report import TrackingReport
-from mplearn_envs.skills.action_choices import HOLD, Choices
+from mplearn_envs.skills.action_choices import HOLD, Choices, drawn_slot
 from mplearn_envs.skills.repertoire import Repertoire
 
 from .base import Choice, Scene, Task
@@ -116,9 +116,7 @@ class FollowTask(Task):
         self._first = scene.choices
         known = self._library
         self._look_at(repertoire)
-        if self._library is known:
-            self._predicted.pop((), None)
-        else:
+        if self._library is not known:
             self._usual_s = {
                 id: repertoire.skills.duration_s(id) / self.pace for id in repertoire.feasible_ids
             }
@@ -212,7 +210,7 @@ class FollowTask(Task):
         self._repertoire = repertoire
         if self._library is not repertoire.library:
             self._library = repertoire.library
-            self._predicted: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
+            self._predicted: dict[tuple[int | None, ...], FloatArray | None] = {}
 
     def _go_on(self, time_s: float) -> None:
         """Perform until after a time."""
@@ -222,8 +220,7 @@ class FollowTask(Task):
             prior = self._first.prior
             if self._ids:
                 prior = self.likely(repertoire.slots[self._ids[-1]], began_s)
-            slot = int(np.searchsorted(np.cumsum(prior), self._rng.random(), side="right"))
-            id = repertoire.primitive(min(slot, int(np.flatnonzero(prior)[-1])))
+            id = repertoire.primitive(drawn_slot(prior, self._rng))
             assert id is not None  # `_following` never leaves hold alone
             lasts_s = self._usual_s[id] * float(
                 np.exp(self.variation * self._rng.standard_normal())
@@ -243,21 +240,28 @@ class FollowTask(Task):
 
     def _prediction(self) -> tuple[FloatArray, FloatArray]:
         """Return how likely each slot is next, and after that, shape (capacity,) each."""
-        n = self._n_recognised
-        library = self._repertoire.library
-        history = tuple(self._ids[max(0, n - library.graph.order) : n])
-        if history not in self._predicted:
-            then = self._predict(history)
-            after = np.zeros_like(then)
-            for slot in np.flatnonzero(then > 0.01).tolist():
-                after += then[slot] * self._predict((*history, self._repertoire.primitive(slot)))
-            self._predicted[history] = then, after / max(after.sum(), 1e-300)
-        return self._predicted[history]
+        n, repertoire = self._n_recognised, self._repertoire
+        history = tuple(self._ids[max(0, n - repertoire.library.graph.order) : n])
+        then = self._next_after(history)
+        after = np.zeros_like(then)
+        for slot in np.flatnonzero(then > 0.01).tolist():
+            after += then[slot] * self._next_after((*history, repertoire.primitive(slot)))
+        return then, after / max(after.sum(), 1e-300)
 
-    def _predict(self, history: tuple[int | None, ...]) -> FloatArray:
-        """Return the library's prediction among what the robot can do, shape (capacity,)."""
+    def _next_after(self, history: tuple[int | None, ...]) -> FloatArray:
+        """Return how likely each slot comes next; where that is unknown, one begins anew."""
+        if history not in self._predicted:
+            self._predicted[history] = self._predict(history)
+        predicted = self._predicted[history]
+        return self._first.prior if predicted is None else predicted
+
+    def _predict(self, history: tuple[int | None, ...]) -> FloatArray | None:
+        """Return the library's prediction among what the robot can do, shape (capacity,), or None.
+
+        It depends on the library alone, not on the episode.
+        """
         if not history or self._repertoire.after(history[-1] or 0).dead_end:
-            return self._first.prior
+            return None
         repertoire = self._repertoire
         graph = repertoire.library.graph
         out = np.zeros(repertoire.capacity)
@@ -265,4 +269,4 @@ class FollowTask(Task):
             if id in repertoire.slots and repertoire.skills.feasibility(id).feasible:
                 out[repertoire.slots[id]] = probability
         out[HOLD] = 0.0
-        return np.asarray(out / out.sum()) if out.sum() > 0 else self._first.prior
+        return np.asarray(out / out.sum()) if out.sum() > 0 else None

@@ -46,11 +46,13 @@ class Changes:
 
     def __post_init__(self) -> None:
         watched: object = self.watched
-        whole = isinstance(watched, int) and not isinstance(watched, bool)
-        if watched is not None and not (whole and 1 <= self.watched <= 100_000):  # type: ignore[operator]
-            raise InvalidValueError(
-                f"watched must be an integer in [1, 100000], or None, not {watched!r}"
-            )
+        if watched is not None:
+            whole = isinstance(watched, (int, np.integer)) and not isinstance(watched, bool)
+            if not (whole and 1 <= watched <= 100_000):  # type: ignore[operator]
+                raise InvalidValueError(
+                    f"watched must be an integer in [1, 100000], or None, not {watched!r:.80}"
+                )
+            object.__setattr__(self, "watched", int(watched))  # type: ignore[call-overload]
         for name in ("habits_s", "people_s"):
             object.__setattr__(self, name, _when(name, getattr(self, name)))
         if not (_is_number(self.evenness) and 1e-3 <= self.evenness <= 1e6):
@@ -62,10 +64,10 @@ def _when(name: str, given: object) -> When:
     if given is None:
         return None
     if isinstance(given, (tuple, list)):
-        moments = tuple(given)
-        rising = all(a < b for a, b in pairwise(moments))
-        if moments and rising and all(_is_number(t) and t > 0 for t in moments):
-            return tuple(float(t) for t in moments)
+        if given and all(_is_number(t) and t > 0 for t in given):
+            moments = tuple(float(t) for t in given)
+            if all(a < b for a, b in pairwise(moments)):
+                return moments
     elif _is_number(given) and given >= 0.1:  # type: ignore[operator]
         return float(given)  # type: ignore[arg-type]
     raise InvalidValueError(
@@ -114,7 +116,7 @@ def make_changes(given: Changes | str | Mapping[str, Any]) -> Changes:
         )
     values = dict(given)
     level = values.pop("level", "none")
-    if level not in CHANGES:
+    if not (isinstance(level, str) and level in CHANGES):
         raise InvalidValueError(f"level must be one of {get_args(ChangesName)}, not {level!r:.80}")
     if unknown := [key for key in values if key not in known]:
         raise InvalidValueError(f"changes have the values {known}, and level, not {unknown}")

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mplearn.recording import FloatArray
+from mplearn_envs.skills.action_choices import drawn_slot
 from mplearn_envs.skills.repertoire import Repertoire
 
 from .changes import Changes, When
@@ -116,7 +117,7 @@ class ChangingPerson:
         rng = np.random.default_rng([self.seed % 2**32])
         walk = [start]
         while len(walk) < n:
-            walk.append(drawn_from(self.prior(walk[-1], 0.0), rng))
+            walk.append(drawn_slot(self.prior(walk[-1], 0.0), rng))
         return walk
 
 
@@ -134,9 +135,3 @@ class _Moments:
             last = self._moments[-1] if self._moments else 0.0
             self._moments.append(last + float(self._rng.exponential(self._mean_s)))
         return bisect_right(self._moments, time_s)
-
-
-def drawn_from(prior: FloatArray, rng: np.random.Generator) -> int:
-    """Return a slot drawn from a distribution over them."""
-    slot = int(np.searchsorted(np.cumsum(prior), rng.random(), side="right"))
-    return min(slot, int(np.flatnonzero(prior)[-1]))

@@ -170,10 +170,12 @@ def test_steady_people_are_as_they_were():
     [
         ("some", "changes must be one of"),
         ({"level": "much"}, "level must be one of"),
+        ({"level": ["all"]}, "level must be one of"),
         ({"habit_s": 3.0}, "changes have the values"),
         ({"habits_s": 0.0}, "habits_s must be a mean time"),
         ({"people_s": (5.0, 3.0)}, "people_s must be a mean time"),
         ({"people_s": (np.nan, 3.0)}, "people_s must be a mean time"),
+        ({"people_s": ("soon", 3.0)}, "people_s must be a mean time"),
         ({"habits_s": True}, "habits_s must be a mean time"),
         ({"watched": 0}, "watched must be an integer"),
         ({"watched": 2.5}, "watched must be an integer"),
@@ -188,11 +190,17 @@ def test_what_is_wrong_is_said(changes, message):
 def test_changes_are_for_who_follows_and_states_for_the_like():
     with pytest.raises(InvalidValueError, match="choose the task 'follow'"):
         make("people", task="goal")
-    growing, steady = make("growing"), make("none")
-    growing.reset(seed=0)
-    steady.reset(seed=0)
-    with pytest.raises(InvalidValueError, match="other changes"):
-        steady.unwrapped.load_state(growing.unwrapped.state())
+    envs = [make("growing"), make("people"), make("none"), make("none", task="goal")]
+    for env in envs:
+        env.reset(seed=0)
+    for here in envs[:3]:
+        for other in envs[:2]:
+            if other is not here:
+                with pytest.raises(InvalidValueError, match="other changes"):
+                    here.unwrapped.load_state(other.unwrapped.state())
+    for other in envs[2:]:
+        with pytest.raises(InvalidValueError, match="other changes"):
+            envs[1].unwrapped.load_state(other.unwrapped.state())
 
 
 def test_changes_survive_json():
@@ -200,3 +208,16 @@ def test_changes_survive_json():
     env = make(given)
     plain = json.loads(env.spec.to_json())["kwargs"]["changes"]
     assert make_changes(given) == make(plain).unwrapped.changes == Changes(60, None, (20.0, 40.0))
+    assert json.dumps(Changes(watched=np.int64(7)).watched) == "7"
+
+
+def test_at_a_dead_end_each_episode_foresees_its_own_beginning():
+    env = make("none", people=(1,))
+    firsts = set()
+    for seed in range(4):
+        _, info = env.reset(seed=seed)
+        task, repertoire = env.unwrapped.task, env.unwrapped.repertoire
+        dead = next(id for id in repertoire.feasible_ids if repertoire.after(id).dead_end)
+        np.testing.assert_array_equal(task._next_after((dead,)), info["transition_prior"])
+        firsts.add(int(np.argmax(info["transition_prior"])))
+    assert len(firsts) > 1
