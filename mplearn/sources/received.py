@@ -16,6 +16,9 @@ PATIENT_S = 5.0  # before the first frame: so long
 RETRY_S = (0.2, 5.0)  # between attempts to connect again: at first, and at most
 BEHIND_S, CAUGHT_UP_S = 1.0, 0.2  # when it is said that frames wait, and that they no longer do
 SLICE_S = 0.02  # a read wakes up so often while it waits for a frame that is missing
+LOOK_S = (
+    0.25  # and so often else; what took longer was held up, which is no silence of the sender's
+)
 
 
 class Receiver(ABC):
@@ -60,7 +63,8 @@ class ReceivedSource(Source):
         self._sequencer = Sequencer(self.tally, ordered=receiver.ordered, rate_hz=rate_hz)
         self._connected: bool | None = None  # None: nothing came yet
         self._heard, self._heard_s = False, time.monotonic()
-        self._read_s = self._heard_s  # when something was there to be read
+        self._read_s = self._heard_s  # when something was there to be read, were we not held up
+        self._looked_s = self._heard_s
         self._late = self._over = False
         self._thread = threading.Thread(target=self._receive, name=name, daemon=True)
         self._thread.start()
@@ -83,7 +87,7 @@ class ReceivedSource(Source):
         until = None if timeout_s is None else time.monotonic() + timeout_s
         while not self._over:
             left = SILENT_S if until is None else max(until - time.monotonic(), 0.0)
-            out = self._take(min(left, SLICE_S if self._sequencer.waits else SILENT_S))
+            out = self._take(min(left, SLICE_S if self._sequencer.waits else LOOK_S))
             if out or (until is not None and time.monotonic() >= until):
                 return out
         return []
@@ -93,6 +97,8 @@ class ReceivedSource(Source):
     def _take(self, timeout_s: float) -> list[Block | Change]:
         items = self._inbox.take(timeout_s)
         now_s = time.monotonic()
+        self._read_s += max(now_s - self._looked_s - LOOK_S, 0.0)
+        self._looked_s = now_s
         out: list[Block | Change] = []
         samples: list[Sample] = []
         for item in items:

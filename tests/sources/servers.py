@@ -12,7 +12,7 @@ from mplearn.sources import Block, Change, Source
 
 
 def gather(
-    source: Source, send: Callable[[], object], n_frames: int, *, seconds: float = 20.0
+    source: Source, send: Callable[[], object], n_frames: int, *, seconds: float = 60.0
 ) -> list[Block | Change]:
     """Return what a source yields until so many frames, lost ones too, have come out."""
     items: list[Block | Change] = []
@@ -22,6 +22,16 @@ def gather(
         items += source.read(0.1)
         assert time.monotonic() < until, [i for i in items if isinstance(i, Change)]
     return items
+
+
+def keep_up(source: Source, sent: int, most: int = 150) -> None:
+    """Wait until a source has read all but so many frames: UDP drops what is too much.
+
+    It reads none of the first second before it knows the rate.
+    """
+    until = time.monotonic() + 60.0
+    while source.tally.frames < sent - most and time.monotonic() < until:
+        time.sleep(0.001)
 
 
 def learned(items: Sequence[Block | Change], path: Path) -> bytes:

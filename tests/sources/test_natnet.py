@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from natnet_server import NatNetServer
 from played import frames_of, texts_of
-from servers import gather, learned, learned_from
+from servers import gather, keep_up, learned, learned_from
 
 from mplearn.recording import FloatArray, Recording
 from mplearn.sources import Source, open_source
@@ -25,13 +25,13 @@ def collect(
     source: Source, server: NatNetServer, markers: FloatArray, first: int = 0, lost: int = 0
 ) -> list:
     def send() -> None:
-        assert server.asked.wait(10.0)
+        assert server.asked.wait(60.0)
         for i, frame in enumerate(markers):
             at = first + i
             server.send({"Anna": np.nan_to_num(frame)}, 1000 + at, 5.0 + at / 100.0)
-            if i % 20 == 19:
-                time.sleep(0.01)
+            keep_up(source, before + i)
 
+    before = source.tally.frames
     thread = threading.Thread(target=send)
     items = gather(source, thread.start, len(markers) + lost)
     thread.join()

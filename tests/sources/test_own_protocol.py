@@ -210,6 +210,9 @@ def test_silence_is_said() -> None:
         one = Block(Stream(("a",), 100.0), np.ones((1, 1)), np.zeros(1), np.zeros(1))
         sender.send(one)
         gather(source, lambda: None, 1)
+        source._source._looked_s -= 3.0  # who reads was held up, which is no silence
+        source._source._read_s -= 3.0
+        assert not texts_of(source.read(0.0), "disconnected")
         source._source._read_s -= 2.0
         items = source.read(0.0)
         assert texts_of(items, "disconnected") == ["nothing has come for 1 s"]
