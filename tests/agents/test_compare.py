@@ -85,10 +85,27 @@ def test_version_1_is_played_with_people_and_read_on_the_scale_of_the_best(tmp_p
         assert share[where, "random"] < share[where, "pooled-path"] <= 100.5
 
 
+def test_what_is_missed_of_the_oracle_in_the_same_episodes_is_regret(tmp_path):
+    out = ["--out", str(tmp_path), "--jobs", "1", "--seeds", "2", "--episodes", "1"]
+    played = ["--tasks", "follow", "--dynamics", "kinematic", "--algorithms", "--people", "test"]
+    policies = ["--policies", "mirror", "oracle", "--changes", "people"]
+    assert main(["compare", "--env", "v1", *out, *played, *policies]) == 0
+    rows = [line for line in (tmp_path / "compare.md").read_text().splitlines() if "| foll" in line]
+    cells = {row.strip("| ").split(" | ")[2]: row.strip("| ").split(" | ") for row in rows}
+    assert cells["mirror"][1] == "kinematic, test, people changes"
+    returns = {name: float(row[3].split()[0]) for name, row in cells.items()}
+    regret = {name: float(row[-1].split()[0]) for name, row in cells.items()}
+    assert regret["oracle"] == 0.0 and regret["mirror"] > 0.5
+    assert regret["mirror"] == pytest.approx(returns["oracle"] - returns["mirror"], abs=0.11)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         (["--env", "v1", "--people", "nobody"], "people must be among"),
+        (["--env", "v1", "--changes", "some"], "changes must be among"),
+        (["--changes", "all"], "compare with env='v1'"),
+        (["--env", "v1", "--changes", "all", "--tasks", "goal"], "let it be a task"),
         (["--bodies", "soft"], "bodies must be among"),
         (["--tasks", "goal", "fly"], "tasks must be among"),
         (["--policies", "mirrored"], "policies must be among"),

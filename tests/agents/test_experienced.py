@@ -21,7 +21,7 @@ def known(edges, falls=(), capacity=8):
         for action in {a for legal in sets for a in legal}:
             for k in range(100):
                 fell = (place, action) in falls and k < 50
-                experience.note(place, action, 0.9, -0.01, fell)
+                experience.note(place, action, 2.0, 0.9, -0.01, fell)
     return experience
 
 

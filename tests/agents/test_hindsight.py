@@ -128,6 +128,14 @@ def test_the_same_seed_plans_the_same_and_experience_is_enough_to_follow():
     assert min(episode.return_ for episode in first) > 4.0 and not first[0].illegal
 
 
+def test_how_long_motions_take_is_found_out_whatever_later_rewards_are_worth():
+    usual = [experienced_follower(make("people", discount=d), 60).outlook for d in (0.98, 1.0)]
+    np.testing.assert_array_equal(usual[0].usual_s, usual[1].usual_s)
+    assert 1.0 < np.median(usual[1].usual_s) < 10.0
+    with pytest.raises(InvalidValueError, match="explore for at least 1 step"):
+        experienced_follower(make("people"), 0)
+
+
 def test_a_certain_demonstrator_is_followed_to_the_end():
     """One who goes round three motions, each exactly as long as the robot takes."""
 

@@ -14,6 +14,8 @@ from mplearn_agents.rl.config import VERSION
 from mplearn_agents.rl.growing import grow
 from mplearn_agents.rl.projection import project
 from mplearn_agents.rl.train import make_environment, train
+from mplearn_envs.varied.changes import CHANGES
+from mplearn_envs.varied.people import SPLITS
 
 pytest.importorskip("sb3_contrib")
 torch = pytest.importorskip("torch")
@@ -314,8 +316,13 @@ def test_bad_input_is_said(folder, config, agent, capsys, tmp_path):
     with pytest.raises(InvalidValueError, match="another task"):
         agent.require_fit(env)
     env.close()
-    assert main(["train", "--out", str(folder / "x"), "--task", "fly"]) == 2
-    assert "task must be a Task or one of" in capsys.readouterr().err
+    for options, said in (
+        (["--task", "fly"], "task must be a Task or one of"),
+        (["--changes", "all", "--people", "test"], "--people and --changes: only of v1"),
+        (["--changes", "all", "--env", "v1"], "choose the task 'follow'"),
+    ):
+        assert main(["train", "--out", str(folder / "x"), *options]) == 2
+        assert said in capsys.readouterr().err
 
 
 OWN_TASK = """
@@ -377,6 +384,14 @@ def test_a_training_takes_settings_and_a_task_of_ones_own(folder, capsys, tmp_pa
 def test_settings_that_cannot_be_are_refused(wrong, said):
     with pytest.raises(InvalidValueError, match=said):
         TrainingConfig(**wrong)
+
+
+def test_one_may_train_where_things_change(tmp_path):
+    small = ["--steps", "1", "--round-steps", "1", "--episodes", "1", "--envs", "1"]
+    where = ["--env", "v1", "--task", "follow", "--changes", "people", "--people", "test"]
+    assert main(["train", "--out", str(tmp_path), *small, *where]) == 0
+    env = make_environment(TrainedPolicy.load(tmp_path).config)
+    assert env.unwrapped.changes == CHANGES["people"] and env.unwrapped.people == SPLITS["test"]
 
 
 def test_the_commands(folder, capsys):

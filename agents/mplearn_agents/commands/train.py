@@ -7,6 +7,7 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+from mplearn.errors import InvalidValueError
 from mplearn_agents.suited import suited
 from mplearn_agents.terminal.arguments import count, positive, seed
 
@@ -20,6 +21,7 @@ EXAMPLE = "mplearn train --task goal --out agents/goal"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     from mplearn_agents.rl.config import AlgorithmName, EnvVersion, PriorUse, TrainingConfig
+    from mplearn_envs.varied.changes import CHANGES
 
     default = {f.name: f.default for f in fields(TrainingConfig) if f.default is not MISSING}
     parser.add_argument("--out", type=Path, required=True, help="folder for the agent and its log")
@@ -32,6 +34,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--people", choices=["train", "test", "all"], help="of v1: with whom (default: train)"
+    )
+    parser.add_argument(
+        "--changes",
+        choices=CHANGES,
+        help="of v1's task follow: what changes meanwhile (default: none)",
     )
     parser.add_argument(
         "--task",
@@ -113,8 +120,11 @@ def run(args: argparse.Namespace) -> None:
     if ".py:" in args.task:
         given["task"] = str(Path(args.task).absolute())
     given["library"] = None if args.library is None else str(args.library)
-    if args.people is not None:
-        given["environment"] = {"people": args.people}
+    of_v1 = {"people": args.people, "changes": args.changes}
+    given["environment"] = {name: value for name, value in of_v1.items() if value is not None}
+    if given["environment"] and args.env != "v1":
+        names = " and ".join(f"--{name}" for name in given["environment"])
+        raise InvalidValueError(f"{names}: only of v1, add --env v1")
     usual = suited(args.task)
     given["prior"] = args.prior or usual.prior
     given["steps"] = usual.steps if args.steps is None else args.steps

@@ -43,7 +43,7 @@ class Comparison:
         people: Of v1: with whom it is played, one game each. Agents are trained with "train".
         speeds: Among which speeds everyone chooses with the primitive, the usual one first.
         changes: Of v1's task ``follow``: levels of what changes meanwhile, one game each; see
-            `mplearn_envs.varied.changes`.
+            `mplearn_envs.varied.changes`. Agents are trained without.
         bodies: Levels of what the body is like, simulated; see `mplearn_envs.execution.bodies`.
     """
 
@@ -77,6 +77,8 @@ class Comparison:
                 raise InvalidValueError(f"{what} must be among {tuple(allowed)}, not {unknown}")
         if self.changes != ("none",) and self.env != "v1":
             raise InvalidValueError("changes are those of people of v1: compare with env='v1'")
+        if self.changes != ("none",) and "follow" not in self.tasks:
+            raise InvalidValueError("changes are those of the task 'follow': let it be a task")
         if len(self.seeds) < 2:
             raise InvalidValueError(f"an interval needs at least 2 seeds, not {self.seeds}")
 

@@ -40,6 +40,7 @@ class Experience:
         capacity: Number of slots C; an action is a slot at one of some speeds.
         legal: How often which actions were legal in a place.
         tried: How often each action was tried in a place, shape (C, A).
+        time_s: Sum of how long these took, (C, A) [s].
         worth: Sum of the discounts over these, (C, A).
         cost: Sum of what they earned, but for goals and falls, (C, A).
         falls: How many of them ended in a fall, (C, A).
@@ -51,12 +52,21 @@ class Experience:
 
     def __post_init__(self) -> None:
         shape = self.capacity, self.n_actions
-        self.tried, self.worth = np.zeros(shape), np.zeros(shape)
+        self.tried, self.time_s, self.worth = np.zeros(shape), np.zeros(shape), np.zeros(shape)
         self.cost, self.falls = np.zeros(shape), np.zeros(shape)
 
-    def note(self, place: int, action: int, discount: float, cost: float, fallen: bool) -> None:
+    def note(
+        self,
+        place: int,
+        action: int,
+        duration_s: float,
+        discount: float,
+        cost: float,
+        fallen: bool,
+    ) -> None:
         """Remember what came of an action."""
         self.tried[place, action] += 1
+        self.time_s[place, action] += duration_s
         self.worth[place, action] += discount
         self.cost[place, action] += cost
         self.falls[place, action] += fallen
@@ -233,7 +243,8 @@ def explore(
         goals = sum(terms.get(name, 0.0) for name in ("reached", "said", "complete", "fall"))
         cost = float(reward) - goals
         if action != HOLD:
-            experience.note(place, action, info["discount"], cost, bool(info["fallen"]))
+            took_s, discount = info["duration_s"], info["discount"]
+            experience.note(place, action, took_s, discount, cost, bool(info["fallen"]))
         if terminated or truncated:
             observation, info = env.reset()
     return experience

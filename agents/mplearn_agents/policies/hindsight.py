@@ -20,7 +20,7 @@ import numpy as np
 
 from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray, IntArray
-from mplearn_envs.skills.action_choices import HOLD
+from mplearn_envs.skills.action_choices import HOLD, drawn_slot
 from mplearn_envs.skills.repertoire import Repertoire
 from mplearn_envs.tasks import FollowTask
 
@@ -244,7 +244,7 @@ class Hindsight(Policy):
             end_s = self._drawn_s(seen.slot) - since_s if seen.slot else -since_s
             prior = self._first if not seen.slot else outlook.likely(seen.slot, seen.time_s + end_s)
             assert prior is not None
-            following = _drawn(prior, rng)
+            following = drawn_slot(prior, rng)
             lasts_s = self._drawn_s(following)
             if end_s + task.recognised_after * lasts_s > 0:
                 break
@@ -255,7 +255,7 @@ class Hindsight(Policy):
             known_s.append(max(ends_s[-1] + task.recognised_after * lasts_s, 1e-6))
             ends_s.append(ends_s[-1] + lasts_s)
             slots.append(following)
-            following = _drawn(outlook.likely(following, seen.time_s + ends_s[-1]), rng)
+            following = drawn_slot(outlook.likely(following, seen.time_s + ends_s[-1]), rng)
             lasts_s = self._drawn_s(following)
         return np.array(slots), np.array(ends_s), np.array(known_s)
 
@@ -341,10 +341,3 @@ def _within_reach(
     soonest.setdefault(HOLD, horizon)
     places = np.array(sorted(soonest))
     return places, np.array([soonest[each] for each in places.tolist()])
-
-
-def _drawn(weights: FloatArray, rng: np.random.Generator) -> int:
-    """Return a slot, drawn by weights of any sum."""
-    total = np.cumsum(weights)
-    slot = int(np.searchsorted(total, rng.random() * total[-1], side="right"))
-    return min(slot, int(np.flatnonzero(weights)[-1]))

@@ -12,6 +12,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray
 from mplearn_envs.lru_cache import LRUCache
 from mplearn_envs.skills.action_choices import HOLD
@@ -145,50 +146,36 @@ class KnowsFromExperience(_Corrected):
         experience: Of one's own actions.
         watched: What was seen of demonstrators meanwhile, in order.
         pace: Speed of the demonstrator as a share of the robot's.
-        discount: Of the environment, per second.
         hold_s: How long holding takes [s].
+
+    Raises:
+        InvalidValueError: Nothing was tried.
     """
 
     def __init__(
-        self,
-        experience: Experience,
-        watched: list[Seen],
-        pace: float,
-        discount: float,
-        hold_s: float,
+        self, experience: Experience, watched: list[Seen], pace: float, hold_s: float
     ) -> None:
         n = experience.capacity
-        tried, worth = experience.tried[:, :n], experience.worth[:, :n]
-        mean = worth.sum(axis=0) / np.maximum(tried.sum(axis=0), 1.0)
-        known = mean > 0
-        times_s = np.where(known, np.log(np.where(known, mean, 1.0)) / np.log(discount), 0.0)
+        tried, time_s = experience.tried[:, :n], experience.time_s[:, :n]
+        known = tried.any(axis=0)
+        if not known.any():
+            raise InvalidValueError("one must explore for at least 1 step to know anything")
+        times_s = time_s.sum(axis=0) / np.maximum(tried.sum(axis=0), 1.0)
         times_s[~known] = np.median(times_s[known])
         times_s[HOLD] = 0.0
         lasts_s = np.full((n, n), np.nan)
         for place, sets in experience.legal.items():
             for action in max(sets, key=lambda legal: sets[legal]):
-                own = worth[place, action % n], tried[place, action % n]
-                took_s = np.log(own[0] / own[1]) / np.log(discount) if own[1] else None
-                lasts_s[place, action % n] = times_s[action % n] if took_s is None else took_s
+                to = action % n
+                own = tried[place, to]
+                lasts_s[place, to] = time_s[place, to] / own if own else times_s[to]
         stuck = ~np.isfinite(lasts_s).any(axis=1)  # there one holds, and begins anew
         anew = {a % n for legal in experience.legal.get(HOLD, ()) for a in legal}
         lasts_s[np.ix_(stuck, sorted(anew))] = hold_s + times_s[sorted(anew)]
-        super().__init__(np.zeros((n, n)), times_s / pace, lasts_s, times_s)
-        counts = np.zeros((n, n))
+        usual_s, ways = times_s / pace, np.zeros((n, n))
         for before, after in pairwise(watched):
-            counts[before.slot, after.slot] += self._follows(before, after)
-        self._before = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
-        self.begin()
-
-    def _follows(self, before: Seen, after: Seen) -> bool:
-        """Return whether one was seen to follow the other at once, in the same episode."""
-        if not before.slot or not after.slot or after.time_s <= before.time_s:
-            return False
-        began_s = [each.time_s - each.share * self.usual_s[each.slot] for each in (before, after)]
-        same = (
-            before.slot == after.slot and began_s[1] - began_s[0] < 0.5 * self.usual_s[before.slot]
-        )
-        return not same and began_s[1] - began_s[0] < _SKIPPED * self.usual_s[before.slot]
+            ways[before.slot, after.slot] += _follows(before, after, usual_s)
+        super().__init__(ways, usual_s, lasts_s, times_s)
 
 
 def oracle(env: gymnasium.Env[Any, Any]) -> Hindsight:
@@ -216,13 +203,12 @@ def experienced_follower(
 
     Raises:
         InvalidValueError: The environment has another task than ``follow``, or was not made by
-            `gymnasium.make`.
+            `gymnasium.make`; or there are no steps.
     """
     task, actor = follow_task(env), env.unwrapped
     experience, watched = _found_out(twin_of(env), task.deadline_s, steps, seed)
-    discount: float = actor.discount  # type: ignore[attr-defined]
     hold_s: float = actor.actions.hold_s  # type: ignore[attr-defined]
-    outlook = KnowsFromExperience(experience, watched, task.pace, discount, hold_s)
+    outlook = KnowsFromExperience(experience, watched, task.pace, hold_s)
     outlook.grows = actor.repertoire.growing  # type: ignore[attr-defined]
     return Hindsight.for_env(env, outlook)
 
@@ -248,6 +234,16 @@ def _found_out(
         _FOUND.put(key, found)
     twin.close()
     return found
+
+
+def _follows(before: Seen, after: Seen, usual_s: FloatArray) -> bool:
+    """Return whether one was seen to follow the other at once, in the same episode."""
+    if not before.slot or not after.slot or after.time_s <= before.time_s:
+        return False
+    began_s = [each.time_s - each.share * usual_s[each.slot] for each in (before, after)]
+    apart_s, lasts_s = began_s[1] - began_s[0], usual_s[before.slot]
+    same = before.slot == after.slot and apart_s < 0.5 * lasts_s
+    return bool(not same and apart_s < _SKIPPED * lasts_s)
 
 
 def _usual_s(repertoire: Repertoire, pace: float) -> FloatArray:
