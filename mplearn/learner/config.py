@@ -41,9 +41,10 @@ class LearnerConfig:
         observe: What markers become: ``"robot"``, joint angles of the robot; or ``"markers"``:
             they are learned as positions.
         segmenter: Name of the segmenter, one of `mplearn.segmentation.SEGMENTERS`.
-        scaffolding: Whether known primitives help to cut what comes ([Kulic2012], end of 2.1):
-            where a motion under way is one of them, a boundary is less likely inside it, and
-            likelier at its end.
+        scaffolding: Whether known primitives help to cut what comes ([Kulic2012], end of 2.1).
+            ``"inside"``: where a motion under way is one of them, a boundary is less likely inside
+            it. True: the more so, and a boundary is likelier at its end, which may be its cause
+            then; but a recording played again and again is cut a little otherwise each time.
         tree: How primitives are formed.
         people: What makes motions of different people one primitive.
         longest_pause_s: Two primitives with a longer pause between them do not count as
@@ -62,7 +63,7 @@ class LearnerConfig:
     rate_hz: float = 100.0
     observe: Literal["robot", "markers"] = "robot"
     segmenter: str = "kohlmorgen-lemm"
-    scaffolding: bool = newer(True, absent=False)
+    scaffolding: Literal["inside", True, False] = newer("inside", absent=False)
     tree: TreeConfig = field(default_factory=TreeConfig)
     people: PeopleConfig = field(default_factory=PeopleConfig)
     longest_pause_s: float = 2.0
@@ -76,6 +77,10 @@ class LearnerConfig:
             raise InvalidValueError(f"rate_hz must lie in [20, 250], not {self.rate_hz}")
         if self.observe not in ("robot", "markers"):
             raise InvalidValueError(f"observe must be 'robot' or 'markers', not {self.observe!r}")
+        if self.scaffolding not in (True, False, "inside"):
+            raise InvalidValueError(
+                f"scaffolding must be True, False or 'inside', not {self.scaffolding!r}"
+            )
         if not self.longest_pause_s > 0:
             raise InvalidValueError(f"longest_pause_s must be positive, not {self.longest_pause_s}")
         if not 0 < self.false_alarms < 1:

@@ -18,6 +18,7 @@ from ..tree import PrimitiveTree
 
 LOOKS_HZ = 10.0  # how often it is asked how far a motion has come [1/s]
 UNKNOWN = 0.5  # what `Segmenter.scaffold` takes for knowing nothing
+INSIDE = 0.4  # how much counts that a motion is not at its end where its end counts for nothing
 _N_STATES = 8
 _MADE_OF = (8, 6, 4, 3)  # exemplars that a known motion's model is made of: the first so many
 _FOLLOWED = 32  # motions that one under way is compared with: those that start nearest to it

@@ -42,7 +42,7 @@ from .events import (
     SegmentClosed,
 )
 from .foresight import NextMotion
-from .known_motions import KnownMotions
+from .known_motions import INSIDE, UNKNOWN, KnownMotions
 from .learner_state import FILES, LearnerState
 from .reversal import Known, LearnerEdit
 from .shown_once import with_shown_once
@@ -605,6 +605,8 @@ class MotionLearner:
             self._segmenter.scaffold()
         elif self._under_way.looks_at(len(self._buffer)) and self.person in self.tree.people:
             ending = self._under_way.ending(self.tree.of(self.person), self._buffer.held)
+            if self.config.scaffolding == "inside":
+                ending = UNKNOWN - INSIDE * max(UNKNOWN - ending, 0.0)
             self._segmenter.scaffold(ending=ending)
 
     def _close(self, segment: Segment) -> list[Event]:

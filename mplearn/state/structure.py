@@ -149,7 +149,7 @@ def _optional(args: tuple[Any, ...]) -> Reader:
 
 def _one_of(allowed: tuple[Any, ...]) -> Reader:
     def read(value: Any, _: Scope) -> Any:
-        if not isinstance(value, (str, int)) or value not in allowed:
+        if not any(type(value) is type(each) and value == each for each in allowed):
             raise StateError(f"must be one of {list(allowed)}, not {shown(value)}")
         return value
 

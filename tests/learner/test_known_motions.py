@@ -121,3 +121,20 @@ def test_without_scaffolding_the_segmenter_is_told_nothing(features: Recording) 
     assert set(endings[False]) == {0.5}
     assert min(endings[True]) < 0.1
     assert max(endings[True]) > 0.9
+
+
+def test_by_default_only_that_a_motion_is_not_at_its_end_is_told(features: Recording) -> None:
+    said = {}
+    for scaffolding in ("inside", True):
+        learner = MotionLearner(
+            LearnerConfig(features.channels, features.rate_hz, scaffolding=scaffolding)
+        )
+        said[scaffolding] = []
+        for start in range(0, 3000, 10):
+            learner.learn_many(features.frames[start : start + 10])
+            said[scaffolding].append(float(learner.state().segmenter.arrays["state.ending"][0]))
+    assert LearnerConfig(features.channels).scaffolding == "inside"
+    assert max(said["inside"]) == 0.5
+    first = next(k for k, each in enumerate(said[True]) if each != 0.5)  # the cuts are the same yet
+    assert said["inside"][first] == pytest.approx(0.5 - 0.4 * max(0.5 - said[True][first], 0.0))
+    assert 0.3 - 1e-9 <= min(said["inside"]) < 0.35

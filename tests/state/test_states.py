@@ -275,3 +275,10 @@ def test_all_settings_survive_a_way_through_json():
     for name in ("scaffolding", "tree", "people"):
         assert name in config.to_dict()
     assert set(config.to_dict()["tree"]) == {each.name for each in fields(TreeConfig)}
+
+
+@pytest.mark.parametrize("value", [0, 1, 2, "on", None, 1.0])
+def test_a_setting_of_several_kinds_takes_what_is_named_and_nothing_equal_to_it(value):
+    with pytest.raises(StateError) as caught:
+        LearnerConfig.from_dict({"channels": ["a"], "scaffolding": value})
+    assert caught.value.place == "scaffolding"
