@@ -53,7 +53,7 @@ def renewed(tree: PrimitiveTree, repertoire: Repertoire) -> float:
 
     Motions five times as large come, until the variance of all motion has changed enough.
     """
-    took = [0.0]
+    took, began = [0.0], False
     for motion in range(4 * len(repertoire.keys)):
         frames = 5.0 * repertoire.perform(motion % len(repertoire.keys))
         tree.insert(frames)
@@ -61,8 +61,10 @@ def renewed(tree: PrimitiveTree, repertoire: Repertoire) -> float:
             begin = time.process_time()
             tree.pass_time()
             took.append(time.process_time() - begin)
-        if max(took) > 1e-4 and tree.state().renewal is None:
+        going_on = tree.state().renewal is not None
+        if began and not going_on:
             break
+        began |= going_on
     return max(took)
 
 

@@ -50,6 +50,18 @@ def test_rows_lie_side_by_side_however_many_blocks_there_are(n_slots):
     assert all(rows.flags.c_contiguous for _, rows, _ in parts)
 
 
+def test_one_array_of_some_slots_is_written_and_no_fork_sees_it(monkeypatch):
+    monkeypatch.setattr(slot_arrays, "BLOCK", 4)
+    kept = SlotArrays((3,), (2,))
+    for slot in range(10):
+        kept.write(kept.take(), (np.full(3, slot), np.full(2, slot)))
+    twin, slots = kept.fork(), np.array([9, 1, 5])
+    kept.write_some(slots, 0, np.array([[-1.0, -2.0], [-3.0, -4.0], [-5.0, -6.0]]))
+    assert kept.gather(slots, 0).tolist() == [[-1, -2, 9], [-3, -4, 1], [-5, -6, 5]]
+    assert kept.gather(np.arange(10), 1).tolist() == [[slot, slot] for slot in range(10)]
+    assert twin.gather(np.arange(10), 0).tolist() == [[slot] * 3 for slot in range(10)]
+
+
 def learned(config):
     motions = Motions(9, 6, 4)
     tree = PrimitiveTree(config, 6, RATE_HZ)

@@ -53,11 +53,22 @@ class SlotArrays:
     def write(self, slot: int, values: Sequence[Any]) -> None:
         """Write the arrays of a slot."""
         block, row = divmod(slot, BLOCK)
+        for stacked, value in zip(self._own(block), values, strict=True):
+            stacked[row] = value
+
+    def write_some(self, slots: IntArray, which: int, values: FloatArray) -> None:
+        """Write the first m values of one array, of one axis, of some slots, shape (k, m)."""
+        block, row = np.divmod(slots, BLOCK)
+        for number in np.unique(block).tolist():
+            here = np.flatnonzero(block == number)
+            self._own(number)[which][row[here], : values.shape[1]] = values[here]
+
+    def _own(self, block: int) -> tuple[FloatArray, ...]:
+        """Return the arrays of a block, which no fork shows from now on."""
         if block in self._lent:
             self.blocks[block] = tuple(stacked.copy() for stacked in self.blocks[block])
             self._lent.remove(block)
-        for stacked, value in zip(self.blocks[block], values, strict=True):
-            stacked[row] = value
+        return self.blocks[block]
 
     def read(self, slot: int) -> tuple[FloatArray, ...]:
         """Return the arrays of a slot, which show what is written there later."""

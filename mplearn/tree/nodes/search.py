@@ -187,16 +187,16 @@ class NodeIndex:
 
     def remeasured(self, nodes: Mapping[int, Node], bank: ExemplarBank) -> None:
         """Take note of new distances in nodes, by id, and of the new models of their exemplars."""
-        n_nearest = self.config.n_nearest
-        for k, id in enumerate(self.ids.tolist()):
-            matrix, slot = nodes[id].matrix, int(self._known["slot"][k])
-            self._known["diameter"][k] = nodes[id].diameter
-            mean, others, slow = self._of_node.read(slot)
-            if len(matrix) > 1:
-                others = others.copy()
-                others[: len(matrix)] = nearest_others(matrix, n_nearest)
-                self._of_node.write(slot, (mean, others, slow))
-        self._known["extent"] = _mean_extents(bank, self.members)
+        known, matrices = self._known, [nodes[id].matrix for id in self.ids.tolist()]
+        sizes = np.array([len(matrix) for matrix in matrices], np.int64)
+        for size in np.unique(sizes).tolist():
+            places = np.flatnonzero(sizes == size)
+            some = np.array([matrices[k] for k in places.tolist()])
+            known["diameter"][places] = some.max(axis=(1, 2), initial=0.0)
+            if size > 1:
+                others = nearest_others(some, self.config.n_nearest)
+                self._of_node.write_some(known["slot"][places], 1, others)
+        known["extent"] = _mean_extents(bank, self.members)
 
     def scale(self, but: int | None = None) -> float:
         """Return the median diameter of the leaves, but for one: how much executions vary.
@@ -363,10 +363,14 @@ def mean_nearest(distances: FloatArray, n_nearest: int) -> FloatArray:
 
 
 def nearest_others(matrix: FloatArray, n_nearest: int) -> FloatArray:
-    """Return how far each of at least two exemplars is from the nearest others, (k, k) -> (k,)."""
+    """Return how far each of at least two exemplars is from the nearest others.
+
+    Of one group, or of several that are as large: (..., k, k) -> (..., k).
+    """
     apart = np.array(matrix, dtype=np.float64)
-    np.fill_diagonal(apart, np.inf)
-    return mean_nearest(apart, min(n_nearest, len(apart) - 1))
+    k = apart.shape[-1]
+    apart[..., np.arange(k), np.arange(k)] = np.inf
+    return mean_nearest(apart, min(n_nearest, k - 1))
 
 
 @njit(cache=True)
