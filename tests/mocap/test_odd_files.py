@@ -31,6 +31,7 @@ from scipy.spatial.transform import Rotation
 from mplearn.demonstrator import demonstrate
 from mplearn.errors import InvalidValueError, RecordingError
 from mplearn.mocap import Hints, open_recording, open_recordings
+from mplearn.mocap.markers.columns import MEDIAPIPE_POSE, OPENPOSE_BODY_25
 from mplearn.recording import Recording
 
 pytestmark = pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")
@@ -460,6 +461,21 @@ def test_people_in_rows_of_their_own_are_takes_of_their_own(
     assert first.markers[:n_frames] == pytest.approx(points[kept], abs=1e-5, nan_ok=True)
     assert second.markers[5:] == pytest.approx(points[kept] + 1.0, abs=1e-5, nan_ok=True)
     assert np.isnan(first.markers[n_frames:]).all() and np.isnan(second.markers[:5]).all()
+
+
+@pytest.mark.parametrize("layout", [MEDIAPIPE_POSE, OPENPOSE_BODY_25])
+def test_points_of_several_people_may_be_numbered(tmp_path: Path, layout: tuple[str, ...]) -> None:
+    points = np.random.default_rng(0).normal((0, 0, 1), 0.3, (12, 2, len(layout), 3))
+    lines = ["frame,person_id,landmark_id,x,y,z"]
+    for i, who, k in np.ndindex(points.shape[:3]):
+        lines.append(",".join(map(str, (i, who, k, *points[i, who, k].tolist()))))
+    path = tmp_path / "a_50hz.csv"
+    path.write_text("\n".join(lines) + "\n")
+    people = open_recordings(path, hints=Hints(unit_m=1.0, up_axis="z"))
+    for who, each in enumerate(people):
+        assert each.marker_names == tuple(f"{who}:{name}" for name in layout)
+        assert each.markers == pytest.approx(points[:, who])
+    assert len(people) == 2
 
 
 def test_rows_of_nobody_are_left_out(

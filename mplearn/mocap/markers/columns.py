@@ -216,6 +216,7 @@ def meaning_of(header: Sequence[str]) -> Columns:
         return Columns(names, units, *ways, {}, (), (), best, tuple(rates), who, fine)
     markers, doubled = _markers(names, [i for i in free if angle_factor(units[i]) is None])
     used = {i for columns in markers.values() for i in columns}
+    numbered = numbered_names(tuple(markers))
     confidences = [i for i in free if i not in used and _CONFIDENCE.fullmatch(names[i])]
     return Columns(
         names,
@@ -223,7 +224,7 @@ def meaning_of(header: Sequence[str]) -> Columns:
         tuple(times),
         tuple(frames),
         texts,
-        _by_number(markers),
+        {numbered.get(name, name): at for name, at in markers.items()},
         doubled,
         tuple(confidences) if markers else (),
         None,
@@ -361,18 +362,22 @@ def _last_word(name: str) -> str:
     return words[-1].lower() if words else ""
 
 
-def _by_number(markers: dict[str, tuple[int, int, int]]) -> dict[str, tuple[int, int, int]]:
-    """Name the landmarks of a known number that are only numbered."""
-    names = _NUMBERED.get(len(markers))
-    numbers = [re.fullmatch(r"(\D*)(\d{1,3})(\D*)", name) for name in markers]
+def numbered_names(names: Sequence[str]) -> dict[str, str]:
+    """Return which landmark each name is, if they are only numbered, and as many as are known.
+
+    Example:
+        >>> numbered_names([f"landmark_{k}" for k in range(33)])["landmark_32"]
+        'right_foot_index'
+        >>> numbered_names(["0", "1", "2"])
+        {}
+    """
+    known = _NUMBERED.get(len(names))
+    numbers = [re.fullmatch(r"(\D*)(\d{1,3})(\D*)", name) for name in names]
     around = {match.group(1, 3) for match in numbers if match}
-    if names is None or not all(numbers) or len(around) > 1:
-        return markers
+    if known is None or not all(numbers) or len(around) > 1:
+        return {}
     counted = [int(match[2]) for match in numbers if match]
     first = min(counted)
-    if first > 1 or sorted(counted) != list(range(first, first + len(names))):
-        return markers
-    return {
-        names[number - first]: columns
-        for number, columns in zip(counted, markers.values(), strict=True)
-    }
+    if first > 1 or sorted(counted) != list(range(first, first + len(known))):
+        return {}
+    return {name: known[number - first] for name, number in zip(names, counted, strict=True)}

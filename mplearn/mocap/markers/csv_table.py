@@ -43,7 +43,7 @@ from ..placing.size import named_unit
 from ..placing.space import Space, placed
 from ..rates import rate_beside
 from ..reader import Hints, Reader
-from .columns import MEDIAPIPE_POSE, Columns, angle_factor, meaning_of, numbered_triples
+from .columns import Columns, angle_factor, meaning_of, numbered_names, numbered_triples
 from .names import chosen_names
 from .pictures import warn_of_pictures
 from .sheet import Header, Sheet, find_header, is_number
@@ -366,7 +366,8 @@ def _by_points(path: Path, table: _Table, columns: Columns) -> _Table:
     """Return a table with a row for each point as one with a row for each frame."""
     keys = _keys(path, table, "point")
     frames, first, row = np.unique(keys, return_index=True, return_inverse=True)
-    of_points = table.texts["point"]
+    numbered = numbered_names(tuple(dict.fromkeys(table.texts["point"])))
+    of_points = [numbered.get(name, name) for name in table.texts["point"]]
     if len(set(who := table.texts.get("who", []))) > 1:
         of_points = [f"{whose}:{name}" for whose, name in zip(who, of_points, strict=True)]
     names = list(dict.fromkeys(of_points))
@@ -382,10 +383,6 @@ def _by_points(path: Path, table: _Table, columns: Columns) -> _Table:
         )
     points[row, which] = table.values[:, axes]
     unit = next((columns.units[i] for i, n in enumerate(columns.names) if n.lower() == "x"), "")
-    if all(name.isdecimal() for name in names) and len(names) == len(MEDIAPIPE_POSE):
-        order = sorted(names, key=lambda name: float(name))
-        known = dict(zip(order, MEDIAPIPE_POSE, strict=True))
-        names = [known[name] for name in names]
     texts = {name: [values[i] for i in first] for name, values in table.texts.items()}
     del texts["point"]
     texts.pop("who", None)
