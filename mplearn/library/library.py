@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TypeAlias, Unpack
+from typing import Any, TypeAlias, Unpack
 
 import numpy as np
 
@@ -112,6 +112,10 @@ class PrimitiveLibrary:
             for id in missing:
                 graph.add_node(id)
         object.__setattr__(self, "graph", graph.snapshot())
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> PrimitiveLibrary:
+        """Share it: nothing of it changes."""
+        return self
 
     # ---- what it holds
 

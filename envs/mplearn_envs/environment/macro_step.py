@@ -355,7 +355,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
 
     def _shared(self) -> dict[int, Any]:
         """Return what copies of a task share with it, for `copy.deepcopy`."""
-        return {id(part): part for part in (self.repertoire, self.library)}
+        return {id(self.repertoire): self.repertoire}
 
     def _scene(self, episode: Episode, options: Mapping[str, Any]) -> Scene:
         return Scene(

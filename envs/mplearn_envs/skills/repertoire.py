@@ -76,6 +76,7 @@ class Repertoire:
             raise LibraryError("the library is empty: there is nothing to perform")
         self._slots = Slots(capacity, len(library))
         self._slots.require_room(len(library))
+        self._shares_skills = skills is not None
         self.skills = skills or Skills(
             library, robot, speed, style, limits, upper_body=upper_body, known=known
         )
@@ -248,6 +249,8 @@ class Repertoire:
             return self
         twin = object.__new__(Repertoire)
         memo[id(self)] = twin
+        if self._shares_skills:
+            memo[id(self.skills)] = self.skills
         twin.__setstate__(copy.deepcopy(self.__getstate__(), memo))
         return twin
 

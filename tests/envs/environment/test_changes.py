@@ -62,6 +62,9 @@ def test_an_episode_goes_on_from_its_state_a_copy_or_a_pickle(level):
     others = [copy.deepcopy(env), pickle.loads(pickle.dumps(env)), make(level)]
     others[2].reset(seed=99)
     others[2].unwrapped.load_state(state)
+    mine, theirs = env.unwrapped.repertoire, others[2].unwrapped.task._repertoire
+    assert theirs.skills is mine.skills or level == "people"  # only what grows is copied
+    assert copy.deepcopy(mine.library) is mine.library
 
     def onward(env):
         seen = []
