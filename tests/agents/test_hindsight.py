@@ -119,6 +119,12 @@ def test_what_is_shown_is_waited_for_where_nothing_else_leads_to_it():
     assert policy.outlook.grows and episode.return_ > 15.0 and not episode.illegal
 
 
+def test_who_knows_a_single_motion_performs_it_and_learns_the_others():
+    env = make({"watched": 1}, task=FollowTask(deadline_s=20.0))
+    (episode,) = play(env, hindsight(env), 1, 3)
+    assert episode.return_ > 0.5 and not episode.illegal
+
+
 def test_the_same_seed_plans_the_same_and_experience_is_enough_to_follow():
     env = make("people")
     policy = experienced_follower(env, 600)

@@ -192,7 +192,10 @@ class Hindsight(Policy):
         lasts_s = self.outlook.lasts_s().copy()
         took_s = lasts_s[place, possible]
         lasts_s[place] = np.nan
-        lasts_s[place, possible] = np.where(np.isfinite(took_s), took_s, np.nanmedian(lasts_s))
+        usual_s: FloatArray = self.outlook.usual_s[possible] * self.task.pace
+        if np.isfinite(lasts_s).any():
+            usual_s = np.full(len(possible), np.nanmedian(lasts_s))
+        lasts_s[place, possible] = np.where(np.isfinite(took_s), took_s, usual_s)
         ticks = np.maximum(1.0, np.rint(lasts_s / self.foresight.tick_s))
         plan, places = self._plan(seen, ticks, place)
         return int(places[plan.best(int(np.searchsorted(places, place)), self.foresight.decisions)])
