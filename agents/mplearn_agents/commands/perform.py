@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from mplearn_agents.policies import Policy
     from mplearn_agents.walk import WalkResult
     from mplearn_envs.robot import Robot
+    from mplearn_envs.skills.repertoire import Repertoire
 
 HELP = "Let the robot walk the graph of a library, do a task, or show primitives, pushed or not."
 EXAMPLE = "mplearn perform my.mplearn --steps 20 --video walk.mp4"
@@ -191,9 +192,22 @@ def _walked(args: argparse.Namespace) -> tuple[WalkResult, Robot]:
     policy = _policy(args, env)
     record = args.video is not None
     result = walk(env, policy, args.steps, args.seed, episodes=args.episodes, record=record)
+    for name, problem in _left_out(env.unwrapped.repertoire, result):  # type: ignore[attr-defined]
+        print(f"{name} would have come, but the robot cannot perform it: {problem}")
     robot: Robot = env.unwrapped.robot  # type: ignore[attr-defined]
     env.close()
     return result, robot
+
+
+def _left_out(repertoire: Repertoire, result: WalkResult) -> list[tuple[str, str]]:
+    """Return what follows what was performed, and cannot be: names, and the first reason each."""
+    refused: dict[int, str] = {}
+    for performed in sorted(set(result.primitives)):
+        for slot, problems in repertoire.after(performed).refused.items():
+            id = repertoire.primitive(slot)
+            if id is not None:
+                refused[id] = problems[0]
+    return [(repertoire.library[id].name, problem) for id, problem in sorted(refused.items())]
 
 
 def _shown(args: argparse.Namespace) -> tuple[WalkResult, Robot]:
