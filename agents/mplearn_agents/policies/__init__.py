@@ -6,8 +6,6 @@ from typing import Any
 
 import gymnasium
 
-from mplearn_envs.tasks import FollowTask
-
 from .base import Policy as Policy
 from .base import legal_actions as legal_actions
 from .base import transition_prior as transition_prior
@@ -29,6 +27,8 @@ from .uniform import UniformLegal as UniformLegal
 
 def experienced(env: gymnasium.Env[Any, Any]) -> Policy:
     """Return who has explored first, and acts on what was found out, whatever the task wants."""
+    from mplearn_envs.tasks import FollowTask  # MuJoCo is not imported before it is needed
+
     follows = isinstance(env.unwrapped.task, FollowTask)  # type: ignore[attr-defined]
     return experienced_follower(env) if follows else Experienced.for_env(env)
 

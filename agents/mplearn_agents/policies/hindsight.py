@@ -12,7 +12,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import gymnasium
 import networkx as nx
@@ -22,10 +22,12 @@ from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray, IntArray
 from mplearn_envs.skills.action_choices import HOLD, drawn_slot
 from mplearn_envs.skills.repertoire import Repertoire
-from mplearn_envs.tasks import FollowTask
 
 from .base import Policy, legal_actions, transition_prior
 from .futures import Futures, Shown, Steps, worth
+
+if TYPE_CHECKING:
+    from mplearn_envs.tasks import FollowTask
 
 _TRIES = 20  # at a future that agrees with what is seen
 
@@ -298,6 +300,8 @@ def follow_task(env: gymnasium.Env[Any, Any]) -> FollowTask:
     Raises:
         InvalidValueError: It has another task.
     """
+    from mplearn_envs.tasks import FollowTask  # MuJoCo is not imported before it is needed
+
     task: Any = env.unwrapped.task  # type: ignore[attr-defined]
     if not isinstance(task, FollowTask):
         raise InvalidValueError(f"this policy needs the task 'follow', not {task!r:.80}")
