@@ -7,14 +7,15 @@ body that it believes in.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, Literal, NamedTuple, TypeAlias, get_args
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import mujoco
 import numpy as np
 
 from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray
+from mplearn_envs.levels import from_levels
 from mplearn_envs.robot import Robot
 
 from .reflexes import NO_PUSHES, Pushes
@@ -125,25 +126,7 @@ def make_body(given: Body | str | Mapping[str, Any]) -> Body:
     Raises:
         InvalidValueError: There is no such level or value, or one is out of its range.
     """
-    if isinstance(given, Body):
-        return given
-    if isinstance(given, str) and given in BODIES:
-        return BODIES[given]
-    known = [each.name for each in fields(Body)]
-    if not isinstance(given, Mapping):
-        raise InvalidValueError(
-            f"body must be one of {get_args(BodyName)}, a Body or a mapping of {known}, "
-            f"not {given!r:.80}"
-        )
-    values = dict(given)
-    level = values.pop("level", "nominal")
-    if level not in BODIES:
-        raise InvalidValueError(f"level must be one of {get_args(BodyName)}, not {level!r}")
-    unknown = [key for key in values if key not in known]
-    if unknown:
-        raise InvalidValueError(f"body has the values {known}, and level, not {unknown}")
-    start = BODIES[level]
-    return Body(**{name: values.get(name, getattr(start, name)) for name in known})
+    return from_levels("body", given, BODIES)
 
 
 def body_model(robot: Robot, body: Body) -> mujoco.MjModel:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from mplearn.errors import InvalidValueError
+from mplearn_envs.levels import from_levels
 
 ChangesName: TypeAlias = Literal["none", "growing", "habits", "people", "all"]
 When: TypeAlias = float | tuple[float, ...] | None  # a mean time between, or the moments
@@ -104,20 +105,4 @@ def make_changes(given: Changes | str | Mapping[str, Any]) -> Changes:
         >>> make_changes({"level": "all", "watched": 20}).watched
         20
     """
-    if isinstance(given, Changes):
-        return given
-    if isinstance(given, str) and given in CHANGES:
-        return CHANGES[given]
-    known = [each.name for each in fields(Changes)]
-    if not isinstance(given, Mapping):
-        raise InvalidValueError(
-            f"changes must be one of {get_args(ChangesName)}, Changes or a mapping of {known}, "
-            f"not {given!r:.80}"
-        )
-    values = dict(given)
-    level = values.pop("level", "none")
-    if not (isinstance(level, str) and level in CHANGES):
-        raise InvalidValueError(f"level must be one of {get_args(ChangesName)}, not {level!r:.80}")
-    if unknown := [key for key in values if key not in known]:
-        raise InvalidValueError(f"changes have the values {known}, and level, not {unknown}")
-    return replace(CHANGES[level], **values)
+    return from_levels("changes", given, CHANGES)

@@ -34,6 +34,7 @@ def test_levels_and_values_by_name():
         ({"masses": -0.1}, "masses must be in"),
         ({"masses": "much"}, "masses must be in"),
         ({"level": "soft"}, "level must be one of"),
+        ({"level": ["harsh"]}, "level must be one of"),
         ({"pushes_per_minute": 3.0}, "steps=True"),
         ({"steps": 2}, "steps must be"),
         (7, "body must be one of"),
