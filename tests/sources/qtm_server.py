@@ -38,11 +38,13 @@ class QTMServer:
 
     def send(self, frame: FloatArray, number: int, time_s: float, more: int = 0) -> None:
         """Send a frame, shape (M, 3) [mm], which says that it has more markers than it has."""
-        points = frame.astype("<f4").tobytes()
-        component = struct.pack("<Ihh", len(frame) + more, 0, 0) + points
-        component = struct.pack("<II", len(component) + 8, 1) + component
-        packet = struct.pack("<qII", round(time_s * 1e6), number, 1) + component
-        self._send(DATA, packet)
+        self._send(DATA, frame_content(frame, number, time_s, more))
+
+    def send_raw(self, data: bytes) -> None:
+        """Send bytes as they are, if somebody listens."""
+        if (client := self._client) is not None:
+            with suppress(OSError):  # who has left
+                client.sendall(data)
 
     def relabel(self, names: Sequence[str]) -> None:
         """Change the labels, and say that the settings changed."""
@@ -74,7 +76,7 @@ class QTMServer:
 
     def _send(self, kind: int, content: bytes) -> None:
         if self._client is not None:
-            self._client.sendall(struct.pack("<II", len(content) + 8, kind) + content)
+            self._client.sendall(packet(kind, content))
 
     def _serve(self) -> None:
         while not self._stop.is_set():
@@ -83,6 +85,7 @@ class QTMServer:
             except TimeoutError:
                 continue
             client.settimeout(0.05)
+            self.streaming.clear()
             self._client = client
             self._send(COMMAND, b"QTM RT Interface connected\0")
             self._answer(client)
@@ -121,6 +124,18 @@ class QTMServer:
             self.streaming.set()
         else:
             raise AssertionError(command)
+
+
+def frame_content(frame: FloatArray, number: int, time_s: float, more: int = 0) -> bytes:
+    """Return a frame as the protocol has it, which says that it has more markers than it has."""
+    component = struct.pack("<Ihh", len(frame) + more, 0, 0) + frame.astype("<f4").tobytes()
+    component = struct.pack("<II", len(component) + 8, 1) + component
+    return struct.pack("<qII", round(time_s * 1e6), number, 1) + component
+
+
+def packet(kind: int, content: bytes) -> bytes:
+    """Return a packet of a kind."""
+    return struct.pack("<II", len(content) + 8, kind) + content
 
 
 def as_sent(markers: FloatArray) -> FloatArray:

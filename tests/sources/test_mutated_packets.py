@@ -1,20 +1,23 @@
 """Packets that were cut or flipped on their way: each is counted, and none ends anything."""
 
+import asyncio
 import itertools
 import random
 import struct
 import time
 from collections.abc import Callable, Sequence
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import qtm_server
 from natnet_server import FRAME, MODELS, NatNetServer, frame_content, packet
-from qtm_server import QTMServer
+from qtm_server import COMMAND, DATA, EVENT, QTMServer
 
 from mplearn.recording import Recording
 from mplearn.sources import Change, Source, Stream, open_source
 from mplearn.sources.inbox import Inbox, News, Sample
-from mplearn.sources.protocols import qtm
+from mplearn.sources.protocols import lsl, qtm
 from mplearn.sources.protocols.datagrams import DatagramReceiver
 from mplearn.sources.protocols.lines import frame_line, header_line
 from mplearn.sources.protocols.own import UDPReceiver
@@ -178,3 +181,105 @@ def test_a_qtm_that_says_nothing_and_answers_nothing_is_connected_to_again(
         before = source.tally.frames
         read_until(source, lambda: sent() and source.tally.frames > before + 10)
         assert source.tally.reconnected == 1
+
+
+class Connection:
+    """What a client does with its connection."""
+
+    aborted = False
+
+    def write(self, data: bytes) -> None: ...
+
+    def abort(self) -> None:
+        self.aborted = True
+
+
+def test_whole_packets_of_qtm_are_read_between_any_broken_ones(session: Recording) -> None:
+    """Whatever pieces they come in; a size that no packet has ends the connection."""
+    protocol = pytest.importorskip("qtm_rt.protocol")
+    markers, rng = np.nan_to_num(session.markers[:200]) * 1000.0, random.Random(0)
+    frames, broken, connection = [], [], Connection()
+    sent = b""
+
+    def client() -> qtm.WholePackets:
+        inner = protocol.QTMProtocol(loop=asyncio.new_event_loop(), on_disconnect=None)
+        inner.on_packet, inner.on_event = frames.append, lambda event: None
+        inner.loop.close()
+        whole = qtm.WholePackets(inner, broken.append)
+        whole.connection_made(connection)
+        return whole
+
+    for i in range(2000):
+        content = qtm_server.frame_content(markers[i % 200], i, i / 100.0)
+        bad = qtm_server.packet(DATA, mutated(content, rng))
+        sent += qtm_server.packet(DATA, content)
+        sent += bad if i % 2 else qtm_server.packet(rng.randrange(9), rng.randbytes(i % 40))
+    sent += qtm_server.packet(EVENT, bytes([11])) + qtm_server.packet(EVENT, b"")
+    endless = struct.pack("<qII", 0, 0, 2**32 - 1)
+    sent += qtm_server.packet(DATA, endless + struct.pack("<II", 0, 1))
+    sent += qtm_server.packet(DATA, endless + struct.pack("<II", 8, 1) * 9)
+    whole = client()
+    while sent:
+        piece = rng.randrange(1, 5000)
+        whole.data_received(sent[:piece])
+        sent = sent[piece:]
+    assert not connection.aborted
+    assert 500 < len(broken) < 2000
+    assert "its component 9 has 0 bytes, where 0 are left" in repr(broken[-1])
+    found = {packet.data for packet in frames}
+    expected = [qtm_server.frame_content(markers[i % 200], i, i / 100.0) for i in range(2000)]
+    assert all(each in found for each in expected)
+    for size in (0, 7, qtm.LARGEST + 1, 2**32 - 1):
+        connection.aborted, n_bad = False, len(broken)
+        whole = client()
+        whole.data_received(struct.pack("<II", size, COMMAND) * 3)
+        assert connection.aborted
+        assert f"its size is {size} bytes" in repr(broken[-1])
+        assert len(broken) == n_bad + 1
+
+
+def test_a_qtm_that_speaks_nonsense_is_connected_to_again(
+    session: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("qtm_rt")
+    monkeypatch.setattr(qtm, "TIMEOUT_S", 0.3)
+    markers, numbers = np.nan_to_num(session.markers[0]) * 1000.0, itertools.count()
+    with QTMServer(session.marker_names) as server, open_source(server.name) as source:
+
+        def whole() -> bool:
+            if server.streaming.is_set():
+                i = next(numbers)
+                server.send(markers, i, i / 100.0)
+            return source.tally.frames >= 120 * (source.tally.reconnected + 1)
+
+        read_until(source, whole)
+        for k, nonsense in enumerate((struct.pack("<II", 0, COMMAND), b"HTTP/1.1 400\r\n\r\n")):
+            server.streaming.clear()
+            server.send_raw(nonsense)
+            read_until(source, lambda k=k: whole() and source.tally.reconnected > k)
+        assert source.tally.damaged == 2
+        server.deaf = True
+        server.drop()
+        begin = time.monotonic()
+    assert time.monotonic() - begin < 5.0  # nobody waits for its answer
+
+
+def test_broken_descriptions_of_lab_streams_are_refused_or_read() -> None:
+    pylsl, rng = pytest.importorskip("pylsl"), random.Random(0)
+    names = tuple(f"M{k}.{axis}" for k in range(20) for axis in "xyz")
+    xml = lsl.described_info(pylsl, "walk", Stream(names, 100.0, unit_m=0.001)).as_xml()
+    assert lsl.described(xml)[0].channels == names
+    read = refused = 0
+    for _ in range(1000):
+        try:
+            stream, columns = lsl.described(mutated(xml.encode(), rng).decode(errors="replace"))
+        except (ValueError, ElementTree.ParseError):  # told, and it is tried again
+            refused += 1
+        else:
+            read += 1
+            assert len(stream.channels) == len(columns) <= 60
+    assert refused > 100 and read > 50
+    for number in ("0", "-1", "999999999", "60.5"):
+        odd = xml.replace("<channel_count>60<", f"<channel_count>{number}<")
+        with pytest.raises(ValueError, match=r"channels: 1 to|invalid literal"):
+            lsl.described(odd)

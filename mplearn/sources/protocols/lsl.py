@@ -19,6 +19,7 @@ from ..received import ReceivedSource, Receiver
 from ..registry import Wanted
 from ..sender import Sender
 from ..source import Block, Source, Stream, known_rate
+from .lines import MOST_CHANNELS
 
 EXTRA = "live"
 SEARCH_S, WAKE_S, BUFFER_S = 1.0, 0.1, 60
@@ -126,10 +127,13 @@ def described(xml: str) -> tuple[Stream, list[int]]:
     """Return what the description of a stream says, and which of its columns are used.
 
     Raises:
-        ValueError: It is none of numbers.
+        ValueError: It is none of numbers, or of no number of channels that there can be.
+        ElementTree.ParseError: It cannot be read.
     """
     info = ElementTree.fromstring(xml)
     n_channels = int(info.findtext("channel_count", "0"))
+    if not 1 <= n_channels <= MOST_CHANNELS:
+        raise ValueError(f"a stream of {n_channels} channels: 1 to {MOST_CHANNELS:,} can be read")
     if info.findtext("channel_format") == "string":
         raise ValueError(f"the stream {info.findtext('name', '')!r} holds text")
     rate_hz = known_rate(float(info.findtext("nominal_srate", "0")))
