@@ -151,6 +151,15 @@ class ReadReport:
         notes: What was found out or done that the file does not say, a sentence each.
         warnings: What contradicts itself, or is in doubt, a sentence each; one in doubt names the
             option that settles it.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from mplearn import open_recording
+        >>> rows = "".join(f"{k / 50:.2f},{k % 7}\n" for k in range(100))
+        >>> _ = Path("swing.csv").write_text("time_s,elbow\n" + rows)
+        >>> report = open_recording("swing.csv").report
+        >>> report.format, report.rate_hz, report.warnings
+        ('CSV', 50.0, ())
     """
 
     format: str
@@ -269,7 +278,12 @@ class Recording:
 
 
 def are_markers(channels: tuple[str, ...]) -> bool:
-    """Return whether columns are markers: ``NAME.x``, ``NAME.y``, ``NAME.z`` in turn."""
+    """Return whether columns are markers: ``NAME.x``, ``NAME.y``, ``NAME.z`` in turn.
+
+    Example:
+        >>> are_markers(("LSHO.x", "LSHO.y", "LSHO.z")), are_markers(("hip", "knee"))
+        (True, False)
+    """
     return (
         bool(channels)
         and len(channels) % 3 == 0
@@ -278,5 +292,10 @@ def are_markers(channels: tuple[str, ...]) -> bool:
 
 
 def marker_channels(names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the column names of markers: ``("A",)`` -> ``("A.x", "A.y", "A.z")``."""
+    """Return the column names of markers: ``("A",)`` -> ``("A.x", "A.y", "A.z")``.
+
+    Example:
+        >>> marker_channels(("LSHO", "RSHO"))
+        ('LSHO.x', 'LSHO.y', 'LSHO.z', 'RSHO.x', 'RSHO.y', 'RSHO.z')
+    """
     return tuple(f"{name}.{axis}" for name in names for axis in "xyz")

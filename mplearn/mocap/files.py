@@ -119,6 +119,12 @@ def read_text(path: Path) -> str:
 
     Raises:
         RecordingError: As `read_bytes`, or the file is not text.
+
+    Example:
+        >>> from pathlib import Path
+        >>> _ = Path("take.csv").write_text("time_s,coude gauche\n", encoding="utf-16")
+        >>> read_text(Path("take.csv"))
+        'time_s,coude gauche\n'
     """
     data = _plain(read_bytes(path))
     if b"\0" in data:

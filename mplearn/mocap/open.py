@@ -160,6 +160,16 @@ class Takes:
     Attributes:
         recordings: Those that can be read, in order of their names.
         unreadable: Why not, by name, for the others.
+
+    Example:
+        >>> from pathlib import Path
+        >>> Path("mixed").mkdir(exist_ok=True)
+        >>> rows = "".join(f"{k / 50:.2f},{k % 7}\n" for k in range(100))
+        >>> _ = Path("mixed", "swing.csv").write_text("time_s,elbow\n" + rows)
+        >>> _ = Path("mixed", "torn.csv").write_text("time_s,elbow\n0.1,up\n")
+        >>> takes = open_takes("mixed")
+        >>> [take.name for take in takes.recordings], list(takes.unreadable)
+        (['swing'], ['torn'])
     """
 
     recordings: tuple[Recording, ...]
@@ -174,7 +184,17 @@ def open_takes(
     hints: Hints | None = None,
     strict: bool = False,
 ) -> Takes:
-    """Read all takes as `open_recordings` does, and tell which cannot be read, without warnings."""
+    """Read all takes as `open_recordings` does, and tell which cannot be read, without warnings.
+
+    Example:
+        >>> from pathlib import Path
+        >>> Path("swings").mkdir(exist_ok=True)
+        >>> rows = "".join(f"{k / 50:.2f},{k % 7}\n" for k in range(100))
+        >>> for name in ("slow.csv", "quick.csv"):
+        ...     _ = Path("swings", name).write_text("time_s,elbow\n" + rows)
+        >>> [(take.name, take.rate_hz) for take in open_takes("swings").recordings]
+        [('quick', 50.0), ('slow', 50.0)]
+    """
     found: list[Recording] = []
     unreadable: dict[str, RecordingError] = {}
     takes = _takes(Path(path))
@@ -215,6 +235,15 @@ class TakeFiles:
         person: Who moves, as far as names of files and folders tell; empty where they do not.
         files: Its files, in order.
         reader: What reads them.
+
+    Example:
+        >>> from pathlib import Path
+        >>> Path("walks", "anna").mkdir(parents=True, exist_ok=True)
+        >>> rows = "".join(f"{k / 50:.2f},{k % 7}\n" for k in range(100))
+        >>> _ = Path("walks", "anna", "slow.csv").write_text("time_s,elbow\n" + rows)
+        >>> (take,) = find_takes("walks").takes
+        >>> take.name, take.person, len(take.read()[0])
+        ('anna/slow', 'anna', 100)
     """
 
     name: str
@@ -237,6 +266,14 @@ class FoundTakes(NamedTuple):
     Attributes:
         takes: In order of their names.
         unreadable: Why not, by name, for folders whose takes cannot be told apart.
+
+    Example:
+        >>> from pathlib import Path
+        >>> Path("bows").mkdir(exist_ok=True)
+        >>> _ = Path("bows", "deep.csv").write_text("time_s,elbow\n0,0\n0.1,1\n")
+        >>> found = find_takes("bows")
+        >>> [take.name for take in found.takes], dict(found.unreadable)
+        (['deep'], {})
     """
 
     takes: tuple[TakeFiles, ...]

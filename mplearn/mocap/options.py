@@ -22,7 +22,16 @@ _on_command_line: ContextVar[bool] = ContextVar("_on_command_line", default=Fals
 
 @contextmanager
 def command_line() -> Iterator[None]:
-    """While this lasts, messages name the options of the ``mplearn`` command."""
+    """While this lasts, messages name the options of the ``mplearn`` command.
+
+    Example:
+        >>> from mplearn.mocap.options import option
+        >>> option("unit_m")
+        'Hints(unit_m=...)'
+        >>> with command_line():
+        ...     option("unit_m")
+        '--unit'
+    """
     token = _on_command_line.set(True)
     try:
         yield

@@ -27,6 +27,20 @@ def register_reader(reader: Reader) -> None:
 
     Raises:
         InvalidValueError: It is no reader, or names no suffix such as ``".abc"``.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import Recording, open_recording
+        >>> from mplearn.mocap import Reader
+        >>> class Shouts(Reader):
+        ...     format, suffixes = "shouts", (".shout",)
+        ...     def read(self, path, hints, *, positions):
+        ...         rows = [[float(line)] for line in path.read_text().split()]
+        ...         return Recording(np.array(rows), hints.rate_hz or 25.0, ("loudness",))
+        >>> register_reader(Shouts())
+        >>> _ = Path("a.shout").write_text("0.1 0.5 0.2")
+        >>> open_recording("a.shout").channels
+        ('loudness',)
     """
     if not isinstance(reader, Reader):
         raise InvalidValueError(f"a reader must be an instance of Reader, not {reader!r}")

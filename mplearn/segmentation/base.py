@@ -23,6 +23,15 @@ class SegmenterState(State):
         rate_hz: Frames per second [1/s].
         n_frames: Frames since the start of the stream.
         arrays: Its arrays by name; each field of a record is one, as ``record.field``.
+
+    Example:
+        >>> from mplearn.segmentation import make_segmenter
+        >>> half = make_segmenter("zero-velocity", 1, 100.0)
+        >>> cuts = [half.update([0.01 * k]) for k in range(50)]
+        >>> later = make_segmenter("zero-velocity", 1, 100.0)
+        >>> later.load_state(half.state())  # goes on in the same segment
+        >>> half.state().n_frames, later.state() == half.state()
+        (50, True)
     """
 
     segmenter: str

@@ -39,6 +39,11 @@ class KinematicCentroidConfig:
         drop: A maximum is decided when the distance has fallen by this share of it.
         reach_s: A maximum counts if it is as far as the running speed leads in this time [s].
         speed: How the speed is filtered, what counts as still, and how long segments are.
+
+    Example:
+        >>> config = KinematicCentroidConfig(drop=0.1)  # decided later, and more surely
+        >>> KinematicCentroid(3, 100.0, config).n_channels
+        3
     """
 
     drop: float = 0.05
@@ -122,6 +127,14 @@ class KinematicCentroid(SpeedSegmenter):
 
     Raises:
         InvalidValueError: An argument is out of range.
+
+    Example:
+        >>> import numpy as np
+        >>> segmenter = KinematicCentroid(n_channels=1, rate_hz=100.0)
+        >>> t = np.arange(800) / 100.0
+        >>> lifts = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> [segment.end for segment in segmenter.segment(lifts)][:2]  # the top, the rest
+        [50, 102]
     """
 
     def __init__(

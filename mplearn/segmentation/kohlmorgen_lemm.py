@@ -68,6 +68,10 @@ class KohlmorgenLemmConfig:
         tolerance_s: How far from the minimum the change of state may lie [s].
         zero_velocity: How the speed is watched.
         turns: For directions: how turns of a motion that never rests are found.
+
+    Example:
+        >>> KohlmorgenLemmConfig().density, KohlmorgenLemmConfig.posture().density
+        ('direction', 'posture')
     """
 
     density: Density = "direction"
@@ -148,6 +152,15 @@ class KohlmorgenLemm(SpeedSegmenter):
 
     Raises:
         InvalidValueError: An argument is out of range.
+
+    Example:
+        >>> import numpy as np
+        >>> segmenter = KohlmorgenLemm(n_channels=2, rate_hz=100.0)
+        >>> t = np.arange(800) / 100.0
+        >>> lift = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)
+        >>> frames = np.stack((lift, 0.5 * lift), axis=1)  # up, down, a rest
+        >>> [segment.end for segment in segmenter.segment(frames)][:3]
+        [50, 100, 201]
     """
 
     def __init__(

@@ -34,6 +34,14 @@ class ZeroVelocityConfig:
         memory_s: Time constant of the running speed [s].
         trust: How much what is known about the motion's end counts, see `Segmenter.scaffold`:
             hysteresis times this where the end is sure, divided by it where it is sure not to be.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.segmentation import ZeroVelocity
+        >>> lifts = np.sin(np.pi * np.arange(400) / 100.0)[:, None]  # turns each second
+        >>> patient = ZeroVelocity(1, 100.0, ZeroVelocityConfig(min_length_s=1.5))
+        >>> len(ZeroVelocity(1, 100.0).segment(lifts)) > len(patient.segment(lifts))
+        True
     """
 
     cutoff_hz: float = 6.0

@@ -47,6 +47,11 @@ class TurnConfig:
         reach_running_s: and farther than the running speed does in this [s].
         hysteresis: A minimum of the speed at a turn is a boundary if it lies below this share of
             both peaks.
+
+    Example:
+        >>> from mplearn.segmentation import KohlmorgenLemmConfig
+        >>> KohlmorgenLemmConfig(turns=TurnConfig(min_length_s=0.3)).turns.min_length_s
+        0.3
     """
 
     axis_s: float = 1.0

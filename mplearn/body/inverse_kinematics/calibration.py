@@ -54,6 +54,15 @@ class Calibration:
         height_m: Estimated stature of the person [m].
         residual_m: Root mean square distance of the markers from their places in the fit [m].
         posture: Posture in the first frame, in the person's size, shape (7 + n,).
+
+    Example:
+        >>> from mplearn.body import InverseKinematics, robot_body
+        >>> from mplearn.demonstrator import Person, demonstrate
+        >>> take = demonstrate(["BAR"], seed=1, person=Person(height_m=1.6)).recording
+        >>> ik = InverseKinematics(robot_body(), take.marker_names, rate_hz=take.rate_hz)
+        >>> found = ik.calibrate(take.markers[:80])
+        >>> abs(found.height_m - 1.6) < 0.05, found.offsets.shape
+        (True, (34, 3))
     """
 
     factors: Annotated[FloatArray, Array("b", 3, low=1e-3, high=1e3)]

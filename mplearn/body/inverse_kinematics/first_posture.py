@@ -16,7 +16,19 @@ from .gauss_newton import Markers, Moves, Search, solve_frame
 
 
 class TooFewMarkersError(BodyError):
-    """Not enough markers are in sight yet to fit a body to them."""
+    """Not enough markers are in sight yet to fit a body to them.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.body import InverseKinematics, marker_set, robot_body
+        >>> markers = marker_set("plug_in_gait39")
+        >>> ik = InverseKinematics(robot_body(), list(markers.names))
+        >>> try:
+        ...     ik.calibrate(np.full((50, len(markers.names), 3), np.nan))  # nobody stands there
+        ... except TooFewMarkersError as error:
+        ...     print("wait until more of them are seen")
+        wait until more of them are seen
+    """
 
 
 TRUNK = ("pelvis", "abdomen", "chest", "clavicle_l", "clavicle_r", "head")

@@ -48,6 +48,10 @@ class IKConfig:
         most_uncertain: Bound on the uncertainty of a joint [rad] or the base [m].
         max_iterations: Gauss-Newton steps a frame.
         tolerance: Change below which a frame is solved [rad, m].
+
+    Example:
+        >>> IKConfig(marker_sigma_m=0.02).outlier_m  # of markers on loose clothes
+        0.06
     """
 
     marker_sigma_m: float = 0.01

@@ -8,6 +8,7 @@ abdomen), the marker goes to the segment that carries it there.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -184,11 +185,11 @@ def find_marker_set(marker_names: Sequence[str]) -> MarkerSet:
         raise BodyError(f"the markers {twice} occur more than once")
     known = {name: sum(marker_set(name).knows(plain)) for name in TABLES}
     best = max(TABLES, key=lambda name: (known[name], -len(TABLES[name])))
-    enough = min(LEAST_SHARE * len(plain), LEAST_OF_SET * len(TABLES[best]))
-    if known[best] < max(enough, 6):
+    enough = max(min(LEAST_SHARE * len(plain), LEAST_OF_SET * len(TABLES[best])), 6)
+    if known[best] < enough:
         raise BodyError(
             f"no marker set knows the markers {list(marker_names)[:6]}...: {best!r} comes closest "
-            f"with {known[best]} of {len(plain)}; there are {', '.join(TABLES)}, and "
+            f"with {known[best]} of {len(plain)}, and {math.ceil(enough)} are needed; there are {', '.join(TABLES)}, and "
             "mplearn.anatomy.recognise finds the body in recordings with other names"
         )
     return marker_set(best)

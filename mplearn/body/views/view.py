@@ -26,6 +26,13 @@ class View(Protocol):
 
     Attributes:
         channels: Names of the channels seen.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.body import feature_channels
+        >>> view = view_of(feature_channels())  # of a body: compared by where its parts are
+        >>> len(feature_channels()), len(view.channels)
+        (33, 78)
     """
 
     channels: tuple[str, ...]
@@ -48,6 +55,12 @@ class PlainView:
 
     Args:
         channels: Names of the D channels.
+
+    Example:
+        >>> import numpy as np
+        >>> view = PlainView(("hip", "knee"))
+        >>> view.see(np.array([[0.1, 0.2]])).tolist()
+        [[0.1, 0.2]]
     """
 
     def __init__(self, channels: tuple[str, ...]) -> None:
@@ -71,6 +84,15 @@ class BodyView:
 
     Args:
         body: The body.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.body import features_of, robot_body
+        >>> view = BodyView(robot_body())
+        >>> features = features_of(robot_body().rest[None])
+        >>> seen = view.see(features)
+        >>> seen.shape, bool(np.allclose(view.read(seen), features))
+        ((1, 78), True)
     """
 
     def __init__(self, body: Body) -> None:
@@ -95,6 +117,11 @@ class BodyView:
 
 
 def view_of(channels: tuple[str, ...]) -> View:
-    """Return the view of frames with these channels: the robot's if they are its features."""
+    """Return the view of frames with these channels: the robot's if they are its features.
+
+    Example:
+        >>> type(view_of(("hip", "knee"))).__name__
+        'PlainView'
+    """
     robot = robot_body()
     return BodyView(robot) if channels == feature_channels(robot) else PlainView(channels)

@@ -65,6 +65,11 @@ class Space:
         forward: The axis that points forward.
         says_unit: Whether the file itself names the unit, not only its format.
         says_up: Whether the file itself names the axes.
+
+    Example:
+        >>> space = Space(unit_m=0.001, up="y", says_unit=False)  # millimetres, most likely
+        >>> space.up, space.forward
+        ('y', 'x')
     """
 
     unit_m: float
