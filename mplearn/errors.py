@@ -72,7 +72,7 @@ class RecordingError(MPLearnError):
 
 
 class RecordingWarning(UserWarning):
-    """A recording contradicts itself, or something of it had to be guessed: see its report.
+    r"""A recording contradicts itself, or something of it had to be guessed: see its report.
 
     Example:
         >>> import warnings

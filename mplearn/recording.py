@@ -140,7 +140,7 @@ class Skeleton:
 
 @dataclass(frozen=True)
 class ReadReport:
-    """How a file was read: what it says, what was found out, what was left out.
+    r"""How a file was read: what it says, what was found out, what was left out.
 
     Attributes:
         format: Name of the dialect, as ``"C3D"`` or ``"Motive CSV"``.

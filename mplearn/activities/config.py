@@ -23,6 +23,15 @@ class ActivityConfig:
             were spread evenly over `reach_s`.
         mixing: Two stretches are one activity if neighbours lie in the other one at least at this
             share of what they would if both were mixed evenly.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.activities import find_activities
+        >>> t = np.arange(6000) / 50.0
+        >>> arms, legs = np.sin(4 * t) * (t < 60), np.sin(5 * t) * (t >= 60)
+        >>> quick = ActivityConfig(reach_s=4.0)  # postures come back within seconds
+        >>> np.unique(find_activities(np.stack((arms, legs), axis=1), 50.0, quick)).tolist()
+        [0, 1]
     """
 
     step_s: float = 0.1

@@ -21,6 +21,13 @@ def postures_of(frames: FloatArray, channels: tuple[str, ...]) -> FloatArray:
 
     Returns:
         Shape (T, V).
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.body import feature_channels, features_of, robot_body
+        >>> frames = features_of(robot_body().rest[None])
+        >>> postures_of(frames, feature_channels()).shape
+        (1, 78)
     """
     root = channels[0].partition(".")[0]
     if not {f"{root}.{axis}" for axis in (*_PLACE, "tz")} <= set(channels):

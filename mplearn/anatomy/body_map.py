@@ -30,9 +30,17 @@ class BodyMap:
         factor: What the recording's lengths are multiplied with to be metres.
         parts: What each place was made of: (place, names of points), those of the file first.
         left_out: Names of points that are no place of the body.
-        stature_m: Estimated stature of the person [m].
+        stature_m: Estimated stature of the person [m]; NaN where markers were known by name.
         confidence: How sure the map is, in [0, 1].
         warnings: What a user should know.
+
+    Example:
+        >>> from mplearn.anatomy import recognise
+        >>> from mplearn.demonstrator import demonstrate
+        >>> take = demonstrate(["BAR"], seed=1).recording
+        >>> found = recognise(take)
+        >>> found.unseen, len(found.apply(take)) == len(take)
+        ((), True)
     """
 
     points: tuple[str, ...]

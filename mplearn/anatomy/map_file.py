@@ -12,7 +12,7 @@ from ..mocap.files import read_text
 
 
 def read_map(path: str | os.PathLike[str]) -> dict[str, str]:
-    """Read a map file.
+    r"""Read a map file.
 
     Each line is ``point = place``, as ``LeftUpLeg = hip_l``; a place is one of the marker set
     ``"landmarks"``. ``point = -`` leaves a point out. What follows a ``#`` is a comment.
@@ -26,6 +26,13 @@ def read_map(path: str | os.PathLike[str]) -> dict[str, str]:
     Raises:
         BodyError: A line is none of these, names no place, or a place or a point occurs twice.
         RecordingError: The file cannot be read.
+
+    Example:
+        >>> from pathlib import Path
+        >>> lines = ["LeftUpLeg = hip_l", "RightUpLeg = hip_r  # a comment", "Hat = -"]
+        >>> _ = Path("names.txt").write_text("\n".join(lines))
+        >>> read_map("names.txt")
+        {'LeftUpLeg': 'hip_l', 'RightUpLeg': 'hip_r', 'Hat': ''}
     """
     known = marker_set("landmarks").names
     names: dict[str, str] = {}

@@ -44,6 +44,13 @@ def recognise_markers(recording: Recording, names: Mapping[str, str] | None = No
 
     Raises:
         BodyError: Too few of the labels are known, with the option that settles it.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> take = demonstrate(["BAR"], seed=1).recording
+        >>> found = recognise_markers(take)
+        >>> len(found.points) == len(take.marker_names), found.left_out
+        (True, ())
     """
     names = names or {}
     labels = recording.marker_names

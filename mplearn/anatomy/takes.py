@@ -29,6 +29,17 @@ class Bodies:
         maps: How each was recognised, by its name.
         marker_sets: Marker set of each, by its name: ``"landmarks"`` for skeletons.
         refused: Why not, by name, for the others.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import Recording
+        >>> from mplearn.anatomy import as_bodies
+        >>> from mplearn.demonstrator import demonstrate
+        >>> take = demonstrate(["BAR"], seed=1).recording
+        >>> lamp = Recording(np.zeros((100, 3)), 100.0, ("lamp.x", "lamp.y", "lamp.z"), name="lamp")
+        >>> bodies = as_bodies([take, lamp])
+        >>> len(bodies.recordings), list(bodies.refused)
+        (1, ['lamp'])
     """
 
     recordings: tuple[Recording, ...]

@@ -27,6 +27,14 @@ class PostureGraph:
         means: Mean state of the frames in each node, shape (n, 2 D).
         leaf_of: Leaf that each frame lies in, shape (T,).
         edges: Leaves that followed each other and how often: source, target, count, shape (E, 3).
+
+    Example:
+        >>> import numpy as np
+        >>> t = np.arange(2000) / 100.0
+        >>> markers = np.stack((np.sin(t), np.cos(t)), axis=1)  # round and round
+        >>> graph = PostureGraph.build(markers, 100.0)
+        >>> len(graph.leaf_of), bool((graph.edges[:, 2] > 0).all())
+        (2000, True)
     """
 
     parents: IntArray

@@ -17,6 +17,11 @@ class Shard(NamedTuple):
     Attributes:
         person: Who moves; empty where unknown.
         takes: Names of the takes, in order.
+
+    Example:
+        >>> shard = Shard("anna", ("anna/bow", "anna/walk"))
+        >>> f"{len(shard.takes)} takes of {shard.person}"
+        '2 takes of anna'
     """
 
     person: str

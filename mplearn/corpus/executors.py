@@ -21,7 +21,14 @@ _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NU
 
 
 class Executor(Protocol):
-    """Does work that needs nothing but its arguments, in any order."""
+    """Does work that needs nothing but its arguments, in any order.
+
+    Example:
+        >>> from mplearn.corpus import Here
+        >>> executor: Executor = Here()
+        >>> [executor.submit(pow, 2, n).result() for n in (3, 4)]
+        [8, 16]
+    """
 
     def submit(self, work: Callable[..., T], *args: Any) -> Future[T]:
         """Have ``work(*args)`` done; a dead worker is an error of the future, not of this call."""
@@ -31,7 +38,15 @@ class Executor(Protocol):
 
 
 class Here:
-    """Does the work in this process, at once."""
+    """Does the work in this process, at once.
+
+    Example:
+        >>> here = Here()
+        >>> here.submit(sum, [1, 2, 3]).result()
+        6
+        >>> type(here.submit(int, "one").exception()).__name__  # of the work, not of the call
+        'ValueError'
+    """
 
     def submit(self, work: Callable[..., T], *args: Any) -> Future[T]:
         """Do ``work(*args)`` and return what came of it."""
@@ -57,6 +72,13 @@ class Processes:
 
     Raises:
         InvalidValueError: ``jobs`` is not positive.
+
+    Example:
+        >>> workers = Processes(jobs=1)  # a process starts with the first work
+        >>> workers.close()
+        >>> Processes(jobs=0)
+        Traceback (most recent call last):
+        mplearn.errors.InvalidValueError: ...
     """
 
     def __init__(self, jobs: int) -> None:

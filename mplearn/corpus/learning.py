@@ -40,7 +40,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class Corpus:
-    """What came of a corpus.
+    r"""What came of a corpus.
 
     Attributes:
         learner: What was learned of it all, and goes on learning; None where it was stopped.
@@ -49,6 +49,16 @@ class Corpus:
         refused: Why not, by name, for takes that could not be learned.
         progress: How far it came.
         merging_s: Time that the merging took [s].
+
+    Example:
+        >>> from pathlib import Path
+        >>> _ = Path("takes").mkdir(exist_ok=True)
+        >>> rows = "".join(f"{k / 50:.2f},{k % 7}\n" for k in range(200))
+        >>> _ = Path("takes", "slow.csv").write_text("time_s,elbow\n" + rows)
+        >>> _ = Path("takes", "torn.csv").write_text("time_s,elbow\n0.1,up\n")
+        >>> corpus = learn_corpus("takes", "takes-learned", jobs=0)
+        >>> corpus.progress.learned, list(corpus.refused)
+        (1, ['torn'])
     """
 
     learner: MotionLearner | None

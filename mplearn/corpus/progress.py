@@ -22,6 +22,11 @@ class Progress:
         elapsed_s: Since this run began [s].
         already: Takes that earlier runs had done.
         deaths: Processes that died.
+
+    Example:
+        >>> progress = Progress(200, 50, {}, 3000.0, 41, 8, 2, 1, 100.0, already=0, deaths=0)
+        >>> progress.rate, progress.left_s
+        (0.5, 300.0)
     """
 
     takes: int

@@ -27,6 +27,12 @@ class Reading:
             ``"channels"``: the files' own channels.
         hints: What the files do not say about themselves.
         names: Place of the body by point, for what is known better than `recognise` finds it.
+
+    Example:
+        >>> from mplearn.mocap import Hints
+        >>> reading = Reading(observe="channels", hints=Hints(rate_hz=50.0))
+        >>> reading.hints.rate_hz
+        50.0
     """
 
     observe: Literal["robot", "positions", "channels"] = "robot"
@@ -76,7 +82,7 @@ def probe(
     rate_hz: float | None = None,
     executor: Executor | None = None,
 ) -> LearnerConfig:
-    """Find the rate and the channels at which a corpus is learned, from some of its takes.
+    r"""Find the rate and the channels at which a corpus is learned, from some of its takes.
 
     Takes spread evenly over the corpus are read: the rate is that of most of them, the channels are
     those that they share. Bodies of other markers are learned all the same.
@@ -89,6 +95,17 @@ def probe(
 
     Raises:
         MPLearnError: No take can be read; the first one's error.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from mplearn.mocap import find_takes
+        >>> rows = "".join(f"{k / 50:.2f},{k % 7}\n" for k in range(200))
+        >>> Path("takes").mkdir(exist_ok=True)
+        >>> for name in ("slow.csv", "quick.csv"):
+        ...     _ = Path("takes", name).write_text("time_s,elbow\n" + rows)
+        >>> config = probe(find_takes("takes").takes, Reading(observe="channels"))
+        >>> config.channels, config.rate_hz
+        (('elbow',), 50.0)
     """
     executor = executor or Here()
     step = max(1, len(takes) // _PROBED)

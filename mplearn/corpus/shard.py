@@ -63,6 +63,11 @@ class ShardReport:
         primitives: Number of primitives known.
         memory_bytes: Most memory that the process ever had [byte].
         deaths: How often a process died while it learned here.
+
+    Example:
+        >>> report = ShardReport(learned=("bow",), refused={"torn": "ends in frame 7"})
+        >>> len(report.learned), report.refused["torn"]
+        (1, 'ends in frame 7')
     """
 
     learned: tuple[str, ...] = ()

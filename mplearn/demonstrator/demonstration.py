@@ -30,6 +30,11 @@ class Demonstration:
             are in none.
         posture: The noiseless truth behind it: base position [m] and quaternion (w, x, y, z), then
             the 40 joint angles [rad], in MuJoCo's qpos layout.
+
+    Example:
+        >>> shown = demonstrate(["SQD", "SQR"], seed=1, rate_hz=50.0)
+        >>> [segment.label for segment in shown.truth], shown.posture.frames.shape[1]
+        (['SQD', 'SQR'], 47)
     """
 
     recording: Recording

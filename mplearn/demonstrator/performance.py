@@ -22,6 +22,12 @@ class Block:
         markers: Markers, shape (T, M, 3) [m]; NaN where hidden.
         postures: Postures, shape (T, 47): base position [m] and quaternion, joint angles [rad].
         truth: The segments that are known to have ended by now, in frames of the whole performance.
+
+    Example:
+        >>> from mplearn.demonstrator import Demonstrator
+        >>> block = next(Demonstrator(seed=1).blocks(["BAR", "BAL"]))
+        >>> len(block.markers) == len(block.postures), block.markers.shape[1:]
+        (True, (34, 3))
     """
 
     markers: FloatArray

@@ -34,6 +34,10 @@ class Primitive:
         duration_s: Typical duration [s].
         windows: Channel -> (begin, end) as shares of the duration; (0, 1) where none is given.
         bumps: Channel -> height of a passing deflection, zero at both ends [rad or leg lengths].
+
+    Example:
+        >>> PRIMITIVES["BAR"].meaning, PRIMITIVES["BAR"].start, PRIMITIVES["BAR"].end
+        ('both arms raise', 'stand', 'both arms up')
     """
 
     name: str

@@ -72,6 +72,12 @@ def drawn_sequencing(
 
     Raises:
         InvalidValueError: There is no round through these primitives.
+
+    Example:
+        >>> import numpy as np
+        >>> order = drawn_sequencing(np.random.default_rng(3))
+        >>> all(1 <= len(followers) <= 2 for followers in order.values())
+        True
     """
     postures: nx.MultiDiGraph[str] = nx.MultiDiGraph()
     for name in order.permutation(list(names)).tolist():

@@ -26,6 +26,14 @@ class Annotations:
     Attributes:
         name: The file's, without its suffix.
         stretches: For each take the stretches (start, end, activity), in order of the file.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import Recording
+        >>> labels = Annotations("by hand", {"take": ((0, 50, "walk"), (50, 100, "turn"))})
+        >>> take = labels.label(Recording(np.zeros((100, 1)), 50.0, ("x",), name="take"))
+        >>> [(label.start, label.label) for label in take.labels]
+        [(0, 'walk'), (50, 'turn')]
     """
 
     name: str
@@ -55,6 +63,14 @@ def read_annotations(path: Path) -> Annotations | None:
 
     Raises:
         RecordingError: The file cannot be read, or a stretch is not two frames in order.
+
+    Example:
+        >>> import json
+        >>> from pathlib import Path
+        >>> table = {"name": "by hand", "takes": {"take": [[0, 50, "walk"]]}}
+        >>> _ = Path("labels.json").write_text(json.dumps(table))
+        >>> read_annotations(Path("labels.json")) is None
+        True
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))

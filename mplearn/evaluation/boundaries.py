@@ -46,6 +46,13 @@ class BoundaryScore:
         n_found: Boundaries of the segmentation, inside the labelled stretch.
         errors_s: Distance of each matched pair [s], shape (n_matched,).
         delays_s: Delay of the decision for each matched boundary [s], shape (n_matched,).
+
+    Example:
+        >>> import numpy as np
+        >>> errors_s, delays_s = np.array([0.02, 0.01]), np.array([0.3, 0.4])
+        >>> score = BoundaryScore(4, 3, errors_s, delays_s)
+        >>> score.recall, round(score.precision, 3), round(score.f1, 3)
+        (0.5, 0.667, 0.571)
     """
 
     n_truth: int

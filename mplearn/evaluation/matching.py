@@ -27,6 +27,13 @@ class Matching:
         found_of: Index of the found segment that shows each true one; -1 where none does, length
             n_truth.
         labels: Class of each found segment; empty where it shows none, length n_found.
+
+    Example:
+        >>> from mplearn.recording import LabelledSegment, Segment
+        >>> truth = [LabelledSegment(0, 100, "wave"), LabelledSegment(100, 200, "bow")]
+        >>> matching = match_segments(truth, [Segment(3, 98), Segment(300, 400)], 100.0)
+        >>> matching.truth_of, matching.found_of
+        ((0, -1), (0, -1))
     """
 
     truth_of: tuple[int, ...]

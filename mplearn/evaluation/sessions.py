@@ -29,6 +29,10 @@ class SessionConfig:
         n_successors: How many movements usually follow a movement.
         loyalty: Probability that one of those follows, as long as they are not used up.
         executions: How often each repetition is used.
+
+    Example:
+        >>> SessionConfig(executions=2, loyalty=1.0).n_successors  # of each movement, and no others
+        3
     """
 
     blend_s: tuple[float, float] = (0.2, 0.6)
@@ -75,6 +79,18 @@ def make_session(
 
     Raises:
         RecordingError: There are no takes, they do not match, or hold too few repetitions.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LabelledSegment, Recording
+        >>> wave = 1 - np.cos(2 * np.pi * np.arange(400) / 100)  # four repetitions
+        >>> def take(name, size):
+        ...     labels = tuple(LabelledSegment(100 * k, 100 * k + 100, name) for k in range(4))
+        ...     return Recording(size * wave[:, None], 100.0, ("elbow",), name=name, labels=labels)
+        >>> takes = [take("up", 1.0), take("out", -1.0)]
+        >>> session = make_session(takes, np.random.default_rng(0))
+        >>> sorted({label.label for label in session.labels})
+        ['out-back', 'out-out', 'up-back', 'up-out']
     """
     config = config or SessionConfig()
     check_alike(takes, "session", ("channels", "rate_hz", "person"))

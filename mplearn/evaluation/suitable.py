@@ -27,6 +27,14 @@ def kind_of_labels(recordings: Iterable[Recording]) -> LabelKind:
 
     Raises:
         RecordingError: No recording has labels.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LabelledSegment, Recording
+        >>> again = tuple(LabelledSegment(100 * k, 100 * k + 100, "squat") for k in range(4))
+        >>> take = Recording(np.zeros((400, 1)), 100.0, ("knee",), labels=again)
+        >>> kind_of_labels([take])
+        'repetitions'
     """
     counts = [Counter(label.label for label in each.labels) for each in recordings if each.labels]
     if not counts:
@@ -39,7 +47,18 @@ def kind_of_labels(recordings: Iterable[Recording]) -> LabelKind:
 
 
 def repeating(recordings: Iterable[Recording]) -> tuple[Recording, ...]:
-    """Return the recordings that hold at least two labelled repetitions of one movement."""
+    """Return the recordings that hold at least two labelled repetitions of one movement.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LabelledSegment, Recording
+        >>> frames = np.zeros((200, 1))
+        >>> twice = (LabelledSegment(0, 100, "squat"), LabelledSegment(100, 200, "squat"))
+        >>> takes = [Recording(frames, 50.0, ("x",), name="squats", labels=twice)]
+        >>> takes.append(Recording(frames, 50.0, ("x",), name="walk"))
+        >>> [take.name for take in repeating(takes)]
+        ['squats']
+    """
     return tuple(
         each
         for each in recordings
@@ -50,7 +69,15 @@ def repeating(recordings: Iterable[Recording]) -> tuple[Recording, ...]:
 
 
 def lost_throughout(recording: Recording) -> str:
-    """Return the name of a channel of which a recording holds no measurement; empty where none."""
+    """Return the name of a channel of which a recording holds no measurement; empty where none.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import Recording
+        >>> frames = np.stack((np.zeros(50), np.full(50, np.nan)), axis=1)
+        >>> lost_throughout(Recording(frames, 50.0, ("hip", "knee")))
+        'knee'
+    """
     lost = np.isnan(recording.frames).all(axis=0)
     return recording.channels[int(lost.argmax())] if lost.any() else ""
 

@@ -23,6 +23,14 @@ class Dynamics:
         means: Shape (3, N, D): position, velocity [1/s], acceleration [1/s^2].
         variances: Shape (3, N, D).
         durations_s: Mean time in each state, shape (N,) [s].
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.hmm import fit
+        >>> ramp = np.linspace(0.0, 1.0, 51)[:, None]  # 1 in a second
+        >>> found = estimate_dynamics(fit([ramp], 5, variance_floor=1e-3), [ramp], rate_hz=50.0)
+        >>> found.means.shape, bool(np.allclose(found.means[1], 1.0, atol=0.05))
+        ((3, 5, 1), True)
     """
 
     means: FloatArray
@@ -41,6 +49,14 @@ def estimate_dynamics(
             model has states cannot be aligned and are left out; if none remains, the model's own
             means stand in, each for 1 / (1 - a_ii) frames.
         rate_hz: Frames per second of the model and the exemplars [1/s].
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.hmm import fit
+        >>> swing = np.sin(np.linspace(0, np.pi, 50))[:, None]
+        >>> found = estimate_dynamics(fit([swing], 6, variance_floor=1e-3), [swing], rate_hz=50.0)
+        >>> bool(found.means[1, 0, 0] > 0 > found.means[1, -1, 0])  # first up, at last down
+        True
     """
     usable = [frames for frames in exemplars if len(frames) >= hmm.n_states]
     if not usable:

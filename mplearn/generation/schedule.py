@@ -13,7 +13,18 @@ from .dynamics import Dynamics
 
 
 class GenerativePrimitive(Protocol):
-    """What a primitive must offer to be generated; `mplearn.library.Primitive` does."""
+    """What a primitive must offer to be generated; `mplearn.library.Primitive` does.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.hmm import fit
+        >>> from mplearn.library import Primitive
+        >>> swing = np.sin(np.linspace(0, np.pi, 50))[:, None]
+        >>> model = fit([swing], n_states=6, variance_floor=1e-3)
+        >>> primitive: GenerativePrimitive = Primitive.from_exemplars(1, model, [swing], 50.0)
+        >>> primitive.id, primitive.mean_duration_s, len(primitive.exemplars)
+        (1, 1.0, 1)
+    """
 
     @property
     def id(self) -> int:

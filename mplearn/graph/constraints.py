@@ -33,6 +33,17 @@ class Asked(TypedDict, total=False):
         novel: Ask for a sequence that has never been observed as a whole, though each of its steps
             has: one that holds a succession of at most ``order + 1`` primitives which is not among
             the histories counted (`history_capacity` bounds those).
+
+    Example:
+        >>> from mplearn.graph import TransitionGraph
+        >>> graph = TransitionGraph()
+        >>> for id in (1, 2, 3):
+        ...     graph.add_node(id)
+        >>> for previous, next_id in ((1, 2), (2, 3), (3, 1), (1, 3)):
+        ...     graph.observe(previous, next_id, 1.0)
+        >>> asked: Asked = {"length": 4, "duration_s": (2.5, 3.5)}
+        >>> graph.path(1, 2, **asked)
+        (1, 3, 1, 2)
     """
 
     length: int | None

@@ -24,6 +24,14 @@ class GraphState(SharedState):
         ids: The primitives, in the order in which they were added, shape (n,).
         edges: Source, target, count, total [ms], squares [ms^2], shape (E, 5).
         histories: Length, context padded with 0, next, count, shape (H, order + 3).
+
+    Example:
+        >>> from mplearn.graph import TransitionGraph
+        >>> graph = TransitionGraph()
+        >>> graph.add_node(1), graph.add_node(2), graph.observe(1, 2, 0.5)
+        (None, None, None)
+        >>> graph.state().ids.tolist(), graph.state().edges[0, :3].tolist()
+        ([1, 2], [1, 2, 1])
     """
 
     order: Annotated[int, Range(1, 8)]

@@ -26,6 +26,17 @@ class Prediction:
             starts [s]. Where this transition has never been seen, that until whatever followed;
             NaN where nothing ever did.
         duration_std_s: Standard deviation of that time [s].
+
+    Example:
+        >>> from mplearn.graph import TransitionGraph
+        >>> graph = TransitionGraph()
+        >>> for id in (1, 2):
+        ...     graph.add_node(id)
+        >>> for duration_s in (0.8, 1.0, 1.2):
+        ...     graph.observe(1, 2, duration_s)
+        >>> coming = graph.predict([1], k=1)[0]
+        >>> coming.id, round(coming.duration_s, 3)
+        (2, 1.0)
     """
 
     id: int

@@ -16,6 +16,18 @@ class ProvisionalGraph:
 
     Args:
         graph: The graph; its order and its weight of shorter histories hold for both.
+
+    Example:
+        >>> from mplearn.graph import TransitionGraph
+        >>> graph = TransitionGraph()
+        >>> for id in (1, 2):
+        ...     graph.add_node(id)
+        >>> graph.observe(1, 2, 0.9)
+        >>> beside = ProvisionalGraph(graph)
+        >>> beside.add_node(-1)  # a motion seen once
+        >>> beside.observe(2, -1, 1.0)
+        >>> beside.predict([2], k=1)[0].id, graph.ids
+        (-1, (1, 2))
     """
 
     def __init__(self, graph: TransitionGraph) -> None:

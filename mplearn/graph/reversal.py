@@ -31,7 +31,19 @@ class CountsState(State):
 
 @dataclass(frozen=True, eq=False)
 class GraphEdit(State):
-    """What an edit changed in a graph: its rows before and after."""
+    """What an edit changed in a graph: its rows before and after.
+
+    Example:
+        >>> from mplearn.graph import TransitionGraph
+        >>> graph = TransitionGraph()
+        >>> for id in (1, 2):
+        ...     graph.add_node(id)
+        >>> before = graph.state()
+        >>> graph.observe(1, 2, 0.9)
+        >>> edit = GraphEdit.between(before, graph.state())
+        >>> len(edit.before.edges), len(edit.after.edges), len(edit.reversed().after.edges)
+        (0, 1, 0)
+    """
 
     before: CountsState
     after: CountsState

@@ -147,7 +147,10 @@ class TransitionGraph:
     def exchange(
         self, edit: GraphEdit, heirs: Mapping[int, int | None], ids: Iterable[int]
     ) -> None:
-        """Undo an edit, or do it again; see `mplearn.graph.reversal`."""
+        """Put an edit's rows of after in the place of those of before, whatever came since.
+
+        So it is done again, and undone with ``edit.reversed()``; see `mplearn.graph.reversal`.
+        """
         self._before_change()
         twin = TransitionGraph.from_state(exchanged(self.state(), edit, heirs, ids))
         self._index, self._edges, self._histories = twin._index, twin._edges, twin._histories

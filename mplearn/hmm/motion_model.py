@@ -13,6 +13,14 @@ class MotionModel(Protocol):
     """A model that recognises a motion by its likelihood and generates it.
 
     `LeftRightHMM`, `SemiMarkovHMM` and `FactorialHMM` are of this kind.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.hmm import fit
+        >>> swing = np.sin(np.linspace(0, np.pi, 40))[:, None]
+        >>> model: MotionModel = fit([swing], 4, variance_floor=1e-3)
+        >>> model.n_channels, model.mean_motion().shape
+        (1, (24, 1))
     """
 
     @property

@@ -23,6 +23,13 @@ class SizeSelection(NamedTuple):
         n_states: The best number of states.
         model: The model of that size.
         criterion: Value of the criterion for each size tried; smaller is better.
+
+    Example:
+        >>> import numpy as np
+        >>> swing = [np.sin(np.linspace(0, np.pi, n))[:, None] for n in (40, 44)]
+        >>> chosen = select_size(swing, (2, 6), variance_floor=1e-3)
+        >>> chosen.n_states, bool(chosen.criterion[6] < chosen.criterion[2])
+        (6, True)
     """
 
     n_states: int

@@ -52,6 +52,12 @@ class SequenceBatch(NamedTuple):
         columns: The same transposed, shape (D, sum T).
         weights: Shape (sum T,).
         offsets: Sequence s is ``frames[offsets[s]:offsets[s + 1]]``, shape (S + 1,).
+
+    Example:
+        >>> import numpy as np
+        >>> batch = SequenceBatch.of([np.zeros((40, 2)), np.ones((30, 2))])
+        >>> batch.n_sequences, batch.n_channels, batch.offsets.tolist()
+        (2, 2, [0, 40, 70])
     """
 
     frames: FloatArray

@@ -29,6 +29,15 @@ class ModelStack(NamedTuple):
         n_states: States that are not padding, shape (M,).
         scales: -1 / (2 variance), shape (M, N, D).
         norms: Sums of ``log_norms`` over the channels, shape (M, N).
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.hmm import fit
+        >>> up = np.linspace(0.0, 1.0, 40)[:, None]
+        >>> models = [fit([up], n_states, variance_floor=1e-2) for n_states in (4, 6)]
+        >>> stack = ModelStack.of(models)
+        >>> stack.n_models, stack.means.shape, stack.n_states.tolist()
+        (2, (2, 6, 1), [4, 6])
     """
 
     means: FloatArray
@@ -128,6 +137,15 @@ def score_pairs(
 
     Raises:
         ModelError: Models and sequences differ in their channels.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.hmm import SequenceBatch, fit
+        >>> up = np.linspace(0.0, 1.0, 40)[:, None]
+        >>> stack = ModelStack.of([fit([motion], 4, variance_floor=1e-2) for motion in (up, -up)])
+        >>> own, other = score_pairs(stack, SequenceBatch.of([up, -up]), np.array([[0, 0], [0, 1]]))
+        >>> bool(own > other)
+        True
     """
     if stack.means.shape[2] != batch.n_channels:
         raise ModelError(

@@ -149,6 +149,14 @@ def activity(model: LeftRightHMM) -> FloatArray:
     """Return how much each channel takes part in a motion, shape (D,), with a mean of 1.
 
     The variance of its means over the states, as a share of that of all channels.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.hmm import fit
+        >>> t = np.linspace(0, np.pi, 40)
+        >>> model = fit([np.stack((np.sin(t), 0.01 * t), axis=1)], 4, variance_floor=1e-3)
+        >>> activity(model).round(1).tolist()  # the first channel does nearly all of it
+        [2.0, 0.0]
     """
     spread = model.means.var(axis=0)
     mean = spread.mean()

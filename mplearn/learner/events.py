@@ -23,6 +23,16 @@ class SegmentClosed:
     Attributes:
         segment: Where it lies, and how sure its end is.
         placement: All that the tree said of it; None for a pause, which the tree does not see.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> t = np.arange(400) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+        >>> closed = [e for e in learner.learn_many(swing) if isinstance(e, SegmentClosed)]
+        >>> [(e.segment.start, e.segment.end, e.placement is None) for e in closed[:3]]  # a rest
+        [(0, 50, False), (50, 100, False), (100, 201, True)]
     """
 
     segment: Segment
@@ -61,6 +71,16 @@ class PrimitiveBorn:
         exemplars: How many demonstrations it was formed from.
         provisional: Whether it is yet to be confirmed by more (`TreeConfig.confirmed`); it is
             recognised all the same.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> t = np.arange(800) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+        >>> events = learner.learn_many(swing)
+        >>> [event.primitive for event in events if isinstance(event, PrimitiveBorn)]
+        [1, 2]
     """
 
     segment: Segment
@@ -77,6 +97,11 @@ class PrimitiveConfirmed:
         segment: The segment that confirmed it.
         primitive: Its id.
         exemplars: How many demonstrations it has by now.
+
+    Example:
+        >>> event = PrimitiveConfirmed(Segment(401, 450), primitive=1, exemplars=3)
+        >>> f"primitive {event.primitive} is sure after {event.exemplars} demonstrations"
+        'primitive 1 is sure after 3 demonstrations'
     """
 
     segment: Segment
@@ -91,6 +116,12 @@ class PrimitiveForgotten:
     Attributes:
         segment: The segment whose arrival made it too old.
         primitive: Id that it had.
+
+    Example:
+        >>> names = {1: "wave", 2: "stumble"}
+        >>> event = PrimitiveForgotten(Segment(9000, 9080), primitive=2)
+        >>> names.pop(event.primitive), names  # it will not be recognised again
+        ('stumble', {1: 'wave'})
     """
 
     segment: Segment
@@ -105,6 +136,13 @@ class PrimitiveMerged:
         segment: The segment whose arrival showed it.
         primitive: Id that stays.
         absorbed: Id that is gone; its counts went to ``primitive``.
+
+    Example:
+        >>> counts = {1: 5, 4: 2}
+        >>> event = PrimitiveMerged(Segment(9000, 9080), primitive=1, absorbed=4)
+        >>> counts[event.primitive] += counts.pop(event.absorbed)
+        >>> counts
+        {1: 7}
     """
 
     segment: Segment
@@ -120,6 +158,13 @@ class PrimitiveSplit:
         segment: The segment whose arrival showed it.
         primitive: Id of the node that was split; it stays in the tree as a more general motion.
         into: Ids of the new primitives.
+
+    Example:
+        >>> event = PrimitiveSplit(Segment(9000, 9080), primitive=4, into=(7, 8))
+        >>> match event:
+        ...     case PrimitiveSplit(primitive=general, into=special):
+        ...         print(f"{general} was {len(special)} motions: {special}")
+        4 was 2 motions: (7, 8)
     """
 
     segment: Segment
@@ -136,6 +181,16 @@ class TransitionSeen:
         previous: Id of the earlier primitive.
         primitive: Id of the later one.
         count: How often this pair has been seen by now.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> t = np.arange(800) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+        >>> seen = [e for e in learner.learn_many(swing) if isinstance(e, TransitionSeen)]
+        >>> {(event.previous, event.primitive) for event in seen} == {(1, 2), (2, 1)}
+        True
     """
 
     segment: Segment
@@ -152,6 +207,11 @@ class PersonChanged:
         frame: First frame of that person.
         person: Number of the person, 0, 1, ... in the order of their coming.
         new: Whether he or she was never seen before.
+
+    Example:
+        >>> event = PersonChanged(frame=7200, person=1, new=True)
+        >>> f"person {event.person} is {'new here' if event.new else 'back'}"
+        'person 1 is new here'
     """
 
     frame: int
@@ -170,6 +230,18 @@ class FramesLost:
         start: First frame.
         end: One past the last.
         reason: What is wrong with it.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> learner = MotionLearner(LearnerConfig(("elbow",)))
+        >>> t = np.arange(400) / 100.0
+        >>> stream = np.sin(t)[:, None]
+        >>> stream[200:300] = 1e300  # the sender is broken
+        >>> for event in learner.learn_many(stream):
+        ...     if isinstance(event, FramesLost):
+        ...         print(event.start, event.end)
+        157 300
     """
 
     start: int
@@ -184,6 +256,11 @@ class AxesChanged:
     Attributes:
         frame: First frame that was found so.
         size: Size of its unit, relative to the stream's at its start.
+
+    Example:
+        >>> event = AxesChanged(frame=12000, size=1000.0)  # metres became millimetres
+        >>> f"from frame {event.frame} on lengths are divided by {event.size:g}"
+        'from frame 12000 on lengths are divided by 1000'
     """
 
     frame: int
@@ -201,6 +278,11 @@ class Anomaly:
         score: How far out: the distance to the nearest primitive over what is usual there
             (`mplearn.library.MotionNovelty`), or the surprise of the transition [nat].
         p_value: Share of what was learned that is at least as far out, in (0, 1].
+
+    Example:
+        >>> event = Anomaly(Segment(9000, 9080), kind="motion", score=4.2, p_value=0.008)
+        >>> event.p_value <= 0.01  # so far out is one motion in a hundred, at most
+        True
     """
 
     segment: Segment

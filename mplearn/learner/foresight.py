@@ -21,6 +21,17 @@ class NextMotion:
         duration_s: Mean time from the start of the last motion until this one starts [s], see
             `mplearn.graph.Prediction`.
         duration_std_s: Standard deviation of that time [s].
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> t = np.arange(850) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+        >>> events = learner.learn_many(swing)  # the last was down
+        >>> expected = learner.predict_next(k=1)[0]
+        >>> expected.id, expected.probability > 0.5, round(expected.duration_s)
+        (1, True, 2)
     """
 
     id: int | None

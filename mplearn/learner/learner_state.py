@@ -42,6 +42,15 @@ class LearnerState(State):
         absurd: What frames of plain channels are held against.
         frozen: Primitives that stay as they were.
         paused: Whether motions are recognised only.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> learner = MotionLearner(LearnerConfig(("elbow",)))
+        >>> events = learner.learn_many(np.zeros((120, 1)))
+        >>> state = learner.state()
+        >>> state.n_frames, MotionLearner.from_state(state).n_frames  # goes on where it stood
+        (120, 120)
     """
 
     config: LearnerConfig

@@ -16,7 +16,15 @@ from .snapshot import FrozenState
 
 
 class Known(NamedTuple):
-    """What a learner knows of motions at one moment."""
+    """What a learner knows of motions at one moment.
+
+    Example:
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> learner = MotionLearner(LearnerConfig(("elbow",)))
+        >>> known = learner.known()
+        >>> len(known.people.trees), known.graph.ids.tolist()
+        (1, [])
+    """
 
     people: PeopleState
     graph: GraphState
@@ -80,6 +88,20 @@ class LearnerEdit(State):
         frozen_before: Frozen primitives that were others then, or none.
         frozen_after: What they were then.
         nearest: In what segments were nearest to; None where that was not noted.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> t = np.arange(800) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+        >>> events = learner.learn_many(swing)
+        >>> before = learner.known()
+        >>> change = learner.remove(2)
+        >>> edit = LearnerEdit.between(before, learner.known())
+        >>> undone = learner.exchange(edit)
+        >>> undone.back, learner.snapshot().names
+        ((2,), ('P1', 'P2'))
     """
 
     people: PeopleEdit

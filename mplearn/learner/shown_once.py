@@ -74,6 +74,14 @@ def with_takes(library: PrimitiveLibrary, takes: Sequence[FloatArray]) -> Primit
     Args:
         library: What is known.
         takes: In the library's channels, shape (T, D) each.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> library = MotionLearner(LearnerConfig(("elbow",), rate_hz=50.0)).snapshot()
+        >>> held = np.full((200, 1), 0.7)
+        >>> len(library), len(with_takes(library, [held]))
+        (0, 1)
     """
     longest = round(POSTURE_S * library.rate_hz)
     pieces = [frames[:longest] for frames in takes if len(frames)]

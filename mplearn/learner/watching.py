@@ -83,6 +83,13 @@ class Watching:
 
     Raises:
         BodyError: The markers belong to no known set.
+
+    Example:
+        >>> from mplearn.body import marker_set
+        >>> from mplearn.recording import marker_channels
+        >>> watching = Watching(marker_channels(marker_set("plug_in_gait39").names), rate_hz=100.0)
+        >>> watching.n_people, len(watching.watches)
+        (0, 1)
     """
 
     def __init__(self, channels: tuple[str, ...], rate_hz: float) -> None:

@@ -24,6 +24,11 @@ class AnomalyScore(NamedTuple):
             is usual there. Of a transition: its surprise, -log of its probability [nat].
         p_value: Share of what was learned that is at least as far out, in (0, 1]: alarms at
             ``p_value <= a`` are false at a rate of about a.
+
+    Example:
+        >>> usual = AnomalyScore(score=0.9, p_value=0.62)
+        >>> usual.p_value <= 0.01  # an alarm that is false once in a hundred motions
+        False
     """
 
     score: float
@@ -42,6 +47,15 @@ class MotionNovelty:
         matrices: Distances among the exemplars of each primitive, shape (k, k), on the scale of the
             tree's rules.
         n_nearest: A motion's distance to a primitive is the mean of that to so many exemplars.
+
+    Example:
+        >>> import numpy as np
+        >>> apart = np.full((20, 20), 0.1)  # distances among 20 executions of primitive 7
+        >>> np.fill_diagonal(apart, 0.0)
+        >>> novelty = MotionNovelty({7: apart}, n_nearest=2)
+        >>> known, other = novelty.score([(7, 0.1)]), novelty.score([(7, 2.0)])
+        >>> known.p_value > 0.5, other.score > 10 * known.score, other.p_value < 0.05
+        (True, True, True)
     """
 
     def __init__(self, matrices: Mapping[int, FloatArray], n_nearest: int) -> None:

@@ -159,6 +159,11 @@ class TreeNode(NamedTuple):
         id: Identity; that of its primitive, if it is a leaf.
         parent: Node above it; None at the root.
         n_exemplars: How many segments were placed in it.
+
+    Example:
+        >>> nodes = (TreeNode(0, None, 3), TreeNode(1, 0, 12), TreeNode(2, 0, 9))
+        >>> [node.id for node in nodes if node.parent == 0]
+        [1, 2]
     """
 
     id: int

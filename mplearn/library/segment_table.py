@@ -24,6 +24,13 @@ class RecognisedSegment(NamedTuple):
         p_value: Share of what was learned that is at least as far out, in (0, 1]; NaN as above.
         person: Who moves; "" where unknown.
         confidence: How sure the segmenter is of the boundary at the end, in [0, 1].
+
+    Example:
+        >>> row = RecognisedSegment("walk", 0.5, 1.7, 3, "step", "step", 0.2, 0.6, "anna")
+        >>> round(row.duration_s, 6), row.name
+        (1.2, 'step')
+        >>> RecognisedSegment.from_dict(row.as_dict()).primitive
+        3
     """
 
     take: str

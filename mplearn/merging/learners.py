@@ -63,6 +63,14 @@ def merged_learner(learners: Iterable[MotionLearner], people: Sequence[str] = ()
 
     Raises:
         InvalidValueError: As `merge_learners`; some are used up by then.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.learner import LearnerConfig, MotionLearner
+        >>> learners = [MotionLearner(LearnerConfig(("elbow",))) for _ in range(3)]
+        >>> events = [learner.learn_many(np.zeros((100, 1))) for learner in learners]
+        >>> merged_learner(learners).n_frames
+        300
     """
     merged, several = _merged(learners, people)
     merged.tree.wake()
@@ -80,6 +88,14 @@ def merged_state(learners: Iterable[MotionLearner], people: Sequence[str] = ()) 
 
     Raises:
         InvalidValueError: As `merge_learners`; some are used up by then.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.learner import LearnerConfig, MotionLearner
+        >>> learners = [MotionLearner(LearnerConfig(("elbow",))) for _ in range(2)]
+        >>> events = [learner.learn_many(np.zeros((100, 1))) for learner in learners]
+        >>> merged_state(learners).n_frames
+        200
     """
     return _merged(learners, people)[0].state()
 

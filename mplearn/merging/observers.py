@@ -19,6 +19,14 @@ def merge_observers(
     """Return the state of the first with the people of the second, and their numbers there.
 
     Neither changes; see `merge_bodies` for what was told.
+
+    Example:
+        >>> from mplearn.body import MotionObserver, marker_set
+        >>> names = marker_set("plug_in_gait39").names
+        >>> first, second = (MotionObserver(names, rate_hz=100.0) for _ in range(2))
+        >>> state, numbers = merge_observers(first, second, {}, ())
+        >>> len(state.known), numbers
+        (0, {})
     """
     state = first.state()
     bodies, numbers = merge_bodies(first.identity.bodies, second.identity.bodies, known, apart)

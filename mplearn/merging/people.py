@@ -47,6 +47,18 @@ def merge_people(trees: Sequence[PeopleTree], people: Sequence[Mapping[int, int]
 
     Raises:
         InvalidValueError: The trees have other rules, channels or rates.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.people import PeopleTree
+        >>> from mplearn.tree import TreeConfig
+        >>> trees = [PeopleTree(TreeConfig(), n_channels=2, rate_hz=100.0) for _ in range(2)]
+        >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+        >>> for tree in trees:
+        ...     placed = [tree.insert(k * lift, 0) for k in (1.0, -1.0, 1.01, -1.01)]
+        >>> merged = merge_people(trees, [{0: 0}, {0: 0}])  # both have watched one person
+        >>> len(merged.tree.leaves), merged.tree.people
+        (2, (0,))
     """
     return merged_people([tree.copy() for tree in trees], people)
 

@@ -54,6 +54,17 @@ def merge_trees(trees: Sequence[PrimitiveTree], least: int = 2) -> MergedTree:
 
     Raises:
         InvalidValueError: The trees have other rules, channels or rates.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.tree import PrimitiveTree, TreeConfig
+        >>> trees = [PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0) for _ in range(2)]
+        >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+        >>> for tree in trees:
+        ...     placed = [tree.insert(k * lift) for k in (1.0, -1.0, 1.01, -1.01)]
+        >>> merged = merge_trees(trees)
+        >>> len(merged.tree.leaves), merged.tree.n_seen
+        (2, 8)
     """
     first, *others = trees
     for other in others:

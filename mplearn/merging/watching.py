@@ -23,6 +23,15 @@ def merge_watching(
 
     Returns:
         The number in the first of each person of the second.
+
+    Example:
+        >>> from mplearn.body import marker_set
+        >>> from mplearn.learner import Watching
+        >>> from mplearn.recording import marker_channels
+        >>> channels = marker_channels(marker_set("plug_in_gait39").names)
+        >>> first, second = Watching(channels, 100.0), Watching(channels, 100.0)
+        >>> merge_watching(first, second, "", {})  # neither has seen anybody
+        {}
     """
     numbers: dict[int, int] = {}
     for other in second.watches:

@@ -115,7 +115,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """Return the content of a text file: UTF-8, Latin-1 of older tools, or UTF-16 of Windows.
+    r"""Return the content of a text file: UTF-8, Latin-1 of older tools, or UTF-16 of Windows.
 
     Raises:
         RecordingError: As `read_bytes`, or the file is not text.

@@ -155,7 +155,7 @@ def open_recordings(
 
 @dataclass(frozen=True)
 class Takes:
-    """The takes of a folder.
+    r"""The takes of a folder.
 
     Attributes:
         recordings: Those that can be read, in order of their names.
@@ -184,7 +184,7 @@ def open_takes(
     hints: Hints | None = None,
     strict: bool = False,
 ) -> Takes:
-    """Read all takes as `open_recordings` does, and tell which cannot be read, without warnings.
+    r"""Read all takes as `open_recordings` does, and tell which cannot be read, without warnings.
 
     Example:
         >>> from pathlib import Path
@@ -228,7 +228,7 @@ def take_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class TakeFiles:
-    """A take that lies in files, and is not read yet.
+    r"""A take that lies in files, and is not read yet.
 
     Attributes:
         name: What it is called, with the folders that it lies in.
@@ -261,7 +261,7 @@ class TakeFiles:
 
 
 class FoundTakes(NamedTuple):
-    """The takes of a folder and of those in it, not read yet.
+    r"""The takes of a folder and of those in it, not read yet.
 
     Attributes:
         takes: In order of their names.

@@ -28,6 +28,16 @@ class PeopleState(State):
         next_id: First id that was never used, as long as there is one person.
         trees: Each person's tree, in the order of their coming.
         sharing: What they share; None as long as there is one person.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.people import PeopleTree
+        >>> from mplearn.tree import TreeConfig
+        >>> tree = PeopleTree(TreeConfig(), n_channels=1, rate_hz=100.0)
+        >>> placed = tree.insert(np.sin(np.linspace(0, np.pi, 60))[:, None], person=0)
+        >>> state = tree.state()
+        >>> state.n_seen, len(state.trees), state.sharing is None
+        (1, 1, True)
     """
 
     n_seen: Count

@@ -283,7 +283,10 @@ class PeopleTree:
         return self._primitives.freeze(id, frozen)
 
     def exchange(self, edit: PeopleEdit) -> Exchange:
-        """Undo an edit, or do it again; see `mplearn.tree.reversal`."""
+        """Put an edit's nodes of after in the place of those of before, whatever came since.
+
+        So it is done again, and undone with ``edit.reversed()``; see `mplearn.tree.reversal`.
+        """
         known = self._trees
         found = {each.person: known[each.person].exchange(each.nodes) for each in edit.trees}
         return self._primitives.exchange(edit, found)

@@ -64,6 +64,19 @@ class PeopleEdit(State):
         trees: The trees of those who had one.
         before: What was shared before; None as long as there was one person.
         after: What was shared then.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.people import PeopleTree
+        >>> from mplearn.tree import TreeConfig
+        >>> tree = PeopleTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+        >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+        >>> placed = [tree.insert(k * lift, 0) for k in (1.0, 1.01, 0.99, -1.0, -1.01)]
+        >>> before, leaves = tree.state(), tree.leaves
+        >>> change = tree.remove(leaves[0])
+        >>> edit = PeopleEdit.between(before, tree.state())
+        >>> leaves[0] in edit.primitives, len(tree.leaves)
+        (True, 1)
     """
 
     trees: tuple[TreeEdit, ...]

@@ -29,6 +29,11 @@ class Wanted:
             markers and joints; or the stream's own ``"channels"``.
         hints: What the stream does not say about itself, or says wrongly.
         names: Place of the body by marker or joint; see `mplearn.anatomy.recognise`.
+
+    Example:
+        >>> from mplearn.mocap import Hints
+        >>> Wanted(observe="channels", hints=Hints(rate_hz=100.0)).hints.rate_hz
+        100.0
     """
 
     observe: Observe = "robot"
@@ -59,6 +64,14 @@ def register_source(kind: str, factory: Factory) -> None:
 
     Raises:
         InvalidValueError: The kind is no such name.
+
+    Example:
+        >>> from mplearn.sources import connect
+        >>> def still(address, wanted, **options):
+        ...     return connect("demonstrator:7", wanted, **options)
+        >>> register_source("still", still)
+        >>> "still" in source_kinds()
+        True
     """
     if not re.fullmatch(r"[a-z][a-z0-9_-]*", kind):
         raise InvalidValueError(f"a kind of source is like 'my-suit', lower case, not {kind!r}")
@@ -80,7 +93,15 @@ def source_kinds() -> dict[str, str]:
 
 
 def connect(name: str, wanted: Wanted | None = None, **options: Any) -> Source:
-    """Return a source as it comes: its own axes, unit and names; see `open_source`."""
+    """Return a source as it comes: its own axes, unit and names; see `open_source`.
+
+    Example:
+        >>> from mplearn.sources import Block
+        >>> with connect("demonstrator:7", speed=float("inf")) as source:
+        ...     block = next(item for item in source if isinstance(item, Block))
+        >>> block.rate_hz, len(block.channels)
+        (100.0, 102)
+    """
     _load_entry_points()
     kind, _, address = name.partition(":")
     factory = _registered.get(kind)

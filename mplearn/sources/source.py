@@ -110,6 +110,15 @@ class Block:
         lost: Frames that never came, among these.
         doubled: Frames that came twice since the last block; the first one counts.
         late: Frames that came when their place was already given up, since the last block.
+
+    Example:
+        >>> import numpy as np
+        >>> stream = Stream(("hip", "knee"), rate_hz=100.0)
+        >>> frames = np.array([[0.1, 0.2], [np.nan, np.nan], [0.1, 0.3]])  # one never came
+        >>> arrived_s = np.array([50.0, np.nan, 50.02])
+        >>> block = Block(stream, frames, np.array([0.0, 0.01, 0.02]), arrived_s, lost=1)
+        >>> block.gaps.tolist(), block.channels
+        ([False, True, False], ('hip', 'knee'))
     """
 
     stream: Stream
@@ -155,6 +164,11 @@ class Change:
         text: What exactly, a sentence.
         time_s: When, as `Block.times_s` [s].
         count: Of what is counted: frames lost, packets damaged; 0 where nothing is.
+
+    Example:
+        >>> change = Change("gap", "120 frames were lost", time_s=61.2, count=120)
+        >>> f"{change.time_s:.0f} s: {change.text}"
+        '61 s: 120 frames were lost'
     """
 
     kind: ChangeKind
@@ -213,6 +227,15 @@ class Source(Closing):
     Attributes:
         name: What it was opened by, as ``"recording:walk.bvh"``.
         tally: What became of all that came.
+
+    Example:
+        >>> from mplearn.sources import open_source
+        >>> with open_source("demonstrator:7", speed=float("inf"), observe="positions") as source:
+        ...     for item in source:
+        ...         if isinstance(item, Block):
+        ...             break
+        >>> source.name, item.rate_hz, source.tally.lost
+        ('demonstrator:7', 100.0, 0)
     """
 
     name: str
@@ -231,7 +254,8 @@ class Source(Closing):
             timeout_s: How long to wait at most [s]; None for ever.
 
         Returns:
-            Empty after the time has passed, or when the stream has ended.
+            Empty after the time has passed, when the stream has ended (`ended` says so), or while
+            what came is kept back: until a body is found in it, or for another rate.
         """
 
     @abstractmethod

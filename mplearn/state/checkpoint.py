@@ -29,6 +29,14 @@ class Checkpoint(NamedTuple):
         document: All that is no shared part, with the keys of those that are.
         parts: Keys of the shared parts that the state is made of, without repeats.
         new: The bytes of those that were not known before, by key; none refers to a later one.
+
+    Example:
+        >>> import numpy as np
+        >>> one = Blob(np.arange(3.0))
+        >>> first = checkpoint(one)
+        >>> later = checkpoint(one, known=first.parts)  # nothing of it is new
+        >>> later.document == first.document, len(first.new), len(later.new)
+        (True, 1, 0)
     """
 
     document: bytes
@@ -80,6 +88,13 @@ def resumed(kind: type[T], document: bytes, part: Callable[[str], bytes]) -> T:
 
     Raises:
         StateError: Something is damaged or missing, or describes no such state.
+
+    Example:
+        >>> from mplearn.segmentation import SegmenterState, make_segmenter
+        >>> state = make_segmenter("zero-velocity", 2, 100.0).state()
+        >>> written = checkpoint(state)
+        >>> resumed(SegmenterState, written.document, written.new.__getitem__).n_frames
+        0
     """
     seen: dict[str, Any] = {}
 
@@ -108,7 +123,13 @@ def resumed(kind: type[T], document: bytes, part: Callable[[str], bytes]) -> T:
 
 
 def key_of(part: Part) -> str:
-    """Return the key of a shared part: the hash of its content, worked out once."""
+    """Return the key of a shared part: the hash of its content, worked out once.
+
+    Example:
+        >>> import numpy as np
+        >>> key_of(Blob(np.zeros(3))) == key_of(Blob(np.zeros(3))) != key_of(Blob(np.ones(3)))
+        True
+    """
     known = _content(part)
     return _packed(part)[0] if known is None else known[0]
 
@@ -134,7 +155,12 @@ def _packed(part: Part) -> tuple[str, tuple[Part, ...], bytes]:
 
 
 def hash_of(data: bytes) -> str:
-    """Return the key of a content."""
+    """Return the key of a content.
+
+    Example:
+        >>> len(hash_of(b"motion")), hash_of(b"motion") == hash_of(b"motion")
+        (32, True)
+    """
     return hashlib.blake2b(data, digest_size=16).hexdigest()
 
 
@@ -156,6 +182,10 @@ def from_bytes(data: bytes) -> Any:
 
     Raises:
         StateError: The bytes are damaged.
+
+    Example:
+        >>> from_bytes(to_bytes({"n": 3, "names": ["bow", "wave"]}))
+        {'n': 3, 'names': ['bow', 'wave']}
     """
     length = int.from_bytes(data[:8], "little")
     return unpacked(from_json(data[8 : 8 + length]), data[8 + length :])

@@ -62,6 +62,13 @@ class SharedState(State):
 
     An owner returns the same object from its ``state()`` until something has changed; a checkpoint
     writes it once, and refers to it from then on.
+
+    Example:
+        >>> from mplearn.graph import TransitionGraph
+        >>> graph = TransitionGraph()
+        >>> graph.add_node(1)
+        >>> graph.state() is graph.state()  # nothing has changed in between
+        True
     """
 
 
@@ -70,6 +77,11 @@ class Blob:
 
     Args:
         array: The values; nobody writes to them from now on.
+
+    Example:
+        >>> import numpy as np
+        >>> Blob(np.arange(6.0).reshape(3, 2)).array.shape
+        (3, 2)
     """
 
     __slots__ = ("array", "content")
@@ -126,6 +138,11 @@ def fields_of(value: Any, share: Share | None = None) -> dict[str, Any]:
 
     A `newer` field is left out where it has the value that its absence means, so that what an older
     version wrote is written again as it was.
+
+    Example:
+        >>> from mplearn.segmentation import TurnConfig
+        >>> fields_of(TurnConfig(zigzag=0.4))["zigzag"]
+        0.4
     """
     names, absent = _names(cast(Any, type(value)))
     return {

@@ -21,6 +21,17 @@ class Range:
     """Marks a number that lies in [low, high]; NaN never does.
 
     It is used as in ``Annotated[float, Range(0.0)]``.
+
+    Example:
+        >>> from dataclasses import dataclass
+        >>> from typing import Annotated
+        >>> from mplearn.state import State, from_plain
+        >>> @dataclass(frozen=True)
+        ... class Clock(State):
+        ...     time_s: Annotated[float, Range(0.0)]
+        >>> from_plain(Clock, {"time_s": -1.0})
+        Traceback (most recent call last):
+        mplearn.errors.StateError: ...
     """
 
     low: float = -LARGEST
@@ -37,6 +48,15 @@ class Array:
         low: Smallest value.
         high: Largest value.
         nan: Whether NaN may stand for what is missing.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.graph import GraphState, TransitionGraph
+        >>> from mplearn.state import from_plain, to_plain
+        >>> plain = to_plain(TransitionGraph().state())  # its edges are Array(None, 5, ...)
+        >>> from_plain(GraphState, plain | {"edges": np.zeros((2, 3), np.int64)})
+        Traceback (most recent call last):
+        mplearn.errors.StateError: edges: ...
     """
 
     shape: tuple[int | str | None, ...]
@@ -63,6 +83,18 @@ def complete(kind: type[T]) -> type[T]:
     """Mark a dataclass whose fields must all be there, whatever defaults its constructor has.
 
     Elsewhere a field that is missing takes its default: as where a setting is newer than a file.
+
+    Example:
+        >>> from dataclasses import dataclass
+        >>> from mplearn.state import State, from_plain
+        >>> @complete
+        ... @dataclass(frozen=True)
+        ... class Tally(State):
+        ...     seen: int = 0
+        ...     lost: int = 0
+        >>> from_plain(Tally, {"seen": 7})
+        Traceback (most recent call last):
+        mplearn.errors.StateError: ...
     """
     _COMPLETE.add(kind)
     return kind

@@ -38,6 +38,14 @@ class FileFormat:
         schema: Version of what is written.
         migrations: From the content of version n to that of n + 1, by n.
         compression: Level of the zip, 0 to 9.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from mplearn.errors import StateError
+        >>> notes = FileFormat("my-notes", "notebook", StateError)
+        >>> notes.write(Path("a.notes"), {"first": "shoes off"})
+        >>> notes.read(Path("a.notes"))
+        {'first': 'shoes off'}
     """
 
     name: str

@@ -16,7 +16,13 @@ T = TypeVar("T")
 
 
 def to_settings(config: Any) -> dict[str, Any]:
-    """Return all settings of a configuration, a dataclass, as plain values by name."""
+    """Return all settings of a configuration, a dataclass, as plain values by name.
+
+    Example:
+        >>> from mplearn.segmentation import TurnConfig
+        >>> to_settings(TurnConfig(axis_s=2.0))["axis_s"]
+        2.0
+    """
     return {each.name: _plain(getattr(config, each.name)) for each in fields(config)}
 
 

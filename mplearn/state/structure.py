@@ -75,6 +75,16 @@ def validated(state: T) -> T:
 
     Raises:
         StateError: Something in it is wrong; its place says where.
+
+    Example:
+        >>> from dataclasses import replace
+        >>> from mplearn.segmentation import make_segmenter
+        >>> state = make_segmenter("zero-velocity", 2, 100.0).state()
+        >>> validated(state).n_frames
+        0
+        >>> validated(replace(state, n_frames=-1))
+        Traceback (most recent call last):
+        mplearn.errors.StateError: ...
     """
     return from_plain(type(state), state)
 
@@ -85,6 +95,13 @@ def within(place: str) -> Iterator[None]:
 
     Args:
         place: The field that the block is about.
+
+    Example:
+        >>> from mplearn.state import require
+        >>> with within("tree"), within("nodes[3]"):
+        ...     require(2 > 3, "left", "must be less")
+        Traceback (most recent call last):
+        mplearn.errors.StateError: tree.nodes[3].left: must be less
     """
     try:
         yield

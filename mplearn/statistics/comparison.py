@@ -39,6 +39,16 @@ class Comparison:
         adjusted: Of each among all, length K: the chance that any would be as far from equal.
         p_value: That the groups do not differ in anything.
         permutations: Exchanges of units between the groups that were tried.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.statistics import Measure
+        >>> seconds = np.array([[1.0], [1.1], [0.9], [1.9], [2.0], [2.1]])
+        >>> people = ("a", "b", "c", "d", "e", "f")
+        >>> groups = dict(zip(people, ("young",) * 3 + ("old",) * 3, strict=True))
+        >>> found = compare(Measure("duration [s]", people, ("bow",), seconds), groups)
+        >>> found.groups, found.sizes, round(found.p_value, 3)
+        (('old', 'young'), (3, 3), 0.1)
     """
 
     what: str
@@ -129,6 +139,16 @@ def compare_transitions(
 
     Raises:
         InvalidValueError: There are not two groups of at least two units.
+
+    Example:
+        >>> import numpy as np
+        >>> counts = np.zeros((6, 2, 2))
+        >>> counts[:3, 0, 0], counts[3:, 0, 1] = 9.0, 9.0  # the young repeat, the old go on
+        >>> people = ("a", "b", "c", "d", "e", "f")
+        >>> groups = dict(zip(people, ("young",) * 3 + ("old",) * 3, strict=True))
+        >>> found = compare_transitions(Transitions(people, ("bow", "rise"), counts), groups)
+        >>> found.names, round(found.p_value, 3)
+        (('bow', 'rise'), 0.1)
     """
     chosen, names, codes = _coded(counted.units, groups)
     counts = counted.counts[chosen]

@@ -30,6 +30,12 @@ class Measure:
         units: People, or takes, length U.
         primitives: Names of the primitives, length P.
         values: Shape (U, P); NaN where a unit shows too little of a primitive.
+
+    Example:
+        >>> import numpy as np
+        >>> tempo = Measure("duration [s]", ("anna", "ben"), ("bow",), np.array([[1.2], [0.9]]))
+        >>> float(tempo.of("ben", "bow"))
+        0.9
     """
 
     name: str

@@ -26,6 +26,13 @@ def plot_measure(measure: Measure, groups: Mapping[str, str]) -> Any:
 
     Returns:
         A `matplotlib.figure.Figure`; bars are the groups' medians.
+
+    Example:
+        >>> import numpy as np
+        >>> tempo = Measure("duration [s]", ("anna", "ben"), ("bow",), np.array([[1.2], [0.9]]))
+        >>> figure = plot_measure(tempo, {"anna": "old", "ben": "young"})
+        >>> figure.axes[0].get_ylabel()
+        'duration [s]'
     """
     names = sorted(set(groups.values()))
     figure = _figure(2.0 + 0.5 * len(names) * len(measure.primitives), 3.6)
@@ -48,7 +55,15 @@ def plot_measure(measure: Measure, groups: Mapping[str, str]) -> Any:
 
 
 def plot_transitions(counted: Transitions, groups: Mapping[str, str]) -> Any:
-    """Return a figure: the transition matrix of each group, from rows to columns."""
+    """Return a figure: the transition matrix of each group, from rows to columns.
+
+    Example:
+        >>> import numpy as np
+        >>> counted = Transitions(("anna", "ben"), ("bow", "rise"), np.ones((2, 2, 2)))
+        >>> figure = plot_transitions(counted, {"anna": "old", "ben": "young"})
+        >>> [axes.get_title() for axes in figure.axes[:2]]
+        ['old', 'young']
+    """
     names = sorted(set(groups.values()))
     size = 1.2 + 0.35 * len(counted.primitives)
     figure = _figure(size * len(names) + 1.0, size + 0.4)
@@ -67,7 +82,14 @@ def plot_transitions(counted: Transitions, groups: Mapping[str, str]) -> Any:
 
 
 def plot_quality(shares: Mapping[str, FloatArray]) -> Any:
-    """Return a figure: how many segments of each set are at most so usual (`quality`)."""
+    """Return a figure: how many segments of each set are at most so usual (`quality`).
+
+    Example:
+        >>> import numpy as np
+        >>> figure = plot_quality({"right": np.array([0.4, 0.7]), "wrong": np.array([0.01, 0.05])})
+        >>> [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+        ['right', 'wrong', 'like the reference']
+    """
     figure = _figure(4.5, 3.6)
     axes = figure.add_subplot()
     for name, values in shares.items():

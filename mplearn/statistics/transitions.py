@@ -22,6 +22,12 @@ class Transitions:
         units: People, or takes, length U.
         primitives: Names of the primitives, length P.
         counts: Shape (U, P, P): from the second axis to the third.
+
+    Example:
+        >>> import numpy as np
+        >>> counts = np.array([[[0.0, 3.0], [1.0, 1.0]]])
+        >>> Transitions(("anna",), ("bow", "rise"), counts).matrix("anna").tolist()
+        [[0.0, 1.0], [0.5, 0.5]]
     """
 
     units: tuple[str, ...]

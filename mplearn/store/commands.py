@@ -37,7 +37,13 @@ class Hands(Protocol):
 
 @dataclass(frozen=True)
 class Command:
-    """Base of all commands."""
+    """Base of all commands.
+
+    Example:
+        >>> from mplearn.store import Merge, Note
+        >>> Merge(3, 7).kind, Merge(3, 7).about, Note("shoes off").about
+        ('merge', (3, 7), ())
+    """
 
     kind: ClassVar[str] = ""
 
@@ -49,7 +55,22 @@ class Command:
 
 @dataclass(frozen=True)
 class Operation(Command, ABC):
-    """Base of the commands that change what was learned."""
+    """Base of the commands that change what was learned.
+
+    Example:
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner
+        >>> @register_command("shout")
+        ... @dataclass(frozen=True)
+        ... class Shout(Operation):
+        ...     word: str
+        ...
+        ...     def do(self, hands):
+        ...         hands.labels.notes[hands.number] = NoteText(self.word.upper(), None)
+        >>> life = LifelongLearner(MotionLearner(LearnerConfig(("elbow",))))
+        >>> life.execute(Shout("hey")).command
+        Shout(word='hey')
+    """
 
     @abstractmethod
     def do(self, hands: Hands) -> None:
@@ -79,6 +100,14 @@ def register_command(kind: str) -> Callable[[C], C]:
 
     Raises:
         InvalidValueError: The name is another command's.
+
+    Example:
+        >>> @register_command("star")
+        ... @dataclass(frozen=True)
+        ... class Star(Command):
+        ...     primitive: Count
+        >>> Star(7).kind
+        'star'
     """
 
     def register(command: C) -> C:
@@ -135,7 +164,21 @@ class Rename(Operation):
 @register_command("merge")
 @dataclass(frozen=True)
 class Merge(Operation):
-    """Say that two primitives are one; the older one stays, and keeps its name."""
+    """Say that two primitives are one; the older one stays, and keeps its name.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner
+        >>> t = np.arange(800) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> config = LearnerConfig(("elbow",), segmenter="zero-velocity")
+        >>> life = LifelongLearner(MotionLearner(config))
+        >>> events = life.learn_many(swing)
+        >>> _ = life.execute(Merge(1, 2), by="Anna")
+        >>> [each.id for each in life.snapshot()]
+        [1]
+    """
 
     first: Count
     second: Count
@@ -159,6 +202,19 @@ class Split(Operation):
     Attributes:
         primitive: Its id.
         groups: Positions of its exemplars that belong together; its two main branches if None.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner
+        >>> t = np.arange(800) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> config = LearnerConfig(("elbow",), segmenter="zero-velocity")
+        >>> life = LifelongLearner(MotionLearner(config))
+        >>> events = life.learn_many(swing)
+        >>> _ = life.execute(Split(1, groups=((0, 1), (2, 3))), by="Anna")
+        >>> len(life.snapshot())
+        3
     """
 
     primitive: Count
@@ -177,7 +233,24 @@ class Split(Operation):
 @register_command("delete")
 @dataclass(frozen=True)
 class Delete(Operation):
-    """Forget a primitive and its demonstrations; shown again, it is learned anew."""
+    """Forget a primitive and its demonstrations; shown again, it is learned anew.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner
+        >>> t = np.arange(800) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> config = LearnerConfig(("elbow",), segmenter="zero-velocity")
+        >>> life = LifelongLearner(MotionLearner(config))
+        >>> events = life.learn_many(swing)
+        >>> _ = life.execute(Delete(2), by="Anna")
+        >>> [each.id for each in life.snapshot()]
+        [1]
+        >>> _ = life.undo(by="Anna")
+        >>> [each.id for each in life.snapshot()]
+        [1, 2]
+    """
 
     primitive: Count
 
@@ -194,7 +267,21 @@ class Delete(Operation):
 @register_command("freeze")
 @dataclass(frozen=True)
 class Freeze(Operation):
-    """Let a primitive stay as it is, whatever comes."""
+    """Let a primitive stay as it is, whatever comes.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner
+        >>> t = np.arange(800) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> config = LearnerConfig(("elbow",), segmenter="zero-velocity")
+        >>> life = LifelongLearner(MotionLearner(config))
+        >>> events = life.learn_many(swing)
+        >>> _ = life.execute(Freeze(1), by="Anna")  # whatever comes, it stays as it is
+        >>> life.state().learner.frozen[0].primitive.id
+        1
+    """
 
     primitive: Count
 
@@ -211,7 +298,21 @@ class Freeze(Operation):
 @register_command("unfreeze")
 @dataclass(frozen=True)
 class Unfreeze(Operation):
-    """Let a frozen primitive change again."""
+    """Let a frozen primitive change again.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner
+        >>> t = np.arange(800) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> config = LearnerConfig(("elbow",), segmenter="zero-velocity")
+        >>> life = LifelongLearner(MotionLearner(config))
+        >>> events = life.learn_many(swing)
+        >>> _ = life.execute(Freeze(1)), life.execute(Unfreeze(1))
+        >>> life.state().learner.frozen
+        ()
+    """
 
     primitive: Count
 
@@ -228,7 +329,16 @@ class Unfreeze(Operation):
 @register_command("note")
 @dataclass(frozen=True)
 class Note(Operation):
-    """Write something down, about a primitive or about all."""
+    """Write something down, about a primitive or about all.
+
+    Example:
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner
+        >>> life = LifelongLearner(MotionLearner(LearnerConfig(("elbow",))))
+        >>> _ = life.execute(Note("shoes off from here on"), by="Anna")
+        >>> [(entry.by, entry.command.text) for entry in life.entries()]
+        [('Anna', 'shoes off from here on')]
+    """
 
     text: str
     primitive: Count | None = None
@@ -252,7 +362,20 @@ class Note(Operation):
 @register_command("pause")
 @dataclass(frozen=True)
 class Pause(Operation):
-    """Stop learning; motions are recognised only."""
+    """Stop learning; motions are recognised only.
+
+    Example:
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner, Resume
+        >>> learner = MotionLearner(LearnerConfig(("elbow",)))
+        >>> life = LifelongLearner(learner)
+        >>> _ = life.execute(Pause(), by="Anna")  # for a rehearsal that is not to be learned
+        >>> learner.paused
+        True
+        >>> _ = life.execute(Resume(), by="Anna")
+        >>> learner.paused
+        False
+    """
 
     def do(self, hands: Hands) -> None:
         """Stop."""
@@ -262,7 +385,15 @@ class Pause(Operation):
 @register_command("resume")
 @dataclass(frozen=True)
 class Resume(Operation):
-    """Go on learning."""
+    """Go on learning.
+
+    Example:
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner, Pause
+        >>> life = LifelongLearner(MotionLearner(LearnerConfig(("elbow",))))
+        >>> [life.execute(command).number for command in (Pause(), Resume())]
+        [1, 2]
+    """
 
     def do(self, hands: Hands) -> None:
         """Go on."""
@@ -272,13 +403,31 @@ class Resume(Operation):
 @register_command("undo")
 @dataclass(frozen=True)
 class Undo(Reversal):
-    """Take a command back; `LifelongLearner.undo`."""
+    """Take a command back; `LifelongLearner.undo`.
+
+    Example:
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner, Note
+        >>> life = LifelongLearner(MotionLearner(LearnerConfig(("elbow",))))
+        >>> _ = life.execute(Note("shoes off"), by="Anna")
+        >>> life.undo(by="Ben").command == Undo(entry=1), life.entries()[0].undone
+        (True, True)
+    """
 
 
 @register_command("redo")
 @dataclass(frozen=True)
 class Redo(Reversal):
-    """Do a command again that was taken back; `LifelongLearner.redo`."""
+    """Do a command again that was taken back; `LifelongLearner.redo`.
+
+    Example:
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner, Note
+        >>> life = LifelongLearner(MotionLearner(LearnerConfig(("elbow",))))
+        >>> _ = life.execute(Note("shoes off"), by="Anna"), life.undo(by="Anna")
+        >>> life.redo(by="Anna").command == Redo(entry=1), life.entries()[0].undone
+        (True, False)
+    """
 
 
 def _require(hands: Hands, id: int) -> None:

@@ -41,6 +41,18 @@ class Happening:
         others: Other primitives that took part: those absorbed, or split into.
         entry: Number of the command, if it was one.
         exemplars: Demonstrations that it had then; 0 where that does not matter.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner
+        >>> t = np.arange(800) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> config = LearnerConfig(("elbow",), segmenter="zero-velocity")
+        >>> life = LifelongLearner(MotionLearner(config))
+        >>> events = life.learn_many(swing)
+        >>> [happening.what for happening in life.history(1)][0]
+        'born'
     """
 
     frame: Count
@@ -63,6 +75,16 @@ class Entry:
         when: Clock time [s since 1970].
         frame: Frames seen by then.
         undone: Whether it is undone now.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner, Note
+        >>> life = LifelongLearner(MotionLearner(LearnerConfig(("elbow",))))
+        >>> events = life.learn_many(np.zeros((150, 1)))
+        >>> entry = life.execute(Note("a long rest"), by="Anna", when=0.0)
+        >>> entry.number, entry.by, entry.frame, entry.undone
+        (1, 'Anna', 150, False)
     """
 
     number: int

@@ -82,6 +82,20 @@ def library_of(path: str | Path) -> PrimitiveLibrary:
 
     Raises:
         StoreError: It cannot be read; the class says why.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner, Rename
+        >>> t = np.arange(800) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> config = LearnerConfig(("elbow",), segmenter="zero-velocity")
+        >>> life = LifelongLearner.open("names.db", lambda: MotionLearner(config))
+        >>> with life:
+        ...     events = life.learn_many(swing)
+        ...     entry = life.execute(Rename(1, "up"), by="Anna")
+        >>> library_of("names.db").names[0]
+        'up'
     """
     return StoreReader(path).life.snapshot()
 
@@ -91,6 +105,19 @@ def learner_of(path: str | Path) -> MotionLearner:
 
     Raises:
         StoreError: It cannot be read; the class says why.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner
+        >>> t = np.arange(800) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> config = LearnerConfig(("elbow",), segmenter="zero-velocity")
+        >>> life = LifelongLearner.open("swings.db", lambda: MotionLearner(config))
+        >>> with life:
+        ...     events = life.learn_many(swing)
+        >>> learner_of("swings.db").n_frames
+        800
     """
     return LifelongLearner.of_found(_found(Path(path)), lazily=True).learner
 

@@ -66,6 +66,15 @@ class StoreInfo:
         checkpoint_at: When that was written [s since 1970].
         parts: Number of parts that checkpoints are made of.
         free_bytes: Room in the file that is not used [byte].
+
+    Example:
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner
+        >>> learner = MotionLearner(LearnerConfig(("x", "y"), 50.0))
+        >>> LifelongLearner.open("glance.db", lambda: learner).close()
+        >>> glance = info("glance.db")
+        >>> glance.path.name, glance.file_bytes > 0, glance.checkpoint is not None
+        ('glance.db', True, True)
     """
 
     path: Path
@@ -93,6 +102,18 @@ class Store:
     Raises:
         StoreError: It cannot be opened; the class says why.
         InvalidValueError: ``checkpoint_s`` is not positive.
+
+    Example:
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner
+        >>> learner = MotionLearner(LearnerConfig(("x", "y")))
+        >>> LifelongLearner.open("kept.db", lambda: learner).close()
+        >>> store = Store("kept.db")
+        >>> found = store.load()
+        >>> store.start(found, lambda: found.life, 100.0)
+        >>> store.problem is None
+        True
+        >>> store.close()
     """
 
     def __init__(self, path: str | Path, *, checkpoint_s: float = 30.0) -> None:
@@ -301,6 +322,16 @@ def is_begun(path: str | Path) -> bool:
 
     Raises:
         StoreError: There is a file, and it cannot be read.
+
+    Example:
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner
+        >>> is_begun("new.db")
+        False
+        >>> learner = MotionLearner(LearnerConfig(("x", "y"), 50.0))
+        >>> LifelongLearner.open("new.db", lambda: learner).close()
+        >>> is_begun("new.db")
+        True
     """
     path = Path(path)
     if not path.exists() or not path.stat().st_size:
@@ -388,6 +419,14 @@ def info(path: str | Path) -> StoreInfo:
 
     Raises:
         StoreError: It cannot be opened.
+
+    Example:
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> from mplearn.store import LifelongLearner
+        >>> learner = MotionLearner(LearnerConfig(("x", "y"), 50.0))
+        >>> LifelongLearner.open("small.db", lambda: learner).close()
+        >>> info("small.db").records
+        0
     """
     path = Path(path)
     connection = open_reading(path)

@@ -34,6 +34,16 @@ def as_dataset(recording: Recording, table: SegmentTable) -> Any:
     Raises:
         RecordingError: The recording holds no markers.
         MissingDependencyError: xarray is not installed (extra ``tables``).
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import Recording
+        >>> from mplearn.library import SegmentTable, RecognisedSegment
+        >>> take = Recording(np.zeros((100, 3)), 50.0, ("C7.x", "C7.y", "C7.z"), name="bow")
+        >>> row = RecognisedSegment("bow", 0.5, 1.7, 3, "down", "down", 0.2, 0.6)
+        >>> dataset = as_dataset(take, SegmentTable([row]))
+        >>> dataset.position.shape, int(dataset.primitive[40, 0])
+        ((100, 3, 1, 1), 3)
     """
     xarray = require("xarray", "tables")
     names = recording.marker_names
@@ -81,6 +91,16 @@ def from_dataset(dataset: Any) -> tuple[Recording, SegmentTable]:
 
     Raises:
         RecordingError: It is no such data set.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import Recording
+        >>> from mplearn.library import SegmentTable, RecognisedSegment
+        >>> take = Recording(np.zeros((100, 3)), 50.0, ("C7.x", "C7.y", "C7.z"), name="bow")
+        >>> row = RecognisedSegment("bow", 0.5, 1.7, 3, "down", "down", 0.2, 0.6)
+        >>> recording, table = from_dataset(as_dataset(take, SegmentTable([row])))
+        >>> recording.channels, table[0].name
+        (('C7.x', 'C7.y', 'C7.z'), 'down')
     """
     try:
         names = tuple(str(name) for name in dataset["keypoints"].values)

@@ -60,7 +60,19 @@ class Recognising(MotionLearner):
 
 
 def segments_of(library: PrimitiveLibrary, recording: Recording) -> SegmentTable:
-    """Return the segments of a recording of any rate; see `PrimitiveLibrary.segments`."""
+    """Return the segments of a recording of any rate; see `PrimitiveLibrary.segments`.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner, Recording
+        >>> t = np.arange(800) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> take = Recording(swing, 100.0, ("elbow",), name="swings")
+        >>> learner = MotionLearner(LearnerConfig(take.channels, segmenter="zero-velocity"))
+        >>> events = list(learner.learn_recording(take))
+        >>> segments_of(learner.snapshot(), take).column("name")[:4]
+        ['P1', 'P2', 'P1', 'P2']
+    """
     return SegmentTable(recognise_recording(library, seen_by(library, recording)))
 
 
@@ -70,6 +82,15 @@ def seen_by(library: PrimitiveLibrary, recording: Recording) -> Recording:
     Raises:
         RecordingError: It lacks channels of the library.
         BodyError: There is no body in it.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner, Recording
+        >>> library = MotionLearner(LearnerConfig(("elbow",), rate_hz=50.0)).snapshot()
+        >>> take = Recording(np.zeros((200, 2)), 100.0, ("elbow", "lamp"))
+        >>> seen = seen_by(library, take)
+        >>> seen.channels, seen.rate_hz
+        (('elbow',), 50.0)
     """
     if recording.channels != library.channels:
         if library.body and recording.is_markers:
@@ -95,6 +116,18 @@ def recognise_recording(
 
     Raises:
         RecordingError: The recording lacks channels of the library.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner, Recording
+        >>> t = np.arange(800) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> take = Recording(swing, 100.0, ("elbow",), name="swings")
+        >>> learner = MotionLearner(LearnerConfig(take.channels, segmenter="zero-velocity"))
+        >>> events = list(learner.learn_recording(take))
+        >>> segment = next(recognise_recording(learner.snapshot(), take))
+        >>> segment.take, segment.start_s, segment.name
+        ('swings', 0.0, 'P1')
     """
     reader = Recognising(library, recording.channels)
     if not library.body and recording.channels != library.channels:

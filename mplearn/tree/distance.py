@@ -39,6 +39,16 @@ class Exemplar(NamedTuple):
         own: Log-likelihood of the points under the model, shape ().
         duration: How long the segment lasts [frame], shape ().
         extent: How far it is from its mean posture held still, a length, shape ().
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.tree import PrimitiveTree, TreeConfig
+        >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+        >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+        >>> placed = [tree.insert(k * lift) for k in (1.0, 1.01, 0.99, -1.0, -1.01)]
+        >>> exemplar = tree.bank[0]
+        >>> float(exemplar.duration), len(exemplar.columns) == len(exemplar.means[0])
+        (60.0, True)
     """
 
     columns: FloatArray
@@ -100,6 +110,12 @@ class LikelihoodDistance(Distance):
 
     Each direction is ``[log P(O | own) - log P(O | other)] / T``; the segments themselves stand for
     generated sequences: cheaper, and without sampling noise.
+
+    Example:
+        >>> from mplearn.tree import TreeConfig, make_distance
+        >>> distance = make_distance(TreeConfig(power=0.5))
+        >>> isinstance(distance, LikelihoodDistance), float(distance.length(9.0))  # its root
+        (True, 3.0)
     """
 
     def divergence(
@@ -114,6 +130,16 @@ class MonteCarloDistance(Distance):
 
     Every model is sampled with the same random numbers, so that the distance is symmetric,
     deterministic, and the same in a tree, in a recogniser and in a stored library.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.tree import PrimitiveTree, TreeConfig
+        >>> config = TreeConfig(distance="monte_carlo", n_sampled=64)  # as the paper prints it
+        >>> tree = PrimitiveTree(config, n_channels=2, rate_hz=100.0)
+        >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+        >>> placed = [tree.insert(k * lift) for k in (1.0, 1.01, 0.99, -1.0, -1.01, -0.99)]
+        >>> len(tree.leaves)
+        2
     """
 
     def __init__(self, config: TreeConfig) -> None:
@@ -148,6 +174,15 @@ def register_distance(name: str, kind: Callable[[TreeConfig], Distance]) -> None
 
     Raises:
         InvalidValueError: The name is taken by another.
+
+    Example:
+        >>> from mplearn.tree import TreeConfig, make_distance
+        >>> class Doubled(LikelihoodDistance):
+        ...     def divergence(self, exemplar, others, rows, weights):
+        ...         return 2.0 * super().divergence(exemplar, others, rows, weights)
+        >>> register_distance("doubled", Doubled)
+        >>> type(make_distance(TreeConfig(distance="doubled"))).__name__
+        'Doubled'
     """
     if _KINDS.setdefault(name, kind) is not kind:
         raise InvalidValueError(f"there is a distance {name!r} already")

@@ -21,6 +21,12 @@ class MirrorMap:
     Attributes:
         source: For each channel the one that it is taken from, shape (D,).
         sign: 1 or -1 for each channel, shape (D,).
+
+    Example:
+        >>> import numpy as np
+        >>> mirror = MirrorMap.of(("hand_l.y", "hand_r.y", "head.z"))
+        >>> mirror.apply(np.array([[0.3, -0.2, 1.6]])).tolist()  # y points to the left
+        [[0.2, -0.3, 1.6]]
     """
 
     source: tuple[int, ...]

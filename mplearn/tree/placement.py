@@ -14,6 +14,11 @@ class Match(NamedTuple):
         node: Its id.
         distance: Symmetric likelihood distance [nat a frame] [Kulic2012, eq. 5].
         ratio: Distance over radius, on the scale of the tree's rules; at most 1 inside.
+
+    Example:
+        >>> matches = (Match(3, distance=0.4, ratio=0.5), Match(7, distance=2.1, ratio=2.6))
+        >>> [match.node for match in matches if match.ratio <= 1.0]
+        [3]
     """
 
     node: int
@@ -27,6 +32,10 @@ class Split(NamedTuple):
     Attributes:
         node: The leaf; it stays in the tree as the node above.
         into: The new leaves, the larger one first.
+
+    Example:
+        >>> Split(node=4, into=(7, 8)).into
+        (7, 8)
     """
 
     node: int
@@ -39,6 +48,11 @@ class Merge(NamedTuple):
     Attributes:
         kept: The leaf that stays.
         absorbed: The leaf that is gone.
+
+    Example:
+        >>> merge = Merge(kept=1, absorbed=4)
+        >>> {1: "bow", 4: "bow?"}[merge.absorbed]
+        'bow?'
     """
 
     kept: int
@@ -51,6 +65,10 @@ class Reparent(NamedTuple):
     Attributes:
         node: The node.
         parent: The node that it lies below now.
+
+    Example:
+        >>> Reparent(node=7, parent=3).parent
+        3
     """
 
     node: int
@@ -67,6 +85,16 @@ class Change(NamedTuple):
         moved: Earlier segments that were moved: number and new node.
         reparented: Nodes that were hung below another.
         removed: Ids of the nodes that are gone, but for absorbed ones.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.tree import PrimitiveTree, TreeConfig
+        >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+        >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+        >>> placed = [tree.insert(k * lift) for k in (1.0, 1.01, 0.99, -1.0, -1.01, -0.99)]
+        >>> change = tree.merge(*tree.leaves)
+        >>> change.merges, change.born
+        ((Merge(kept=1, absorbed=2),), ())
     """
 
     born: tuple[int, ...] = ()
@@ -109,6 +137,16 @@ class Placement(NamedTuple):
             where there was none.
         like: Number of the segment that it is most like among those that wait to become a
             primitive, where the two may show one motion; None where there is none.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.tree import PrimitiveTree, TreeConfig
+        >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+        >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+        >>> placed = [tree.insert(k * lift) for k in (1.0, -1.0, 1.01, -1.01)]
+        >>> placement = tree.insert(0.99 * lift)
+        >>> placement.number, placement.recognised, placement.node_id == placed[2].born[0]
+        (4, True, True)
     """
 
     number: int

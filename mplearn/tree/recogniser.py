@@ -29,6 +29,16 @@ class Recognition(NamedTuple):
         distance: To the nearest primitive [nat a frame]; inf where there is none.
         ratio: That over the primitive's radius; above 1 outside. An open-set score.
         alternatives: All that it was compared with, best first.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.tree import PrimitiveTree, TreeConfig
+        >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+        >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+        >>> placed = [tree.insert(k * lift) for k in (1.0, 1.01, 0.99, -1.0, -1.01)]
+        >>> recognition = tree.recogniser().recognise(np.cos(lift))
+        >>> recognition.primitive is None, recognition.ratio > 1.0
+        (True, True)
     """
 
     primitive: int | None
@@ -71,6 +81,18 @@ class Recogniser:
         bank: The exemplars of its nodes.
         index: Its nodes.
         shortest_frames: Fewest frames of a segment.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.tree import PrimitiveTree, TreeConfig
+        >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+        >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+        >>> placed = [tree.insert(k * lift) for k in (1.0, 1.01, 0.99, -1.0, -1.01)]
+        >>> recogniser = tree.recogniser()
+        >>> recogniser.recognise(1.005 * lift).primitive in recogniser.primitives
+        True
+        >>> recogniser.recognise(np.cos(lift)).primitive is None  # nothing is like it
+        True
     """
 
     def __init__(

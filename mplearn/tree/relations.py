@@ -33,6 +33,11 @@ class Relation(NamedTuple):
     Attributes:
         primitive: Its id; the primitive's own where it is its own mirror image.
         ratio: Median distance of the exemplars to it, over its radius.
+
+    Example:
+        >>> related_to = (Relation(primitive=7, ratio=0.6), Relation(primitive=3, ratio=0.9))
+        >>> min(related_to, key=lambda relation: relation.ratio).primitive
+        7
     """
 
     primitive: int
@@ -62,6 +67,19 @@ def related(
     Raises:
         UnknownPrimitiveError: There is no such primitive.
         InvalidValueError: Neither a mirror nor channels are given, or a channel does not exist.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.tree import MirrorMap, PrimitiveTree, TreeConfig
+        >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+        >>> t = np.linspace(0, np.pi, 60)
+        >>> left = np.stack((np.sin(t), 0.1 * np.sin(2 * t)), axis=1)  # the left hand is lifted
+        >>> sides = (left, left[:, ::-1])
+        >>> placed = [tree.insert(k * side) for k in (1, 1.01, 0.99) for side in sides]
+        >>> first, second = tree.leaves
+        >>> mirror = MirrorMap.of(("hand_l.z", "hand_r.z"))
+        >>> related(tree, first, mirror=mirror)[0].primitive == second
+        True
     """
     if mirror is None and channels is None:
         raise InvalidValueError("a relation needs a mirror, or channels to look at")

@@ -20,6 +20,15 @@ class Repetition(NamedTuple):
         times: How often it came; 1 where no two are alike.
         apart: Largest distance between its executions, or to the nearest other motion where it came
             once, over what a primitive may have; inf where nothing else was seen.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.tree import PrimitiveTree, TreeConfig
+        >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+        >>> placed = tree.insert(np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5]))
+        >>> waiting = tree.most_repeated()
+        >>> waiting.n_waiting, waiting.times
+        (1, 1)
     """
 
     n_waiting: int

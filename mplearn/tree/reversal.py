@@ -30,6 +30,18 @@ class NodesEdit(State):
         before: As they were.
         after: As they were then.
         floor: Variance floor of the models by which distances were measured, shape (D,).
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.tree import PrimitiveTree, TreeConfig
+        >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+        >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+        >>> placed = [tree.insert(k * lift) for k in (1.0, 1.01, 0.99, -1.0, -1.01, -0.99)]
+        >>> before, leaves = tree.state(), tree.leaves
+        >>> change = tree.remove(leaves[1])
+        >>> after = tree.state()
+        >>> NodesEdit.between(before.nodes, after.nodes, after.floor).leaves == {leaves[1]}
+        True
     """
 
     before: tuple[NodeState, ...]
@@ -75,6 +87,19 @@ class Exchange(NamedTuple):
             where that is forgotten.
         moved: Segments that are in another leaf than before: number and leaf.
         changed: Leaves with other exemplars than before.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.tree import NodesEdit, PrimitiveTree, TreeConfig
+        >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+        >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+        >>> placed = [tree.insert(k * lift) for k in (1.0, 1.01, 0.99, -1.0, -1.01, -0.99)]
+        >>> before, leaves = tree.state(), tree.leaves
+        >>> change = tree.merge(*leaves)
+        >>> after = tree.state()
+        >>> edit = NodesEdit.between(before.nodes, after.nodes, after.floor)
+        >>> tree.exchange(edit.reversed()).back == (leaves[1],), tree.leaves == leaves
+        (True, True)
     """
 
     back: tuple[int, ...] = ()

@@ -478,7 +478,10 @@ class PrimitiveTree:
         return Change()
 
     def exchange(self, edit: NodesEdit) -> Exchange:
-        """Undo an edit, or do it again; see `mplearn.tree.reversal`."""
+        """Put an edit's nodes of after in the place of those of before, whatever came since.
+
+        So it is done again, and undone with ``edit.reversed()``; see `mplearn.tree.reversal`.
+        """
         found = exchange(self._structure, edit, self.n_seen)
         self._models.forget()
         return found

@@ -189,7 +189,8 @@ def find_marker_set(marker_names: Sequence[str]) -> MarkerSet:
     if known[best] < enough:
         raise BodyError(
             f"no marker set knows the markers {list(marker_names)[:6]}...: {best!r} comes closest "
-            f"with {known[best]} of {len(plain)}, and {math.ceil(enough)} are needed; there are {', '.join(TABLES)}, and "
-            "mplearn.anatomy.recognise finds the body in recordings with other names"
+            f"with {known[best]} of {len(plain)}, and {math.ceil(enough)} are needed; there are "
+            f"{', '.join(TABLES)}, and mplearn.anatomy.recognise finds the body in recordings "
+            "with other names"
         )
     return marker_set(best)

@@ -90,8 +90,21 @@ def add_chain(
 ) -> FactorialHMM:
     """Add a chain fitted to what the others leave unexplained of a motion's demonstrations.
 
+    It alone does not make them likelier yet: `em_step` fits all chains together.
+
     Raises:
         ModelError: A sequence has fewer frames than there are states.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.hmm import fit
+        >>> t = np.linspace(0, 1, 60)
+        >>> two = np.stack((np.sin(np.pi * t), np.sin(3 * np.pi * t)), axis=1)
+        >>> one_chain = fit([two], 3, variance_floor=1e-3)
+        >>> both = add_chain(one_chain, [two], 4)
+        >>> fitted = em_step(both, [two], variance_floor=1e-3)  # all chains together
+        >>> fitted.score(two) > one_chain.score(two), len(both.chains)
+        (True, 2)
     """
     if isinstance(model, LeftRightHMM):
         model = FactorialHMM((model.means,), (model.log_stay,), model.variances.mean(axis=0))
@@ -120,6 +133,14 @@ def em_step(
 
     Raises:
         ModelError: A sequence is impossible, or too short.
+
+    Example:
+        >>> import numpy as np
+        >>> t = np.linspace(0, 1, 60)
+        >>> two = np.stack((np.sin(np.pi * t), np.sin(3 * np.pi * t)), axis=1)
+        >>> model = fit_factorial([two], (3, 4), variance_floor=1e-3)
+        >>> em_step(model, [two], variance_floor=1e-3).score(two) >= model.score(two) - 1e-6
+        True
     """
     floor = as_floor(variance_floor, model.n_channels)
     moments, data, counts = [], [], []
@@ -151,6 +172,15 @@ def needs_more_chains(
     Each sequence has a margin, the log-likelihood per frame by which its own model explains it
     better than the other does. They are told apart where the mean margin is at least ``separation``
     times its standard deviation over the sequences of both.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.hmm import fit
+        >>> up = [np.linspace(0, k, 40)[:, None] for k in (0.98, 1.0, 1.02)]
+        >>> down = [-motion for motion in up]
+        >>> models = [fit(motions, 4, variance_floor=1e-2) for motions in (up, down)]
+        >>> needs_more_chains(models[0], up, models[1], down)  # one is enough to tell them apart
+        False
     """
     each = margins(model, sequences, neighbour) + margins(neighbour, neighbour_sequences, model)
     return bool(np.mean(each) < separation * np.std(each))

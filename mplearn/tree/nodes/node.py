@@ -92,6 +92,16 @@ class Node:
         apart: Ids of leaves that a person said are other motions: the rules never merge them.
         frozen: Whether a person said that it is to stay as it is: nothing changes its exemplars.
         stood_for: Segments and frames that went for want of room, by the exemplar nearest to them.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.tree import PrimitiveTree, TreeConfig
+        >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+        >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+        >>> placed = [tree.insert(k * lift) for k in (1.0, 1.01, 0.99, -1.0, -1.01)]
+        >>> leaf = tree.node(tree.leaves[0])
+        >>> leaf.is_leaf, leaf.n_placed, leaf.matrix.shape
+        (True, 3, (3, 3))
     """
 
     id: int
