@@ -112,7 +112,11 @@ def _by_tree(recording: Recording) -> Mapping[str, list[int]]:
     }
     largest = max(sizes.values(), default=0.0)
     chosen = [root for root, size in sizes.items() if size > LEAST_SIZE * largest]
-    return {skeleton.names[root]: trees[root] for root in chosen}
+    roots_of = [skeleton.names[root] for root in chosen]
+    prefixes = [name.rpartition(":")[0] for name in roots_of]  # Anna:Pelvis, Ben:Pelvis
+    if all(prefixes) and len(set(prefixes)) == len(prefixes):
+        roots_of = prefixes
+    return {name: trees[root] for name, root in zip(roots_of, chosen, strict=True)}
 
 
 def _shows_axes(skeleton: Skeleton, joint: int) -> bool:

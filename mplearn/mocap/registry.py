@@ -78,7 +78,7 @@ def reader_of(path: Path) -> Reader | None:
 
 
 def reader_for(path: Path) -> Reader:
-    """Return the reader for a file that is meant to be read; the first asked in doubt.
+    """Return the reader for a file that is meant to be read; the most general one in doubt.
 
     Raises:
         RecordingError: No reader knows its suffix.
@@ -90,7 +90,7 @@ def reader_for(path: Path) -> Reader:
             raise bad_file(
                 path, f"unknown suffix {suffix(path)!r}", f"one of {', '.join(suffixes())}"
             )
-        found = fitting[0]
+        found = fitting[-1]
     return found
 
 

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from known_person import RATE_HZ, Truth
 from rigs import Rig, write_rig
+from scipy.spatial.transform import Rotation
 
 from mplearn.anatomy import recognise
 from mplearn.body import human_body, marker_set
 from mplearn.errors import BodyError, RecordingError
-from mplearn.mocap import Hints, open_recording
+from mplearn.mocap import Hints, open_recording, open_recordings
+from mplearn.mocap.placing.space import upright
 from mplearn.mocap.skeletons.joint_arrays import LAYOUTS
 
 pytestmark = pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")
@@ -50,7 +52,7 @@ def joints(layout: str, landmarks: dict[str, np.ndarray]) -> np.ndarray:
         sided = word in ("left", "right")
         part, end = (rest, f"_{word[0]}") if sided else (name, "")
         middle = (part,) if sided and part == "hip" else PLACES.get(part, (part,))
-        if layout == "Kinect" and part == "foot":
+        if "Kinect" in layout and part == "foot":
             middle = ("toe_tip",)
         places = [place if sided is False else f"{place}{end}" for place in middle]
         at = [landmarks[place] for place in places if place in landmarks]
@@ -71,7 +73,8 @@ def test_the_joints_of_a_layout_are_the_persons(
     take = open_recording(tmp_path / f"walk_{RATE_HZ:g}hz.npy")
     assert take.report is not None and f"those of {layout}" in " ".join(take.report.notes)
     assert (take.report.unit_m, take.report.up, take.rate_hz) == (0.001, "y", RATE_HZ)
-    assert take.markers == pytest.approx(points, abs=1e-9, nan_ok=True)
+    needed = [k for k, name in enumerate(LAYOUTS[layout].split()) if name != "-"]
+    assert take.markers == pytest.approx(points[:, needed], abs=1e-9, nan_ok=True)
     angles, off_mm = truth.errors(recognise(take).apply(take))
     assert np.median(angles) < 3.0 and np.median(off_mm) < 15.0
 
@@ -101,12 +104,67 @@ def test_an_archive_with_batch_confidence_and_rate(
 
 
 @pytest.mark.parametrize(
-    "shape", [(5, 9, 3), (5, 17, 2), (5, 322), (0, 17, 3), (17, 3), (2, 5, 17, 3)]
+    "shape", [(5, 9, 3), (5, 17, 2), (5, 321), (0, 17, 3), (17, 3), (40, 50, 17, 3)]
 )
 def test_what_is_no_array_of_joints(tmp_path: Path, shape: tuple[int, ...]) -> None:
     np.save(tmp_path / "a.npy", np.ones(shape))
     with pytest.raises(RecordingError, match="frames"):
         open_recording(tmp_path / "a.npy", hints=Hints(rate_hz=RATE_HZ))
+
+
+@pytest.mark.parametrize("order", ["(T, P, J, 3)", "(P, T, J, 3)", "(3, T, J, P)"])
+def test_people_of_an_array_are_takes_of_their_own(
+    tmp_path: Path, landmarks: dict[str, np.ndarray], order: str
+) -> None:
+    one = joints("COCO", landmarks)
+    other = one[::-1] + np.array([0.0, 2.0, 0.0])
+    nobody = np.zeros_like(one)
+    people = np.stack([one, other, *([] if order[1] == "3" else [nobody])], axis=1)
+    axes = {
+        "(T, P, J, 3)": (0, 1, 2, 3),
+        "(P, T, J, 3)": (1, 0, 2, 3),
+        "(3, T, J, P)": (3, 0, 2, 1),
+    }
+    np.save(tmp_path / "a.npy", people.transpose(axes[order]))
+    found = open_recordings(tmp_path / "a.npy", hints=Hints(rate_hz=RATE_HZ))
+    assert [each.person for each in found] == ["person0", "person1"]
+    for k, each in enumerate(found):
+        assert each.markers == pytest.approx(people[:, k])
+
+
+@pytest.mark.parametrize("layout", ["SMPL", "KIT-ML"])
+def test_features_of_motion_are_joints_again(
+    tmp_path: Path, landmarks: dict[str, np.ndarray], layout: str
+) -> None:
+    points = joints(layout, landmarks)[:, :22][..., [1, 2, 0]]  # x left, y up, z ahead
+    points = np.where(np.isnan(points), points[:, :1], points)
+    n_frames, n_joints = points.shape[:2]
+    heading = 0.02 * np.arange(n_frames)
+    turned = np.einsum(
+        "tjk,tkl->tjl", points, Rotation.from_euler("y", -heading[:, None]).as_matrix()
+    )
+    turned += 0.01 * np.arange(n_frames)[:, None, None] * [1.0, 0.0, 0.5]
+    whole = np.zeros((n_frames, 12 * (n_joints + 1) - 13))
+    whole[:-1, 0] = -np.diff(heading) / 2.0  # features turn the other way round
+    to_person = Rotation.from_euler("y", -heading[:, None])
+    steps = np.diff(turned[:, 0], axis=0)
+    whole[:-1, 1:3] = to_person[1:].apply(steps)[:, [0, 2]]
+    whole[:, 3] = turned[:, 0, 1]
+    seen = turned[:, 1:] - turned[:, :1] * [1.0, 0.0, 1.0]
+    seen = np.stack([to_person.apply(each) for each in seen.swapaxes(0, 1)], axis=1)
+    whole[:, 4 : 4 + seen[0].size] = seen.reshape(n_frames, -1)
+    np.save(tmp_path / "a.npy", whole)
+    take = open_recording(tmp_path / "a.npy")
+    assert take.report is not None
+    assert (take.rate_hz, take.report.up) == ({"SMPL": 20.0, "KIT-ML": 12.5}[layout], "y")
+    kept = [k for k, name in enumerate(LAYOUTS[layout].split()[:22]) if name != "-"]
+    expected = (turned - turned[:1, :1] * [1.0, 0.0, 1.0])[:, kept]
+    found = take.markers @ upright("y")
+    assert found == pytest.approx(expected, abs=1e-9)
+    whole[:, -4:] = 0.3
+    np.save(tmp_path / "a.npy", whole)
+    with pytest.raises(RecordingError, match="normalised"):
+        open_recording(tmp_path / "a.npy")
 
 
 def in_a_picture(points: np.ndarray, size: float) -> np.ndarray:

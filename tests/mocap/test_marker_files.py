@@ -404,7 +404,7 @@ def test_unknown_suffix_and_unreadable_folders(tmp_path: Path) -> None:
         open_recordings(tmp_path)
     with pytest.raises(RecordingError, match="no such file or folder"):
         open_recordings(tmp_path / "none")
-    with pytest.raises(RecordingError, match="not the name"):
+    with pytest.raises(RecordingError, match="first row holds numbers"):
         open_recording(write_ui_prmd(tmp_path / "squat.txt"))
     with pytest.raises(RecordingError, match="no take 'other'"):
         open_recording(write_csv(tmp_path / "a.csv"), take="other")

@@ -165,6 +165,17 @@ def two_rows(text: str, *, named: bool) -> str:
     return "\n".join([*map(",".join, lines), frames])
 
 
+def visual3d(text: str) -> str:
+    """A file's name, names, kinds and folders above axes, as Visual3D exports them; no times."""
+    head, *frames = text.splitlines()
+    names = [name[:-2] for name in head.split(",")[1:]]
+    above = [["walk.c3d"] * len(names), names, *([word] * len(names) for word in ("TARGET", "RAW"))]
+    lines = ["\t".join(["", *row]) for row in above]
+    lines.append("\t".join(["ITEM", *("XYZ"[k % 3] for k in range(len(names)))]))
+    lines += ["\t".join([str(i + 1), *frame.split(",")[1:]]) for i, frame in enumerate(frames)]
+    return "\n".join(["rate: 50", *lines]) + "\n"
+
+
 def sides_last(text: str) -> str:
     """``WRA_l_x`` and ``WRA_r_x`` for ``LWRA_x`` and ``RWRA_x``."""
     head, frames = text.split("\n", 1)
@@ -211,6 +222,12 @@ TABLES: dict[str, Change] = {
     "in curly brackets": lambda s: in_brackets(s, '{{"x": {}, "y": {}, "z": {}}}'),
     "two rows of names": lambda s: two_rows(s, named=True),
     "two rows of names, no name of the index": lambda s: two_rows(s, named=False),
+    "Visual3D": visual3d,
+    "times in Japanese": lambda s: s.replace("time", "\u6642\u9593", 1),
+    "frames and times in Japanese": lambda s: "".join(
+        (f"{i}," if i else "\u30d5\u30ec\u30fc\u30e0,") + line
+        for i, line in enumerate(s.replace("time", "\u6642\u9593", 1).splitlines(keepends=True))
+    ),
     "a remark below": lambda s: s + "\nEnd of file\n",
     "a text in front, and lines of nothing": lambda s: re.sub(
         r"(?m)^", "walk,", s.strip()
@@ -222,6 +239,12 @@ TABLES: dict[str, Change] = {
     "long, axes named": lambda s: by_points(s, "time,marker,pos_x,pos_y,pos_z"),
     "long, with units": lambda s: by_points(s, "time,Marker Name,X (mm),Y (mm),Z (mm)"),
 }  # fmt: skip
+
+
+def test_a_text_that_no_reader_claims_is_refused_as_a_table(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("hip_angle,knee_angle\n1,2\n3,4\n")
+    with pytest.raises(RecordingError, match="no rate"):
+        open_recording(tmp_path / "notes.txt")
 
 
 @pytest.mark.parametrize("kind", TABLES)

@@ -1,13 +1,15 @@
 """A recording of several people is a recording of each, whoever wrote it how."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from mocap_writers import mvnx_motion, write_mvnx
 
 from mplearn.anatomy import recognise
 from mplearn.demonstrator import demonstrate
-from mplearn.mocap import each_person, open_recordings
+from mplearn.mocap import each_person, open_recording, open_recordings
 from mplearn.recording import Recording, Skeleton, marker_channels
 
 NAMES = tuple(f"M{k}" for k in range(12))
@@ -76,6 +78,29 @@ def test_trees_of_joints_tell_people_apart(held: bool) -> None:
         assert each.skeleton is not None and each.skeleton.parents == (-1, *range(14))
         assert each.marker_names == each.skeleton.names
     assert each_person(skeletons("Hips", held=held))[0].name == "take"
+
+
+@pytest.mark.parametrize("positions", [False, True])
+def test_subjects_of_an_mvnx_file_stand_side_by_side(tmp_path: Path, positions: bool) -> None:
+    motions = [mvnx_motion(40, seed) for seed in (1, 2)]
+    alone = []
+    for who, motion in zip(("Anna", "Ben"), motions, strict=True):
+        subject = f'label="{who}" frameRate="100" segmentCount="23"'
+        path = write_mvnx(tmp_path / f"{who}.mvnx", motion, subject=subject)
+        alone.append(open_recording(path, positions=positions))
+    texts = [(tmp_path / f"{who}.mvnx").read_text() for who in ("Anna", "Ben")]
+    second = texts[1][texts[1].index("<subject") : texts[1].index("</mvnx>")]
+    (tmp_path / "duet.mvnx").write_text(texts[0].replace("</mvnx>", f"{second}</mvnx>"))
+    both = open_recording(tmp_path / "duet.mvnx", positions=positions)
+    assert np.array_equal(both.frames, np.hstack([each.frames for each in alone]))
+    assert both.channels[0] == f"Anna:{alone[0].channels[0]}"
+    if positions:
+        found = each_person(both)
+        assert [each.person for each in found] == ["Anna", "Ben"]
+        for each, one in zip(found, alone, strict=True):
+            assert np.array_equal(each.frames, one.frames)
+            assert each.skeleton is not None and one.skeleton is not None
+            assert each.skeleton.parents == one.skeleton.parents
 
 
 @pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")

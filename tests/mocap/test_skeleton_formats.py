@@ -294,6 +294,25 @@ def test_smpl_under_other_names(tmp_path: Path, arrays: dict[str, object]) -> No
     assert other.rate_hz == usual.rate_hz
 
 
+def test_all_of_motion_x_in_one_array(tmp_path: Path) -> None:
+    usual = open_recording(write_smpl(tmp_path / "a.npz"), positions=True)
+    array = np.random.default_rng(0).normal(size=(12, 322))  # hands, jaw, face and betas, too
+    array[:, :66] = smpl_poses()[:, :66]
+    array[:, 309:312] = [0.4, -0.1, 0.95]
+    np.save(tmp_path / "b.npy", array)
+    other = open_recording(tmp_path / "b.npy", positions=True)
+    assert other.markers == pytest.approx(usual.markers, abs=1e-6)
+    assert other.rate_hz == 30.0
+
+
+def test_places_of_aist_are_as_much_larger_as_its_person(tmp_path: Path) -> None:
+    usual = open_recording(write_smpl(tmp_path / "a.npz"), positions=True)
+    places = 93.7 * np.tile([0.4, -0.1, 0.95], (12, 1))
+    scaled = {"poses": None, "smpl_poses": smpl_poses()[:, :72], "smpl_scaling": np.array([93.7])}
+    path = write_smpl(tmp_path / "b.npz", trans=None, smpl_trans=places, **scaled)
+    assert open_recording(path, positions=True).markers == pytest.approx(usual.markers, abs=1e-6)
+
+
 @pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")
 @pytest.mark.parametrize("unit", [1.0, 100.0, 1000.0])
 @pytest.mark.parametrize("said", [False, True])

@@ -88,7 +88,7 @@ _TIME_UNITS = {
     **dict.fromkeys(("ns", "nanoseconds"), 1e-9),
 }
 _FRAME = re.compile(
-    rf"(unnamed: ?0|#|index|idx|row|sample|samples|field)$|(sub)?{_SEP}?frames?{_SEP}?"
+    rf"(unnamed: ?0|#|index|idx|row|sample|samples|field|item)$|(sub)?{_SEP}?frames?{_SEP}?"
     rf"(#|no\.?|nr\.?|num|number|index|idx|id|count)?$|(sample|field|row|item){_SEP}?"
     r"(#|no\.?|num|number|index|idx)$",
     re.I,
@@ -195,7 +195,8 @@ def meaning_of(header: Sequence[str]) -> Columns:
     frames = [
         i
         for i, name in enumerate(names)
-        if i not in special and (_FRAME.fullmatch(name) or (not name and i == 0))
+        if i not in special
+        and (_FRAME.fullmatch(name) or (not name and i == 0) or (i < 2 and is_foreign(name)))
     ]
     special |= set(frames)
     rates = [i for i, name in enumerate(names) if i not in special and _RATE.fullmatch(name)]
@@ -232,6 +233,11 @@ def meaning_of(header: Sequence[str]) -> Columns:
         who if markers else None,
         fine if markers else None,
     )
+
+
+def is_foreign(name: str) -> bool:
+    """Whether a name is in letters of another language, and none of a marker's axes."""
+    return not name.isascii() and not any(axes.fullmatch(name) for axes in _AXES)
 
 
 def numbered_triples(names: Sequence[str]) -> list[str]:

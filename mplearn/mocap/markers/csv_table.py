@@ -43,7 +43,14 @@ from ..placing.size import named_unit
 from ..placing.space import Space, placed
 from ..rates import rate_beside
 from ..reader import Hints, Reader
-from .columns import Columns, angle_factor, meaning_of, numbered_names, numbered_triples
+from .columns import (
+    Columns,
+    angle_factor,
+    is_foreign,
+    meaning_of,
+    numbered_names,
+    numbered_triples,
+)
 from .names import chosen_names
 from .pictures import warn_of_pictures
 from .sheet import Header, Sheet, find_header, is_number
@@ -242,7 +249,12 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
     if of_points and len(set(texts.get("person", ()))) > 1 and "who" not in texts:
         texts["who"] = texts.pop("person")
     in_order = columns.points is None and "who" not in texts
-    numbers = [i for i in columns.frames if _counts(found[:, place[i]], in_order=in_order)]
+    numbers = [
+        i
+        for i in columns.frames
+        if _counts(found[:, place[i]], in_order=in_order)
+        and not (is_foreign(columns.names[i]) and (np.diff(found[:, place[i]]) <= 0).any())
+    ]
     if wanted == measured and not are_markers:  # what is only called a number of frames is measured
         wanted = [i for i in clocks if i in columns.frames and i not in numbers] + wanted
     if not wanted or not len(found):
@@ -255,8 +267,12 @@ def _read(sheet: Sheet, header: Header, columns: Columns, findings: Findings) ->
         times = [(x, unit_s) for x, unit_s in times if len(x) == 1 or np.ptp(x) != 0]
     if fine_at is not None and len(times) == 1 and _counts(times[0][0]):  # as ROS has stamps
         times = [(times[0][0] + fine_s * found[:, place[fine_at]], 1.0)]
-    if not times:  # as pandas writes an index of times
-        index = [found[:, place[i]] for i in columns.frames if not columns.names[i]]
+    if not times:  # as pandas writes an index of times, or in another language
+        index = [
+            found[:, place[i]]
+            for i in columns.frames
+            if not columns.names[i] or (of_points and is_foreign(columns.names[i]))
+        ]
         times = [(x, None) for x in index if (np.diff(x) > 0).all() and not _counts(x)]
     times += [(_of_day(path, texts.pop(n)), 1.0) for n in list(texts) if n.startswith("time ")]
     table = _Table(

@@ -263,7 +263,9 @@ def _joined_names(above: list[list[str]]) -> tuple[str, ...]:
             names = [_with_unit(name, unit) for name, unit in pairs]
         width = max((i + 1 for i, name in enumerate(names) if name), default=0)
         return tuple(names[:width])
-    names, letters = above[axes - 1], above[axes]
+    # above the axes, or above what kind of points they are
+    names = max(reversed(above[:axes]), key=lambda row: len({cell for cell in row if cell}))
+    letters = above[axes]
     units = above[axes + 1] if len(above) > axes + 1 and _names_units(above[axes + 1]) else []
     joined: list[str] = []
     current = ""

@@ -2,7 +2,8 @@
 
 Such an array holds no names: how many joints there are tells which they may be, and of several
 layouts the one whose bones keep their lengths, and are as long on both sides. Hands, face and what
-else comes behind the body's joints are left out.
+else comes behind the body's joints are left out. Of several people all are read, each of whom
+becomes a take (`each_person`). Features of motion (HumanML3D) become joints again.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ from ..options import option
 from ..placing.space import Space, placed
 from ..rates import rate_beside
 from ..reader import Hints, Reader
-from .npz_file import NPZFile, finite, read_npy
-from .smpl import BODY_JOINTS, POSES, ROOTS
+from .motion_features import RATES_HZ, joints_of_features
+from .npz_file import NPZFile, finite, npy_shape, read_npy
+from .smpl import BODY_JOINTS, MOTION_X, POSES, ROOTS
 
 _FACE = "nose left_eye right_eye left_ear right_ear"
 _FEET = "left_big_toe left_small_toe left_heel right_big_toe right_small_toe right_heel"
@@ -40,6 +42,9 @@ def _chain(side: str, *joints: str) -> str:
 _ARM, _LEG = ("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")
 _HAND = ("clavicle", *_ARM, "hand", "handtip", "thumb")
 _COCO = f"{_FACE} {_both(*_ARM, *_LEG)}"
+_OPENPOSE_BODY = f"nose neck {_chain('right', *_ARM)} {_chain('left', *_ARM)}"
+_UP = ("ankle", "knee", "hip")
+_NO = "-"  # a joint that nobody needs: a copy of another, the end of a thumb
 LAYOUTS = {
     "COCO": _COCO,
     "Human3.6M": (
@@ -48,7 +53,7 @@ LAYOUTS = {
     ),
     "SMPL": " ".join(BODY_JOINTS),
     "OpenPose": (
-        f"nose neck {_chain('right', *_ARM)} {_chain('left', *_ARM)} mid_hip "
+        f"{_OPENPOSE_BODY} mid_hip "
         f"{_chain('right', *_LEG)} {_chain('left', *_LEG)} right_eye left_eye right_ear left_ear "
         f"{_FEET}"
     ),
@@ -66,16 +71,72 @@ LAYOUTS = {
     ),
     "MediaPipe": " ".join(MEDIAPIPE_POSE),
     "COCO-WholeBody": f"{_COCO} {_FEET}",
+    "Human3.6M in full": (
+        f"mid_hip {_chain('right', *_LEG, 'foot')} {_NO} {_chain('left', *_LEG, 'foot')} {_NO} "
+        f"{_NO} spine thorax nose head {_NO} {_chain('left', *_ARM)} {_NO} {_NO} {_NO} {_NO} "
+        f"{_NO} {_chain('right', *_ARM)} {_NO} {_NO} {_NO} {_NO}"
+    ),
+    "LAFAN1": (
+        f"pelvis {_chain('left', *_LEG, 'foot')} {_chain('right', *_LEG, 'foot')} spine1 spine2 "
+        f"spine3 neck head {_chain('left', 'collar', *_ARM)} {_chain('right', 'collar', *_ARM)}"
+    ),
+    "KIT-ML": (
+        f"pelvis spine1 spine3 neck head {_chain('right', *_ARM)} {_chain('left', *_ARM)} "
+        f"{_chain('right', *_LEG)} {_NO} {_chain('right', 'foot')} "
+        f"{_chain('left', *_LEG)} {_NO} {_chain('left', 'foot')}"
+    ),
+    "first Kinect": (
+        f"spine_base spine_mid spine_shoulder head {_chain('left', *_ARM, 'hand')} "
+        f"{_chain('right', *_ARM, 'hand')} {_chain('left', *_LEG, 'foot')} "
+        f"{_chain('right', *_LEG, 'foot')}"
+    ),
+    "Panoptic": (
+        f"neck nose mid_hip {_chain('left', *_ARM, *_LEG)} {_chain('right', *_ARM, *_LEG)} "
+        "left_eye left_ear right_eye right_ear"
+    ),
+    "OpenPose of COCO": (
+        f"{_OPENPOSE_BODY} {_chain('right', *_LEG)} {_chain('left', *_LEG)} right_eye left_eye "
+        "right_ear left_ear"
+    ),
+    "MPI-INF-3DHP": (
+        f"{_NO} {_NO} {_NO} {_NO} mid_hip thorax {_NO} head "
+        f"{_NO} {_chain('left', *_ARM)} {_NO} {_NO} {_chain('right', *_ARM)} {_NO} "
+        f"{_chain('left', *_LEG)} {_NO} {_chain('left', 'foot')} "
+        f"{_chain('right', *_LEG)} {_NO} {_chain('right', 'foot')}"
+    ),
+    "MPI-INF-3DHP's test": (
+        f"head thorax {_chain('right', *_ARM)} {_chain('left', *_ARM)} {_chain('right', *_LEG)} "
+        f"{_chain('left', *_LEG)} mid_hip {_NO} {_NO}"
+    ),
+    "MPII": (
+        f"{_chain('right', *_UP)} {_chain('left', *_LEG)} mid_hip thorax {_NO} head "
+        f"{_chain('right', *_ARM[::-1])} {_chain('left', *_ARM)}"
+    ),
+    "LSP": (
+        f"{_chain('right', *_UP)} {_chain('left', *_LEG)} {_chain('right', *_ARM[::-1])} "
+        f"{_chain('left', *_ARM)} thorax head"
+    ),
+    "CrowdPose": f"{_both(*_ARM, *_LEG)} head thorax",
 }
-"""Joints of a body by layout, in order."""
+"""Joints of a body by layout, in order; those called ``-`` are left out."""
 
 _BY_NUMBER = {
-    17: ("COCO", "Human3.6M"),
+    14: ("LSP", "CrowdPose"),
+    16: ("MPII",),
+    17: ("COCO", "Human3.6M", "MPI-INF-3DHP's test"),
+    18: ("OpenPose of COCO",),
+    19: ("Panoptic",),
+    20: ("first Kinect",),
+    21: ("KIT-ML",),
+    22: ("SMPL", "LAFAN1"),
     25: ("OpenPose", "Kinect"),
     26: ("Halpe",),
-    32: ("Azure Kinect",),
+    28: ("MPI-INF-3DHP",),
+    32: ("Azure Kinect", "Human3.6M in full"),
     133: ("COCO-WholeBody",),
-    **dict.fromkeys((22, 24, 52, 55, 127, 144), ("SMPL",)),
+    136: ("Halpe",),
+    **dict.fromkeys((49, 65, 67, 135, 137), ("OpenPose",)),
+    **dict.fromkeys((24, 45, 52, 55, 73, 127, 144), ("SMPL",)),
     **dict.fromkeys((33, 75, 543, 553), ("MediaPipe",)),  # with hands and face
 }
 _NAMES = (
@@ -90,13 +151,17 @@ _BONES = {
     ("elbow", "wrist"): 0.146,
 }
 USUAL = Space(1.0, says_unit=False)  # what an array cannot say
+_MOST_PEOPLE = 10  # that are in an array
 _LOOK, _ENOUGH = 200, 6  # frames that are looked at; bones of arms and legs that are seen
 # by how much bones may vary in time (median), differ from side to side, and from usual proportions
 _VARY, _DIFFER, _ODD = 0.15, 0.25, 0.35
 
 
 class JointArrayReader(Reader):
-    """Reads arrays of joints, shape (T, J, 3): see the module's docstring."""
+    """Reads arrays of joints, shape (T, J, 3): see the module's docstring.
+
+    Of several people they are (T, P, J, 3) or (P, T, J, 3), or (3, T, J, P), as networks have it.
+    """
 
     format = "joint array"
     suffixes = (".npy", ".npz")
@@ -104,7 +169,7 @@ class JointArrayReader(Reader):
     def accepts(self, path: Path) -> bool:
         """Whether it is one array, or an archive with one of joints and none of poses."""
         if suffix(path) == ".npy":
-            return True
+            return npy_shape(path)[1:] != (MOTION_X,)
         try:
             archive = NPZFile(path)
         except RecordingError:
@@ -124,23 +189,34 @@ class JointArrayReader(Reader):
             if name is None:
                 raise bad_file(path, f"arrays {', '.join(archive.names[:8])}", "one of joints")
             points, said_hz = archive.numbers(name), archive.rate_hz()
-        points = _as_joints(path, points)
-        rate_hz = hints.rate_hz or said_hz or rate_beside(path, findings)
+        usual_hz = None
+        if points.ndim == 2 and points.shape[1] in RATES_HZ:
+            usual_hz = RATES_HZ[points.shape[1]]
+            findings.note(f"{points.shape[1]} features of motion, at {usual_hz:g} Hz as is usual")
+            points = joints_of_features(path, points)
+        people = _as_people(path, points)
+        rate_hz = hints.rate_hz or said_hz or rate_beside(path, findings) or usual_hz
         if rate_hz is None:
             raise bad_file(path, "no rate", f"one in its name, or {option('rate_hz')}")
-        points = without_unseen(points)
-        if hold_scores(points):
+        people = [without_unseen(points) for points in people]
+        people = [points for points in people if not np.isnan(points).all()] or people[:1]
+        if any(map(hold_scores, people)):
             raise bad_file(
                 path,
                 "pixels, and as third numbers how sure each is: points of a picture",
                 "places in space, (frames, joints, 3)",
             )
-        layout = _layout(path, points)
-        names = tuple(LAYOUTS[layout].split())
-        findings.note(f"{points.shape[1]} joints: those of {layout}")
-        if points.shape[1] > len(names):
-            findings.leave_out([f"{points.shape[1] - len(names)} points of hands, face and others"])
-        points = points[:, : len(names)]
+        n_joints = people[0].shape[1]
+        layout = _layout(path, max(people, key=lambda points: np.isfinite(points).sum()))
+        joints = LAYOUTS[layout].split()
+        findings.note(f"{n_joints} joints: those of {layout}")
+        if n_joints > len(joints):
+            findings.leave_out([f"{n_joints - len(joints)} points of hands, face and others"])
+        kept = [k for k, joint in enumerate(joints) if joint != _NO]
+        names = tuple(joints[k] for k in kept)
+        if len(people) > 1:
+            names = tuple(f"person{p}:{name}" for p in range(len(people)) for name in names)
+        points = np.concatenate([points[:, kept] for points in people], axis=1)
         warn_of_pictures(points, names, findings)
         at = placed(path, points, names, rate_hz, USUAL, hints, findings)
         return Recording(
@@ -152,23 +228,35 @@ class JointArrayReader(Reader):
         )
 
 
-def _as_joints(path: Path, array: FloatArray) -> FloatArray:
-    """Return an array as joints, shape (T, J, 3)."""
-    points = array[0] if array.ndim == 4 and len(array) == 1 else array
-    if points.ndim == 4 and points.shape[1] == 1:
-        points = points[:, 0]
-    if points.ndim == 2 and points.shape[1] // 3 in _BY_NUMBER and points.shape[1] % 3 == 0:
-        points = points.reshape(len(points), -1, 3)
-    if points.ndim != 3 or points.shape[2] not in (3, 4) or points.shape[1] not in _BY_NUMBER:
+def _as_people(path: Path, array: FloatArray) -> list[FloatArray]:
+    """Return an array as the joints of each person, shape (T, J, 3) each."""
+    points = array
+    last = array.shape[-1:]
+    channels_first = array.ndim == 3 or (array.ndim == 4 and last[0] not in (3, 4))
+    if channels_first and array.shape[0] == 3 and array.shape[2] in _BY_NUMBER:
+        points = np.moveaxis(array, 0, -1)  # (T, J, 3), or (T, J, P, 3)
+        points = points.swapaxes(1, 2) if array.ndim == 4 else points
+    elif array.ndim == 3 and array.shape[1] == 3 and array.shape[0] in _BY_NUMBER:
+        points = array.transpose(2, 0, 1)  # (J, 3, T), as networks have it
+    if points.ndim == 4 and points.shape[2] in _BY_NUMBER:
+        of_each = points if len(points) <= points.shape[1] else points.swapaxes(0, 1)
+        told_apart = len(of_each) < of_each.shape[1] and len(of_each) <= _MOST_PEOPLE
+        people = list(of_each) if len(of_each) == 1 or told_apart else []
+    elif points.ndim == 2 and points.shape[1] // 3 in _BY_NUMBER and points.shape[1] % 3 == 0:
+        people = [points.reshape(len(points), -1, 3)]
+    else:
+        people = [points]
+    shapes = {points.shape[1:] for points in people if points.ndim == 3}
+    if not any(shape[0] in _BY_NUMBER and shape[1] in (3, 4) for shape in shapes):
         raise bad_file(
             path,
             f"an array of shape {array.shape}",
-            f"(frames, joints, 3), of {', '.join(map(str, sorted(_BY_NUMBER)))} joints; a table "
-            "(CSV) can name others",
+            f"(frames, joints, 3), of {', '.join(map(str, sorted(_BY_NUMBER)))} joints, or "
+            "(frames, people, joints, 3); a table (CSV) can name others",
         )
-    if not len(points):
+    if not len(people[0]):
         raise bad_file(path, "0 frames", "at least one")
-    return points[..., :3].copy()  # the fourth says how sure a joint is
+    return [points[..., :3].copy() for points in people]  # the fourth says how sure a joint is
 
 
 def _layout(path: Path, points: FloatArray) -> str:

@@ -6,6 +6,9 @@ chosen when it is exported:
 
 * both: joint angles or positions; orientations alone: the same, but the pelvis stays where it is;
 * positions alone: positions; joint angles alone: angles.
+
+Of several subjects all are read, side by side, their names before those of the segments; each is a
+take of its own (`each_person`).
 """
 
 from __future__ import annotations
@@ -23,7 +26,7 @@ from ..findings import Findings
 from ..options import option
 from ..placing.space import Space, placed
 from ..reader import Hints, Reader
-from .mvnx_file import MVNXFile, read_mvnx
+from .mvnx_file import SAME_RATE, MVNXFile, read_mvnx
 from .skeletal import Limbs, SkeletalMotion, limb_order, skeletal_recording
 
 _SPACE = Space(1.0, "z", "x", says_up=True)
@@ -51,21 +54,79 @@ class MVNXReader(Reader):
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read angles, or where the segments' origins and ends are; see `Reader.read`."""
         findings = Findings(self.format)
-        file = read_mvnx(path, read_text(path), findings)
-        rate_hz = hints.rate_hz or file.rate_hz
-        if rate_hz is None:
-            raise bad_file(path, "no frameRate", f"one, or {option('rate_hz')}")
-        if file.orientations is not None:
-            motion = _motion(file, rate_hz, findings)
-            recording = skeletal_recording(path, motion, hints, findings, positions=positions)
-        elif positions and file.positions is not None:
-            recording = _points(path, file, file.positions, rate_hz, hints, findings)
-        elif not positions and file.joint_angles is not None:
-            recording = _angles(file, file.joint_angles, rate_hz, findings)
-        else:
-            what = "positions or orientations" if positions else "orientations or joint angles"
-            raise bad_file(path, f"it holds no {what} of segments", "an export with them")
-        return replace(recording, name=stem(path), person=file.subject)
+        files = read_mvnx(path, read_text(path), findings)
+        people = [_subject(path, file, hints, findings, positions=positions) for file in files]
+        return people[0] if len(people) == 1 else _side_by_side(path, people, findings)
+
+
+def _subject(
+    path: Path, file: MVNXFile, hints: Hints, findings: Findings, *, positions: bool
+) -> Recording:
+    """Return the recording of one subject."""
+    rate_hz = hints.rate_hz or file.rate_hz
+    if rate_hz is None:
+        raise bad_file(path, "no frameRate", f"one, or {option('rate_hz')}")
+    if file.orientations is not None:
+        motion = _motion(file, rate_hz, findings)
+        recording = skeletal_recording(path, motion, hints, findings, positions=positions)
+    elif positions and file.positions is not None:
+        recording = _points(path, file, file.positions, rate_hz, hints, findings)
+    elif not positions and file.joint_angles is not None:
+        recording = _angles(file, file.joint_angles, rate_hz, findings)
+    else:
+        what = "positions or orientations" if positions else "orientations or joint angles"
+        raise bad_file(path, f"it holds no {what} of segments", "an export with them")
+    return replace(recording, name=stem(path), person=file.subject)
+
+
+def _side_by_side(path: Path, people: list[Recording], findings: Findings) -> Recording:
+    """Return the recordings of several subjects as one, the subjects' names before all others."""
+    rates = {each.rate_hz for each in people}
+    if max(rates) > (1.0 + SAME_RATE) * min(rates):
+        raise bad_file(
+            path, f"subjects at {', '.join(f'{rate:g}' for rate in sorted(rates))} Hz", "one rate"
+        )
+    said = [each.person.replace(":", " ") or f"subject{k}" for k, each in enumerate(people)]
+    names = [f"{name}_{k}" if said.count(name) > 1 else name for k, name in enumerate(said)]
+    frames = np.full((max(map(len, people)), sum(len(each.channels) for each in people)), np.nan)
+    at = 0
+    for each in people:
+        frames[: len(each), at : at + len(each.channels)] = each.frames
+        at += len(each.channels)
+    if len(set(map(len, people))) > 1:
+        findings.warn("the subjects have other numbers of frames: missing at the end")
+    first = people[0].report
+    assert first is not None
+    return replace(
+        people[0],
+        frames=frames,
+        channels=tuple(
+            f"{name}:{channel}"
+            for name, each in zip(names, people, strict=True)
+            for channel in each.channels
+        ),
+        person="",
+        skeleton=_of_all(names, people),
+        report=findings.report(people[0].rate_hz, first.unit_m, first.up),
+    )
+
+
+def _of_all(names: list[str], people: list[Recording]) -> Skeleton | None:
+    """Return one skeleton with the trees of all subjects; None where they have none."""
+    trees = [each.skeleton for each in people if each.skeleton is not None]
+    if len(trees) < len(people):
+        return None
+    starts = np.cumsum([0, *(len(tree.names) for tree in trees)])
+    return Skeleton(
+        tuple(f"{name}:{j}" for name, tree in zip(names, trees, strict=True) for j in tree.names),
+        tuple(
+            parent + int(start) if parent >= 0 else -1
+            for tree, start in zip(trees, starts, strict=False)
+            for parent in tree.parents
+        ),
+        np.concatenate([tree.offsets for tree in trees]),
+        tuple(end for tree in trees for end in tree.ends),
+    )
 
 
 def _usual_parents(segments: list[str]) -> dict[str, str]:

@@ -13,6 +13,9 @@ from ...recording import FloatArray, IntArray
 from ..files import bad_file
 from ..findings import Findings
 
+SAME_RATE = 0.01
+"""How far the rates of subject and times, and of two subjects, may differ, as a share."""
+
 _MEASURED = {"position": 3, "orientation": 4, "jointAngle": 3}
 _LISTED = {"pos_b": "segments", "connector1": "joints", "connector2": "joints"}
 _TEXTS = (*_MEASURED, *_LISTED)
@@ -20,7 +23,6 @@ _EXPECTED = "an MVNX file: mvnx, subject, segments, frames"
 _CUT_OFF = (3, 5)  # errors of expat: no element found, unclosed token
 _MOST_MISSING = 10  # times as many frames as there are
 _LARGEST = 1e12  # of a rate [1/s] and of times [ms]
-_SAME_RATE = 0.01  # how far the rates of subject and times may differ, as a share
 
 
 @dataclass
@@ -50,31 +52,39 @@ class MVNXFile:
     t_pose: FloatArray | None = None
 
 
-def read_mvnx(path: Path, text: str, findings: Findings) -> MVNXFile:
-    """Return what an MVNX file holds.
+def read_mvnx(path: Path, text: str, findings: Findings) -> list[MVNXFile]:
+    """Return what an MVNX file holds of each of its subjects.
 
     Raises:
         RecordingError: The text is not such a file, or declares entities.
     """
-    stream = _Stream(path)
+    streams = _Streams(path)
     parser = expat.ParserCreate()
     parser.buffer_text = True
-    parser.StartElementHandler = stream.start
-    parser.EndElementHandler = stream.end
-    parser.CharacterDataHandler = stream.text
-    parser.StartDoctypeDeclHandler = stream.doctype
+    parser.StartElementHandler = streams.start
+    parser.EndElementHandler = streams.end
+    parser.CharacterDataHandler = streams.text
+    parser.StartDoctypeDeclHandler = streams.doctype
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
-        if error.code not in _CUT_OFF or stream.numbers < 3:
+        last = streams.last
+        if error.code not in _CUT_OFF or last is None or last.numbers < 3:
             raise bad_file(path, f"damaged XML ({error})", _EXPECTED) from error
-        stream.leave_out_last()
-        findings.warn(f"the file is cut off: {stream.numbers} frames before that are read")
+        last.leave_out_last()
+        findings.warn(f"the file is cut off: {last.numbers} frames before that are read")
+    whole = [each for each in streams.subjects if each.file.segments and each.numbers]
+    if not whole:
+        first = streams.subjects[0] if streams.subjects else _Stream(path)
+        raise bad_file(
+            path, f"{len(first.file.segments)} segments, {first.numbers} frames", _EXPECTED
+        )
+    return [_measured(path, each, findings) for each in whole]
+
+
+def _measured(path: Path, stream: _Stream, findings: Findings) -> MVNXFile:
+    """Return what the file holds of a subject, its texts as numbers."""
     file = stream.file
-    if not file.segments or not stream.numbers:
-        raise bad_file(path, f"{len(file.segments)} segments, {stream.numbers} frames", _EXPECTED)
-    if stream.n_subjects > 1:
-        findings.warn(f"{stream.n_subjects} subjects: {file.subject!r}, the first, is read")
     rows = _rows(stream.indices, findings)
     for name, n_parts in (
         ("position", len(file.segments)),
@@ -111,7 +121,7 @@ def _rate(
     measured_hz = 1000.0 * float(rows[-1]) / lasts_ms
     if said_hz is None:
         return measured_hz
-    slack = _SAME_RATE + measured_hz / 1000.0 / float(rows[-1])  # times are in whole milliseconds
+    slack = SAME_RATE + measured_hz / 1000.0 / float(rows[-1])  # times are in whole milliseconds
     if abs(measured_hz / said_hz - 1.0) <= slack:
         return said_hz
     findings.warn(f"frameRate is {said_hz:g}, the times say {measured_hz:.6g} Hz, which is used")
@@ -154,13 +164,41 @@ def _table(path: Path, texts: list[str], name: str, width: int) -> FloatArray:
     return flat.reshape(len(texts), width)
 
 
+class _Streams:
+    """What expat calls as it goes through the file: a stream for each subject."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.subjects: list[_Stream] = []
+
+    @property
+    def last(self) -> _Stream | None:
+        return self.subjects[-1] if self.subjects else None
+
+    def doctype(self, *_: object) -> None:
+        raise bad_file(self.path, "a document type, which may declare entities", "none, as in MVNX")
+
+    def start(self, name: str, attributes: dict[str, str]) -> None:
+        if name.rpartition(":")[2] == "subject":
+            self.subjects.append(_Stream(self.path))
+        if self.last is not None:
+            self.last.start(name, attributes)
+
+    def text(self, text: str) -> None:
+        if self.last is not None:
+            self.last.text(text)
+
+    def end(self, name: str) -> None:
+        if self.last is not None:
+            self.last.end(name)
+
+
 class _Stream:
-    """What expat calls as it goes through the file."""
+    """What is told of one subject, from its first element on."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.file = MVNXFile()
-        self.n_subjects = 0
         self.numbers = 0  # frames of the motion
         self.indices: list[int] = []
         self.times_ms: list[float] = []
@@ -181,15 +219,8 @@ class _Stream:
         for texts in self.measured.values():
             del texts[self.numbers :]
 
-    def doctype(self, *_: object) -> None:
-        raise bad_file(self.path, "a document type, which may declare entities", "none, as in MVNX")
-
     def start(self, name: str, attributes: dict[str, str]) -> None:
         name = name.rpartition(":")[2]
-        if name == "subject":
-            self.n_subjects += 1
-        if self.n_subjects > 1:
-            return
         if name == "subject":
             self.file.subject = attributes.get("label", "").strip()
             said_hz = _number(attributes.get("frameRate", ""))
@@ -227,7 +258,7 @@ class _Stream:
             self._frame = ""
         elif name == self._list:
             self._list = ""
-        if self._parts is None or name not in _TEXTS or self.n_subjects > 1:
+        if self._parts is None or name not in _TEXTS:
             return
         text, self._parts = "".join(self._parts).strip(), None
         if name in _MEASURED:

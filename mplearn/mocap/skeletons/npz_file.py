@@ -1,4 +1,4 @@
-"""Arrays of a NumPy archive from anyone: nothing is unpickled, nothing allocated unseen."""
+"""Arrays of NumPy's files from anyone: nothing is unpickled, nothing allocated unseen."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import io
 import struct
 import zipfile
 import zlib
-from collections.abc import Iterable
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from tokenize import TokenError
 from typing import Any
@@ -16,7 +17,7 @@ from numpy.lib import format as npy
 
 from ...errors import RecordingError
 from ...recording import FloatArray
-from ..files import bad_file, read_bytes
+from ..files import bad_file, head, read_bytes
 
 RATES = (
     *("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps", "mocap_fps"),
@@ -32,54 +33,29 @@ _DAMAGE = (zipfile.BadZipFile, zlib.error, OSError, EOFError, ValueError, KeyErr
            OverflowError)  # fmt: skip
 
 
-class NPZFile:
-    """The arrays of an archive, each read when it is asked for.
+class Arrays(ABC):
+    """Arrays by name, of a file.
 
     Args:
-        path: The file, plain or gzipped.
-
-    Raises:
-        RecordingError: It is not such an archive.
+        path: The file, for messages.
+        names: Names of the arrays.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, names: Iterable[str]) -> None:
         self.path = path
-        data = read_bytes(path)
-        self._limit = max(_SMALL_BYTES, _MOST_PACKED * len(data))
-        try:
-            self._archive = zipfile.ZipFile(io.BytesIO(data))
-            members = self._archive.infolist()
-        except _DAMAGE as error:
-            raise bad_file(path, f"damaged ({error})", _EXPECTED) from error
-        self._members = {m.filename.removesuffix(".npy"): m for m in members}
+        self.names = tuple(names)
 
-    def __contains__(self, name: str) -> bool:
-        """Whether there is an array of this name."""
-        return name in self._members
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the arrays."""
-        return tuple(self._members)
-
+    @abstractmethod
     def read(self, name: str) -> np.ndarray[Any, np.dtype[Any]]:
         """Return an array of numbers or text.
 
         Raises:
             RecordingError: It is damaged, of objects, or says to be larger than it is.
         """
-        member = self._members[name]
-        if member.file_size > self._limit:
-            raise bad_file(self.path, f"{name!r} expands to {member.file_size} bytes", _EXPECTED)
-        try:
-            content = self._archive.read(member)
-        except _DAMAGE as error:
-            raise _unreadable(self.path, repr(name), error) from error
-        return _array(self.path, content, repr(name))
 
     def first_of(self, names: Iterable[str]) -> str | None:
         """Return the first of some names that there is an array of."""
-        return next((name for name in names if name in self), None)
+        return next((name for name in names if name in self.names), None)
 
     def numbers(self, name: str) -> FloatArray:
         """Return an array of finite numbers, or NaN.
@@ -108,6 +84,65 @@ class NPZFile:
         return rate_hz
 
 
+class HeldArrays(Arrays):
+    """Arrays that are there already, as parts of another one.
+
+    Args:
+        path: The file, for messages.
+        arrays: The arrays by name.
+    """
+
+    def __init__(self, path: Path, arrays: Mapping[str, FloatArray]) -> None:
+        super().__init__(path, arrays)
+        self._arrays = arrays
+
+    def read(self, name: str) -> FloatArray:
+        """Return an array; see `Arrays.read`."""
+        return self._arrays[name]
+
+
+class NPZFile(Arrays):
+    """The arrays of an archive, each read when it is asked for.
+
+    Args:
+        path: The file, plain or gzipped.
+
+    Raises:
+        RecordingError: It is not such an archive.
+    """
+
+    def __init__(self, path: Path) -> None:
+        data = read_bytes(path)
+        self._limit = max(_SMALL_BYTES, _MOST_PACKED * len(data))
+        try:
+            self._archive = zipfile.ZipFile(io.BytesIO(data))
+            members = self._archive.infolist()
+        except _DAMAGE as error:
+            raise bad_file(path, f"damaged ({error})", _EXPECTED) from error
+        self._members = {m.filename.removesuffix(".npy"): m for m in members}
+        super().__init__(path, self._members)
+
+    def read(self, name: str) -> np.ndarray[Any, np.dtype[Any]]:
+        """Return an array; see `Arrays.read`."""
+        member = self._members[name]
+        if member.file_size > self._limit:
+            raise bad_file(self.path, f"{name!r} expands to {member.file_size} bytes", _EXPECTED)
+        try:
+            content = self._archive.read(member)
+        except _DAMAGE as error:
+            raise _unreadable(self.path, repr(name), error) from error
+        return _array(self.path, content, repr(name))
+
+
+def npy_shape(path: Path) -> tuple[int, ...]:
+    """Return the shape that an ``.npy`` file says at its start; empty where it is none."""
+    try:
+        shape, _, _ = _header(io.BytesIO(head(path)))
+    except _DAMAGE:
+        return ()
+    return shape
+
+
 def read_npy(path: Path) -> np.ndarray[Any, np.dtype[Any]]:
     """Return the array of an ``.npy`` file, plain or gzipped.
 
@@ -133,16 +168,20 @@ def finite(path: Path, name: str, array: np.ndarray[Any, np.dtype[Any]]) -> Floa
 
 def _array(path: Path, content: bytes, name: str) -> np.ndarray[Any, np.dtype[Any]]:
     try:
-        stream = io.BytesIO(content)
-        version = npy.read_magic(stream)
-        read_header = npy.read_array_header_1_0 if version[0] == 1 else npy.read_array_header_2_0
-        shape, _, dtype = read_header(stream)
+        shape, _, dtype = _header(io.BytesIO(content))
         size = float(np.prod(shape, dtype=np.float64)) * dtype.itemsize
         if dtype.hasobject or size > len(content):
             raise ValueError(f"shape {shape} of {dtype}")
         return npy.read_array(io.BytesIO(content), allow_pickle=False)
     except _DAMAGE as error:
         raise _unreadable(path, name, error) from error
+
+
+def _header(stream: io.BytesIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Return shape, order and type of an array, as NumPy writes them before it."""
+    version = npy.read_magic(stream)
+    read_header = npy.read_array_header_1_0 if version[0] == 1 else npy.read_array_header_2_0
+    return read_header(stream)
 
 
 def _unreadable(path: Path, name: str, error: Exception) -> RecordingError:

@@ -1,4 +1,4 @@
-"""SMPL, SMPL-H and SMPL-X poses in ``.npz`` files, as AMASS has them [SMPL] [AMASS].
+"""SMPL, SMPL-H and SMPL-X poses in ``.npz`` files, as AMASS has them, or ``.npy`` [SMPL] [AMASS].
 
 Such a file holds how each joint of a body model turns, and where the model is; how long the bones
 are comes from the model, which has a licence of its own and is neither needed nor shipped. The
@@ -15,13 +15,13 @@ import numpy as np
 
 from ...maths.rotations import matrix_to_quaternion, rotation_vector_to_matrix
 from ...recording import BoolArray, FloatArray, Recording
-from ..files import bad_file
+from ..files import bad_file, suffix
 from ..findings import Findings
 from ..options import option
 from ..placing.space import Space
 from ..rates import rate_beside
 from ..reader import Hints, Reader
-from .npz_file import RATES, NPZFile
+from .npz_file import RATES, Arrays, HeldArrays, NPZFile, finite, npy_shape, read_npy
 from .skeletal import Limbs, limb_order, skeletal_recording
 from .stature import unit_of_places
 
@@ -74,6 +74,10 @@ _BODIES = ("pose_body", "body_pose")
 _FAR_M = 20.0  # from where all begins: hardly a place in metres
 _SQUARE = 0.01  # by which matrices and quaternions are off rotations, at most
 _PLACES = ("trans", "transl", "smpl_trans", "root_trans")
+_SCALE = "smpl_scaling"  # AIST++: by how much its places are larger than the model's
+MOTION_X = 322
+"""Numbers a frame of Motion-X: root, body, hands, jaw, face, place, betas."""
+_MOTION_X_HZ = 30.0
 
 
 class SMPLReader(Reader):
@@ -81,18 +85,27 @@ class SMPLReader(Reader):
 
     The rotations are axis-angle vectors [rad], matrices or quaternions, under ``poses``, or under
     ``root_orient`` and ``pose_body`` (``global_orient`` and ``body_pose``); places under ``trans``
-    [m]; the rate under ``mocap_framerate``. The world of AMASS is z up.
+    [m]; the rate under ``mocap_framerate``. The world of AMASS is z up. Motion-X has all in one
+    array of 322 numbers a frame, at 30 Hz.
     """
 
     format = "SMPL"
-    suffixes = (".npz",)
+    suffixes = (".npz", ".npy")
+
+    def accepts(self, path: Path) -> bool:
+        """Whether it is an archive, or an array as Motion-X has it."""
+        return suffix(path) == ".npz" or npy_shape(path)[1:] == (MOTION_X,)
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read angles, or where the joints of a person of 1.70 m are; see `Reader.read`."""
         findings = Findings(self.format)
-        archive = NPZFile(path)
+        whole = suffix(path) == ".npy"
+        archive = _motion_x(path) if whole else NPZFile(path)
         vectors = _vectors(archive, findings)
         rate_hz = hints.rate_hz or archive.rate_hz() or rate_beside(path, findings)
+        if rate_hz is None and whole:
+            rate_hz = _MOTION_X_HZ
+            findings.note(f"{rate_hz:g} Hz, as is usual in Motion-X")
         if rate_hz is None:
             raise bad_file(path, f"none of {', '.join(RATES[:5])}", f"one, or {option('rate_hz')}")
         limbs = mean_person()
@@ -113,6 +126,14 @@ class SMPLReader(Reader):
         return replace(recording, report=replace(recording.report, unit_m=unit_m))
 
 
+def _motion_x(path: Path) -> Arrays:
+    """Return the arrays that an array of Motion-X is made of."""
+    array = finite(path, "the array", read_npy(path))
+    if array.ndim != 2 or array.shape[1] != MOTION_X:
+        raise bad_file(path, f"an array of shape {array.shape}", f"(frames, {MOTION_X})")
+    return HeldArrays(path, {"poses": array[:, :66], "trans": array[:, 309:312]})
+
+
 def mean_person() -> Limbs:
     """Return the skeleton of a person of mean proportions in a T pose, x forward, z up [m]."""
     names = tuple(name for name, *_ in (*_JOINTS, *_ENDS))
@@ -125,7 +146,7 @@ def mean_person() -> Limbs:
     )
 
 
-def _vectors(archive: NPZFile, findings: Findings) -> FloatArray:
+def _vectors(archive: Arrays, findings: Findings) -> FloatArray:
     """Return the rotation vectors of the body's joints, shape (T, 22, 3) [rad]."""
     name = archive.first_of(POSES)
     root, body = archive.first_of(ROOTS), archive.first_of(_BODIES)
@@ -163,7 +184,7 @@ def _vectors(archive: NPZFile, findings: Findings) -> FloatArray:
     return vectors
 
 
-def _as_vectors(archive: NPZFile, name: str, findings: Findings) -> FloatArray:
+def _as_vectors(archive: Arrays, name: str, findings: Findings) -> FloatArray:
     """Return an array of rotations as rotation vectors, whatever it holds; others as they are.
 
     Missing ones, NaN, stay missing.
@@ -221,7 +242,7 @@ def _rotation_vectors(quaternions: FloatArray, seen: BoolArray) -> FloatArray:
     return vectors
 
 
-def _places(archive: NPZFile, n_frames: int, findings: Findings) -> FloatArray:
+def _places(archive: Arrays, n_frames: int, findings: Findings) -> FloatArray:
     name = archive.first_of(_PLACES)
     if name is None:
         findings.warn("there is no 'trans': the pelvis is taken to stay where it is")
@@ -230,7 +251,12 @@ def _places(archive: NPZFile, n_frames: int, findings: Findings) -> FloatArray:
     places = archive.numbers(name)
     if places.size != 3 * n_frames or places.shape[-1:] != (3,):
         raise bad_file(archive.path, f"{name} of shape {places.shape}", f"({n_frames}, 3)")
-    return places.reshape(n_frames, 3)
+    places = places.reshape(n_frames, 3)
+    scale = archive.numbers(_SCALE).ravel() if _SCALE in archive.names else np.ones(1)
+    if len(scale) == 1 and scale[0] > 0 and scale[0] != 1.0:
+        findings.note(f"{name} is divided by {_SCALE}, {scale[0]:.5g}: it is metres then")
+        places = places / scale[0]
+    return places
 
 
 def _unit(
