@@ -51,6 +51,15 @@ class WalkStep:
         tracking_rmse_rad: Root mean square of the joints' tracking error [rad].
         cog_deviation_m: Largest distance of the centre of gravity from the middle of the soles [m].
         zmp_margin_m: Least distance of the zero-moment point from the edge of the soles [m].
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> from mplearn_agents.policies import Greedy
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", dynamics="kinematic")
+        >>> step = walk(env, Greedy(), steps=1, seed=1).steps[-1]
+        >>> step.primitive is not None, step.illegal, step.fallen
+        (True, False, False)
     """
 
     action: int
@@ -76,6 +85,15 @@ class WalkResult:
         rate_hz: Recorded postures per second [1/s].
         episodes: How many episodes came to their end.
         successes: In how many of them the task was solved; None if it does not say.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> from mplearn_agents.policies import Greedy
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", dynamics="kinematic")
+        >>> result = walk(env, Greedy(), steps=2, seed=1)
+        >>> result.duration_s > 0, result.postures.shape[0]  # nothing was recorded
+        (True, 0)
     """
 
     steps: tuple[WalkStep, ...]
@@ -126,6 +144,15 @@ def walk(
 
     Raises:
         InvalidValueError: ``steps`` or ``episodes`` is less than 1.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> from mplearn_agents.policies import RandomWalk
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", dynamics="kinematic")
+        >>> result = walk(env, RandomWalk(seed=1), steps=3, seed=1)
+        >>> len(result.primitives), result.falls
+        (3, 0)
     """
     if steps < 1:
         raise InvalidValueError(f"a walk has at least 1 step, not {steps}")

@@ -17,7 +17,16 @@ Env = gymnasium.Env[Any, Any]
 
 
 class ActionMaskError(MPLearnError, AssertionError):
-    """An environment's action mask breaks the convention."""
+    """An environment's action mask breaks the convention.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> try:
+        ...     check_action_mask(gym.make("CartPole-v1"), steps=2)
+        ... except ActionMaskError as error:
+        ...     print(str(error)[:34])
+        before step 0: there is no mask: n
+    """
 
 
 class MaskReport(NamedTuple):
@@ -30,6 +39,21 @@ class MaskReport(NamedTuple):
         flagged: Whether ``info["illegal"]`` tells of illegal actions.
         refused: How many of those tried raised an error.
         prior: Whether the environment gives a transition prior.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> class Doors(gym.Env):
+        ...     action_space, observation_space = gym.spaces.Discrete(3), gym.spaces.Discrete(1)
+        ...
+        ...     def reset(self, *, seed=None, options=None):
+        ...         super().reset(seed=seed)
+        ...         return 0, {"action_mask": np.array([1, 0, 1], np.int8)}
+        ...
+        ...     def step(self, action):
+        ...         return 0, 0.0, False, False, {"action_mask": np.array([1, 0, 1], np.int8)}
+        >>> report = check_action_mask(Doors(), steps=20)
+        >>> report.steps, report.prior, round(report.legal, 3)
+        (20, False, 0.667)
     """
 
     steps: int
@@ -67,6 +91,20 @@ def check_action_mask(
 
     Raises:
         ActionMaskError: Something does not hold; the message says what, and where.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> class Doors(gym.Env):
+        ...     action_space, observation_space = gym.spaces.Discrete(3), gym.spaces.Discrete(1)
+        ...
+        ...     def reset(self, *, seed=None, options=None):
+        ...         super().reset(seed=seed)
+        ...         return 0, {"action_mask": np.array([1, 0, 1], np.int8)}
+        ...
+        ...     def step(self, action):
+        ...         return 0, 0.0, False, False, {"action_mask": np.array([1, 0, 1], np.int8)}
+        >>> check_action_mask(Doors(), steps=20).refused  # no action raises an error
+        0
     """
     space = env.action_space
     if not isinstance(space, gymnasium.spaces.Discrete) or space.start != 0:

@@ -25,6 +25,11 @@ class Setting:
         seeds: Seeds of synthetic sessions and of walks.
         orders: Orders of presentation a person.
         wrong: Folder of the same movements performed wrongly on purpose; None where there is none.
+
+    Example:
+        >>> setting = Setting("synthetic", seeds=(101,))
+        >>> setting.seeds, setting.wrong is None
+        ((101,), True)
     """
 
     data: str

@@ -19,6 +19,13 @@ def captioned(picture: NDArray[np.uint8], text: str, note: str = "") -> NDArray[
 
     Raises:
         MissingDependencyError: pillow, which matplotlib brings, is not installed.
+
+    Example:
+        >>> import numpy as np
+        >>> blank = np.full((120, 320, 3), 255, np.uint8)
+        >>> written = captioned(blank, "bow down", "0.5 of the speed")
+        >>> written.shape, bool((written != blank).any())
+        ((120, 320, 3), True)
     """
     text, note = printable(text), printable(note)
     image = require("PIL.Image", "report").fromarray(picture)

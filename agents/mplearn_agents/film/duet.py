@@ -39,6 +39,14 @@ def accompany(
 
     Returns:
         A posture for each picture, shape (sum of pictures, 7 + n), feet about the origin.
+
+    Example:
+        >>> from mplearn.body import human_body
+        >>> from mplearn.demonstrator import demonstrate
+        >>> shown = demonstrate(["BAR", "BAL"], seed=1)
+        >>> frames = shown.posture.frames
+        >>> accompany(human_body(), frames, shown.truth, [("BAL", 20), ("BAR", 30)]).shape
+        (50, 47)
     """
     last = _centred(body, postures[truth[0].start : truth[0].start + 1])[0]
     pieces: list[FloatArray] = []

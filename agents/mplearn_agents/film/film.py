@@ -79,6 +79,15 @@ def with_captions(
         pictures: One for each recorded posture of the walk.
         walk: The walk.
         names: What each of its steps is called.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn_agents.walk import WalkResult, WalkStep
+        >>> step = WalkStep(3, 7, "bow down", 1.0, 0.0, False, False, 0.01, 0.01, 0.03)
+        >>> walk = WalkResult((step,), np.zeros((2, 37)), np.zeros(2, int), 25.0)
+        >>> blank = np.zeros((120, 320, 3), np.uint8)
+        >>> len(list(with_captions([blank, blank], walk, ["bow down"])))
+        2
     """
     for k, picture in enumerate(pictures):
         step = int(walk.step_of[k])
@@ -87,7 +96,16 @@ def with_captions(
 
 
 def middle_pictures(walk: WalkResult) -> dict[int, int]:
-    """Return, for each step that performs a primitive, the index of the picture in its middle."""
+    """Return, for each step that performs a primitive, the index of the picture in its middle.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn_agents.walk import WalkResult, WalkStep
+        >>> step = WalkStep(3, 7, "bow down", 1.0, 0.0, False, False, 0.01, 0.01, 0.03)
+        >>> walk = WalkResult((step,), np.zeros((26, 37)), np.zeros(26, int), 25.0)
+        >>> middle_pictures(walk)
+        {0: 14}
+    """
     middles = {}
     for k, step in enumerate(walk.steps):
         shown = np.flatnonzero(walk.step_of == k)

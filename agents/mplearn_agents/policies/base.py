@@ -18,6 +18,13 @@ class Policy(ABC):
     The environment's ``info`` says what is legal (``"action_mask"``, shape (A,)) and how the
     demonstrator went on from here (``"transition_prior"``, shape (A,), which sums to 1 and is 0
     where the mask is 0).
+
+    Example:
+        >>> class Shy(Policy):
+        ...     def act(self, observation, info):
+        ...         return 0
+        >>> Shy().act(None, {"action_mask": np.array([1, 1])})
+        0
     """
 
     def reset(self, seed: int | None = None) -> None:  # noqa: B027  (a policy may have no memory)

@@ -98,6 +98,15 @@ class Experienced(Policy):
         in_order: Whether the task wants one slot after the other, or any of them.
         reached: What the task pays where it is fulfilled.
         fallen: What a fall costs.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", task="recite", dynamics="kinematic")
+        >>> policy = Experienced.for_env(env, steps=50, seed=1)
+        >>> observation, info = env.reset(seed=1)
+        >>> bool(info["action_mask"][policy.act(observation, info)])
+        True
     """
 
     def __init__(

@@ -105,6 +105,10 @@ class Foresight:
         futures: How many.
         decisions: For how many, after the next one, futures are told apart by what is recognised.
         tick_s: Between the moments that are looked at [s].
+
+    Example:
+        >>> Foresight(horizon_s=10.0, tick_s=0.1).ticks
+        100
     """
 
     horizon_s: float = 15.0
@@ -140,6 +144,17 @@ class Hindsight(Policy):
         hold_s: Duration of holding [s].
         foresight: How far it looks ahead.
         seed: Of the futures.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> from mplearn_agents.policies import hindsight
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", task="follow", dynamics="kinematic")
+        >>> policy = hindsight(env)
+        >>> policy.reset(seed=1)
+        >>> observation, info = env.reset(seed=1)
+        >>> bool(info["action_mask"][policy.act(observation, info)])
+        True
     """
 
     def __init__(

@@ -36,6 +36,16 @@ class Imitation(Policy):
         slots: Action of each primitive.
         seed: Seed of the walk; None draws one.
         renew: Returns the forecast of now, where the library may change from episode to episode.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", dynamics="kinematic")
+        >>> policy = Imitation.for_env(env)
+        >>> policy.reset(seed=1)
+        >>> observation, info = env.reset(seed=1)
+        >>> bool(info["action_mask"][policy.act(observation, info)])
+        True
     """
 
     def __init__(

@@ -17,6 +17,14 @@ class Mirror(Policy):
     """For the task ``follow``: performs the motion recognised last, and holds where it may not.
 
     It guesses nothing: so it comes late to every motion, and is never led elsewhere.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", task="follow", dynamics="kinematic")
+        >>> observation, info = env.reset(seed=1)
+        >>> bool(info["action_mask"][Mirror().act(observation, info)])
+        True
     """
 
     def act(self, observation: Any, info: Mapping[str, Any]) -> int:

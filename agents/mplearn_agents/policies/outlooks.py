@@ -183,6 +183,15 @@ def oracle(env: gymnasium.Env[Any, Any]) -> Hindsight:
 
     Raises:
         InvalidValueError: The environment has another task than ``follow``.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", task="follow", dynamics="kinematic")
+        >>> policy = oracle(env)
+        >>> observation, info = env.reset(seed=1)
+        >>> bool(info["action_mask"][policy.act(observation, info)])
+        True
     """
     return Hindsight.for_env(env, KnowsTheGraph(env))
 
@@ -192,6 +201,13 @@ def hindsight(env: gymnasium.Env[Any, Any]) -> Hindsight:
 
     Raises:
         InvalidValueError: The environment has another task than ``follow``.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", task="follow", dynamics="kinematic")
+        >>> type(hindsight(env)).__name__
+        'Hindsight'
     """
     return Hindsight.for_env(env, KnowsWhatItMay(env))
 
@@ -204,6 +220,15 @@ def experienced_follower(
     Raises:
         InvalidValueError: The environment has another task than ``follow``, or was not made by
             `gymnasium.make`; or there are no steps.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", task="follow", dynamics="kinematic")
+        >>> policy = experienced_follower(env, steps=50, seed=1)
+        >>> observation, info = env.reset(seed=1)
+        >>> bool(info["action_mask"][policy.act(observation, info)])
+        True
     """
     task, actor = follow_task(env), env.unwrapped
     experience, watched = _found_out(twin_of(env), task.deadline_s, steps, seed)

@@ -130,6 +130,20 @@ class PathToTask(Policy):
         renew: Returns the graph of now, where the library may change from episode to episode.
         correcting: Whether the graph may be another person's: where the prior shows other ways than
             the graph has, it is mended, for the rest of the episode.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> from mplearn_envs.tasks import GoalTask
+        >>> task = GoalTask("primitive", target="squat down")
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", task=task, dynamics="kinematic")
+        >>> policy = PathToTask.for_env(env)
+        >>> observation, info = env.reset(seed=1)
+        >>> while not info["is_success"]:
+        ...     step = env.step(policy.act(observation, info))
+        ...     observation, reward, terminated, truncated, info = step
+        >>> terminated
+        True
     """
 
     def __init__(

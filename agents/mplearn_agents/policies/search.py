@@ -54,6 +54,15 @@ class Search(Policy):
 
     Raises:
         InvalidValueError: ``horizon_s`` is not positive, or ``beam`` less than 1.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", task="recite", dynamics="kinematic")
+        >>> policy = Search.for_env(env, horizon_s=3.0, beam=2)
+        >>> observation, info = env.reset(seed=1)
+        >>> bool(info["action_mask"][policy.act(observation, info)])
+        True
     """
 
     def __init__(

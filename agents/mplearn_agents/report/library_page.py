@@ -53,6 +53,16 @@ def library_figures(
         library: What was learned.
         labels: What each primitive is called in the figures.
         folder: Where PNG files of the figures go; None writes none.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> t = np.arange(800) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+        >>> events = learner.learn_many(swing)
+        >>> sorted(library_figures(learner.snapshot(), {1: "up", 2: "down"}))
+        ['curves', 'graph', 'tree']
     """
     if not len(library):
         return {}
@@ -95,6 +105,17 @@ def library_page(library: PrimitiveLibrary, source: str) -> Page:
     Args:
         library: What was learned.
         source: Name of the file it came from.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LearnerConfig, MotionLearner
+        >>> t = np.arange(800) / 100.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up, down, a rest
+        >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+        >>> events = learner.learn_many(swing)
+        >>> page = library_page(learner.snapshot(), "swings.mplearn")
+        >>> sorted(page.figures), len(page.primitives)
+        (['curves', 'graph', 'tree'], 2)
     """
     n_edges = library.graph.to_networkx().number_of_edges()
     return Page(

@@ -98,6 +98,11 @@ class Page:
 
     Attributes:
         figures: Any of "progress", "stream", "curves", "tree" and "graph".
+
+    Example:
+        >>> page = Page("Swings", "What one arm did.", numbers=(), footer="mplearn")
+        >>> page.walk is None, page.figures
+        (True, {})
     """
 
     title: str
@@ -121,6 +126,11 @@ def render_page(page: Page) -> str:
 
     Raises:
         MissingDependencyError: jinja2 is not installed.
+
+    Example:
+        >>> html = render_page(Page("Swings", "What one arm did.", numbers=()))
+        >>> "What one arm did." in html, "http://" in html.replace("http://www.w3.org", "")
+        (True, False)
     """
     jinja2 = require("jinja2", "report")
     template = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined).from_string(

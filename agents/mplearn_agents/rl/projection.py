@@ -27,7 +27,18 @@ def project(action: int, mask: ArrayLike) -> int:
 
 
 class ProjectIllegal(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Replaces illegal actions by legal ones, see `project`; the mask is ``action_masks()``."""
+    """Replaces illegal actions by legal ones, see `project`; the mask is ``action_masks()``.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> env = ProjectIllegal(gym.make("mplearn/PrimitiveHumanoid-v0", dynamics="kinematic"))
+        >>> observation, info = env.reset(seed=1)
+        >>> forbidden = int((info["action_mask"] == 0).nonzero()[0][0])
+        >>> observation, reward, terminated, truncated, info = env.step(forbidden)
+        >>> info["illegal"], info["action"] != forbidden
+        (False, True)
+    """
 
     def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
         """Perform a legal action; ``info["action"]`` says which."""

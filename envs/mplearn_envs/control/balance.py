@@ -35,6 +35,18 @@ class BalanceController:
         robot: The robot.
         gain: Of COG, height and orientation [1/s].
         foot_gain: Of the feet's positions and rotations [1/s].
+
+    Example:
+        >>> from mplearn_envs.mechanics import rest_reference
+        >>> from mplearn_envs.robot import humanoid
+        >>> controller = BalanceController(humanoid())
+        >>> reference = rest_reference(humanoid())
+        >>> target = reference.target.copy()
+        >>> target[0] -= 0.01  # a little into the knees
+        >>> for _ in range(100):
+        ...     reference = controller.update(reference, target, period_s=0.004)
+        >>> controller.cog_error_m(reference) < 0.005
+        True
     """
 
     def __init__(self, robot: Robot, gain: float = 8.0, foot_gain: float = 20.0) -> None:

@@ -23,7 +23,16 @@ from .upper_body import UpperBodyTracker
 
 
 class Controller(ABC):
-    """What every controller is; none needs an environment."""
+    """What every controller is; none needs an environment.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn_envs.control import StandingController
+        >>> from mplearn_envs.robot import humanoid
+        >>> controller: Controller = StandingController(humanoid())
+        >>> controller.update(np.zeros(len(humanoid().channels))).shape
+        (30,)
+    """
 
     @abstractmethod
     def reset(self) -> None:
@@ -50,6 +59,15 @@ class StandingController(Controller):
     Args:
         robot: The robot.
         period_s: Control period [s].
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn_envs.robot import humanoid
+        >>> robot = humanoid()
+        >>> controller = StandingController(robot, period_s=0.004)
+        >>> upright = np.zeros(len(robot.channels))  # the robot's features: standing, arms hanging
+        >>> controller.update(upright).shape
+        (30,)
     """
 
     def __init__(self, robot: Robot, period_s: float = 0.004) -> None:

@@ -16,6 +16,15 @@ class UpperBodyTracker:
         limits: Smallest and largest position, shape (U, 2).
         velocity: Velocity limits, shape (U,).
         period_s: Control period [s].
+
+    Example:
+        >>> import numpy as np
+        >>> tracker = UpperBodyTracker(np.array([[-1.0, 1.0]]), np.array([2.0]), period_s=0.01)
+        >>> here = np.array([0.0])
+        >>> for _ in range(10):
+        ...     here = tracker.update(here, np.array([5.0]))  # out of reach, and far
+        >>> float(here[0].round(3))  # no faster than 2 rad/s
+        0.2
     """
 
     def __init__(self, limits: FloatArray, velocity: FloatArray, period_s: float) -> None:

@@ -80,6 +80,16 @@ class OnlinePrimitiveHumanoidEnv(MacroStepEnv):
 
     Raises:
         InvalidValueError: An option is wrong, a library is given, or the task is "follow".
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> options = {"dynamics": "kinematic", "warm_up_s": 5.0}
+        >>> env = gym.make("mplearn/OnlinePrimitiveHumanoid-v0", **options)
+        >>> observation, info = env.reset(seed=1)
+        >>> info["learner"]["watched_s"], int(info["action_mask"].sum())  # hold alone
+        (5.0, 1)
+        >>> env.close()
     """
 
     def __init__(

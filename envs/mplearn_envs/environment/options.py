@@ -18,7 +18,15 @@ Illegal: TypeAlias = Literal["hold", "raise"]
 
 @dataclass(frozen=True)
 class Options:
-    """A group of options."""
+    """A group of options.
+
+    Example:
+        >>> PictureOptions.of({"width": 320}, "pictures").width
+        320
+        >>> PictureOptions.of({"wide": 320}, "pictures")
+        Traceback (most recent call last):
+        mplearn.errors.InvalidValueError: ...
+    """
 
     @classmethod
     def of(cls, given: Self | Mapping[str, Any] | None, name: str) -> Self:
@@ -130,6 +138,14 @@ class PictureOptions(Options):
         height: Height [pixels].
         draw_balance: Whether support polygon, COG and ZMP are drawn on the floor.
         frame_rate_hz: How often ``frame_callback`` is called [1/s of simulated time].
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> pictures = PictureOptions(width=320, height=240, draw_balance=True)
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", pictures=pictures, dynamics="kinematic")
+        >>> env.unwrapped.pictures.width
+        320
     """
 
     width: int = 640
@@ -149,6 +165,11 @@ def require_one_of(name: str, value: object, allowed: tuple[object, ...]) -> Non
 
     Raises:
         InvalidValueError: It is not among those that are allowed.
+
+    Example:
+        >>> require_one_of("style", "wild", ("smooth", "nearest"))
+        Traceback (most recent call last):
+        mplearn.errors.InvalidValueError: ...
     """
     if not isinstance(value, (str, bool, type(None))) or value not in allowed:
         raise InvalidValueError(f"{name} must be one of {allowed}, not {value!r}")
@@ -161,6 +182,11 @@ def require_number(
 
     Raises:
         InvalidValueError: It is none in [low, high]; ``meaning`` is what the message says of that.
+
+    Example:
+        >>> require_number("capacity", 0, 2, 4096, "2 to 4096 slots", whole=True)
+        Traceback (most recent call last):
+        mplearn.errors.InvalidValueError: ...
     """
     number = isinstance(value, (Real, np.number)) and not isinstance(value, (bool, np.bool_))
     fits = not whole or isinstance(value, (int, np.integer))

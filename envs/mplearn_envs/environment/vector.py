@@ -37,6 +37,15 @@ class PrimitiveHumanoidVectorEnv(PlainSpec, SyncVectorEnv):
         max_episode_steps: Macro steps after which an episode is truncated; None: never.
         **options: Of each environment, see `PrimitiveHumanoidEnv`. Each gets a copy of a task
             object.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> envs = gym.make_vec("mplearn/PrimitiveHumanoid-v0", num_envs=2, dynamics="kinematic")
+        >>> observations, infos = envs.reset(seed=1)
+        >>> envs.unwrapped.action_masks().shape[0], infos["action_mask"].shape[0]
+        (2, 2)
+        >>> envs.close()
     """
 
     env_class: ClassVar[type[MacroStepEnv]] = PrimitiveHumanoidEnv
@@ -96,7 +105,16 @@ class PrimitiveHumanoidVectorEnv(PlainSpec, SyncVectorEnv):
 
 
 class VariedHumanoidVectorEnv(PrimitiveHumanoidVectorEnv):
-    """The same of `VariedHumanoidEnv`."""
+    """The same of `VariedHumanoidEnv`.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> envs = gym.make_vec("mplearn/PrimitiveHumanoid-v1", num_envs=2, dynamics="kinematic")
+        >>> envs.num_envs
+        2
+        >>> envs.close()
+    """
 
     env_class = VariedHumanoidEnv
 

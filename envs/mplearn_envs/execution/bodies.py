@@ -57,6 +57,11 @@ class Body:
 
     Raises:
         InvalidValueError: A value is no number in its range.
+
+    Example:
+        >>> wrong = Body(masses=0.1, friction=0.3, delay_s=0.01)
+        >>> wrong.certain, Body().certain
+        (False, True)
     """
 
     masses: float = 0.0
@@ -125,12 +130,22 @@ def make_body(given: Body | str | Mapping[str, Any]) -> Body:
 
     Raises:
         InvalidValueError: There is no such level or value, or one is out of its range.
+
+    Example:
+        >>> make_body("nominal").certain, make_body({"payload_kg": 0.5}).payload_kg
+        (True, 0.5)
     """
     return from_levels("body", given, BODIES)
 
 
 def body_model(robot: Robot, body: Body) -> mujoco.MjModel:
-    """Return the model in which a robot's bodies of one level are drawn, not disturbed yet."""
+    """Return the model in which a robot's bodies of one level are drawn, not disturbed yet.
+
+    Example:
+        >>> from mplearn_envs.robot import humanoid
+        >>> body_model(humanoid(), Body()).nu
+        30
+    """
     if body.bumps_m == 0.0:
         return mujoco.MjModel.from_xml_string(robot.xml)
     spec = mujoco.MjSpec.from_string(robot.xml)
@@ -154,6 +169,13 @@ class Drawn(NamedTuple):
     Attributes:
         lag: By how many control periods commands come late.
         off: By how much the joints are off at the start, shape (n,) [rad].
+
+    Example:
+        >>> from mplearn_envs.robot import humanoid
+        >>> body = Body(delay_s=0.02)
+        >>> drawn = embody(body_model(humanoid(), body), humanoid(), body, draw=3)
+        >>> 0 <= drawn.lag <= 5  # periods of 4 ms
+        True
     """
 
     lag: int
@@ -168,6 +190,15 @@ def embody(model: mujoco.MjModel, robot: Robot, body: Body, draw: int) -> Drawn:
         robot: The robot.
         body: What may be drawn.
         draw: Which draw.
+
+    Example:
+        >>> from mplearn_envs.robot import humanoid
+        >>> body = Body(masses=0.1, delay_s=0.02, start_rad=0.05)
+        >>> model = body_model(humanoid(), body)
+        >>> mass_kg = model.body_mass.sum()
+        >>> drawn = embody(model, humanoid(), body, draw=3)
+        >>> drawn.off.shape, bool(model.body_mass.sum() != mass_kg)
+        ((30,), True)
     """
     n = len(robot.joint_names)
     if body.certain:
@@ -214,6 +245,15 @@ def draw_pushes(
         draw: Which draw: the episode's.
         count: Which macro step of it, from 0.
         duration_s: How long that is planned to take [s].
+
+    Example:
+        >>> from mplearn_envs.robot import humanoid
+        >>> body = Body(push_ns=5.0, pushes_per_minute=60.0, steps=True)
+        >>> model = body_model(humanoid(), body)
+        >>> pushes = draw_pushes(model, humanoid(), body, draw=3, count=0, duration_s=30.0)
+        >>> again = draw_pushes(model, humanoid(), body, draw=3, count=0, duration_s=30.0)
+        >>> str(pushes) == str(again)
+        True
     """
     if body.pushes_per_minute == 0.0 or body.push_ns == 0.0:
         return NO_PUSHES

@@ -29,6 +29,15 @@ class Measured(NamedTuple):
             negative outside, -1 where fewer than three corners of the soles are down; (1,) [m].
         bodies: Origin of every body from the middle of the soles on the floor, x along the heading,
             shape (B, 3) [m]; body 0 is the world.
+
+    Example:
+        >>> from mplearn_envs.execution.simulation import Simulation
+        >>> from mplearn_envs.robot import humanoid
+        >>> simulation = Simulation(humanoid())
+        >>> simulation.reset()
+        >>> measured = Sensors(simulation).read()
+        >>> measured.posture.shape, measured.velocity.shape, measured.cog.shape
+        ((33,), (36,), (3,))
     """
 
     posture: FloatArray
@@ -43,6 +52,15 @@ class Sensors:
 
     Args:
         simulation: The robot; its poses must be up to date.
+
+    Example:
+        >>> from mplearn_envs.execution.simulation import Simulation
+        >>> from mplearn_envs.robot import humanoid
+        >>> simulation = Simulation(humanoid())
+        >>> simulation.reset()
+        >>> measured = Sensors(simulation).read()
+        >>> bool(0.7 < measured.posture[0] < 1.0), bool(measured.support_margin[0] > 0)
+        (True, True)
     """
 
     def __init__(self, simulation: Simulation) -> None:

@@ -50,6 +50,17 @@ class Simulation:
         model: The compiled model.
         data: Its state.
         draw: Which body was drawn, see `embody`.
+
+    Example:
+        >>> from mplearn_envs.mechanics import rest_reference
+        >>> from mplearn_envs.planning import Planner
+        >>> from mplearn_envs.robot import humanoid
+        >>> simulation = Simulation(humanoid())
+        >>> simulation.reset()
+        >>> plan = Planner(humanoid()).hold(rest_reference(humanoid()), 0.5)
+        >>> report = simulation.perform(plan)
+        >>> report.fallen, round(report.duration_s, 3)
+        (False, 0.5)
     """
 
     def __init__(self, robot: Robot, feedback: Feedback = "steps", body: Body = NOMINAL) -> None:

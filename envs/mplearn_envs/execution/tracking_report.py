@@ -36,6 +36,15 @@ class TrackingReport(NamedTuple):
         duration_s: How long it took [s].
         n_steps: How many steps the robot took to survive.
         end: Where the reference robot is at the end if not where it was planned.
+
+    Example:
+        >>> from mplearn_envs.mechanics import rest_reference
+        >>> from mplearn_envs.planning import Planner
+        >>> from mplearn_envs.robot import humanoid
+        >>> plan = Planner(humanoid()).hold(rest_reference(humanoid()), 0.5)
+        >>> report = TrackingReport.as_planned(plan)
+        >>> report.fallen, report.duration_s, report.fallen_at(0.5).fallen
+        (False, 0.5, True)
     """
 
     time_s: FloatArray
@@ -76,6 +85,17 @@ def assess(robot: Robot, plan: Plan, q: FloatArray, v: FloatArray, fallen: bool)
         q: Postures at the plan's reference postures, the start included, shape (S + 1, 7 + n).
         v: Velocities there, shape (S + 1, 6 + n).
         fallen: Whether it fell.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn_envs.mechanics import rest_reference
+        >>> from mplearn_envs.planning import Planner
+        >>> from mplearn_envs.robot import humanoid
+        >>> plan = Planner(humanoid()).hold(rest_reference(humanoid()), 0.5)
+        >>> velocity = np.zeros((len(plan.q), plan.q.shape[1] - 1))
+        >>> report = assess(humanoid(), plan, plan.q, velocity, fallen=False)
+        >>> float(report.tracking_error_rad.max().round(9))
+        0.0
     """
     ref = reference_robot(robot)
     n = len(q)
@@ -123,6 +143,15 @@ def has_fallen(q: FloatArray, wanted: FloatArray, drop_m: float) -> bool:
         q: Actual posture, shape (7 + n,).
         wanted: Wanted posture, shape (7 + n,).
         drop_m: By how much it may be lower than wanted [m].
+
+    Example:
+        >>> from mplearn_envs.mechanics import rest_reference
+        >>> from mplearn_envs.robot import humanoid
+        >>> q = rest_reference(humanoid()).q
+        >>> low = q.copy()
+        >>> low[2] -= 0.4
+        >>> has_fallen(q, q, drop_m=0.3), has_fallen(low, q, drop_m=0.3)
+        (False, True)
     """
     up, wanted_up = _up(q), _up(wanted)
     cosine = up[0] * wanted_up[0] + up[1] * wanted_up[1] + up[2] * wanted_up[2]

@@ -22,7 +22,15 @@ _NOTE = (
 
 
 def walk_table(walks: Iterable[Walk], robot: str = "robot") -> Table:
-    """Return one row for each speed and choice of primitives; ``robot`` names who walks."""
+    """Return one row for each speed and choice of primitives; ``robot`` names who walks.
+
+    Example:
+        >>> from mplearn_envs.experiments import Walk
+        >>> steps = [("bow down", 0.01, 0.03, 0.001, 0.0, 0.0, 0.5)]
+        >>> table = walk_table([Walk(speed=0.5, lifting=False, duration_s=2.0, steps=steps)])
+        >>> dict(zip(table.columns, table.rows[0], strict=True))["COG off [cm]"]
+        '1.00'
+    """
     rows = []
     for speed, lifting, group in _grouped(walks):
         steps = [step for walk in group for step in walk.steps]
@@ -48,7 +56,15 @@ def walk_table(walks: Iterable[Walk], robot: str = "robot") -> Table:
 
 
 def primitive_table(walks: Iterable[Walk]) -> Table:
-    """Return one row for each primitive and speed, from walks that lift feet too."""
+    """Return one row for each primitive and speed, from walks that lift feet too.
+
+    Example:
+        >>> from mplearn_envs.experiments import Walk
+        >>> steps = [("step left", 0.01, 0.03, 0.001, 0.0, 0.0, 0.5)]
+        >>> table = primitive_table([Walk(speed=0.5, lifting=True, duration_s=2.0, steps=steps)])
+        >>> [row[0] for row in table.rows]
+        ['step left']
+    """
     rows = []
     for speed, lifting, group in _grouped(walks):
         if not lifting:
@@ -72,7 +88,14 @@ def primitive_table(walks: Iterable[Walk]) -> Table:
 def speed_table(
     library: PrimitiveLibrary, robot: Robot | None = None, speeds: Sequence[float] = (0.5, 1.0)
 ) -> Table:
-    """Return which share of the primitives the robot performs at a speed, and why not the rest."""
+    """Return which share of the primitives the robot performs at a speed, and why not the rest.
+
+    Example:
+        >>> from mplearn_envs.data.library_source import LibrarySource
+        >>> table = speed_table(LibrarySource(None).now(), speeds=[0.5])
+        >>> len(table.rows), table.columns
+        (1, ('speed', 'performed', 'performed slower', 'refused', 'pace', 'why'))
+    """
     robot = robot or humanoid()
     rows = []
     for speed in speeds:

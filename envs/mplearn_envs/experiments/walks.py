@@ -35,6 +35,12 @@ class Walk:
         steps: Of each primitive performed: name, largest COG deviation [m], smallest margin of the
             zero-moment point [m], mean square of the tracking error [rad^2], drift [m] and turn
             [rad] of the standing foot against the plan, share of the human's speed.
+
+    Example:
+        >>> walk = Walk(speed=0.5, lifting=False, duration_s=12.0)
+        >>> walk.steps.append(("bow down", 0.01, 0.03, 0.001, 0.0, 0.0, 0.5))
+        >>> "fell" if walk.fell else f"stood for {walk.duration_s:g} s"
+        'stood for 12 s'
     """
 
     speed: float
@@ -64,6 +70,13 @@ def random_walks(
         speeds: Speeds, as shares of the human's.
         error: Largest model error, as a share.
         robot: Who walks; None is the humanoid.
+
+    Example:
+        >>> from mplearn_envs.data.library_source import LibrarySource
+        >>> library = LibrarySource(None).now()  # the built-in one
+        >>> walks = random_walks(library, seeds=[1], n_primitives=1, speeds=[0.5])
+        >>> {walk.lifting for walk in walks}, {walk.fell for walk in walks}
+        ({False, True}, {''})
     """
     out = []
     for speed in speeds:

@@ -34,6 +34,13 @@ class Reading:
         body_ang_vel: Of the bodies, in the world's frame, shape (T, B, 3).
         times_s: The time that the file gives each frame, shape (T,) [s].
         local: Whether ``body_pos`` is seen from a base at the origin, not turned.
+
+    Example:
+        >>> import numpy as np
+        >>> upright = np.tile([1.0, 0.0, 0.0, 0.0], (50, 1))
+        >>> reading = Reading(50.0, np.zeros((50, 3)), upright, joint_pos=np.zeros((50, 30)))
+        >>> reading.joint_pos.shape
+        (50, 30)
     """
 
     rate_hz: float
@@ -100,6 +107,11 @@ class Dialect(NamedTuple):
         kind: What kind of fault it is, see `Fault`.
         problem: What is wrong with the file if this is how it is meant.
         readings: What it says then.
+
+    Example:
+        >>> dialect = Dialect("quaternion order", "quaternions stand as x, y, z, w", readings=())
+        >>> dialect.problem
+        'quaternions stand as x, y, z, w'
     """
 
     kind: str
@@ -116,6 +128,12 @@ class Format(ABC):
         suffix: What the names of its files end with; "" for a folder.
         rate_hz: Frames per second unless others are asked for [1/s].
         many: Whether one file (or folder) holds any number of motions.
+
+    Example:
+        >>> from mplearn_envs.export import format_of
+        >>> format = format_of("unitree")
+        >>> format.suffix, format.rate_hz, format.many
+        ('.csv', 30.0, False)
     """
 
     name: ClassVar[str]

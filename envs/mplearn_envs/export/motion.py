@@ -19,6 +19,10 @@ class Span(NamedTuple):
         name: Its name.
         start_s: Where it begins [s].
         end_s: Where it ends [s].
+
+    Example:
+        >>> Span(id=7, name="bow down", start_s=0.0, end_s=1.2).name
+        'bow down'
     """
 
     id: int

@@ -36,6 +36,13 @@ class Performed:
     Attributes:
         motions: What the robot performs.
         left_out: Names of the primitives that it cannot, with the reasons.
+
+    Example:
+        >>> from mplearn_envs.export import perform
+        >>> from mplearn_envs.robot import humanoid
+        >>> performed = perform(None, humanoid(), ("bow down", "bow up"))
+        >>> [motion.name for motion in performed.motions], performed.left_out
+        (['bow down / bow up'], {})
     """
 
     motions: tuple[RobotMotion, ...]

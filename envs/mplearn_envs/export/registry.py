@@ -24,6 +24,19 @@ def register_format(format: Format) -> None:
 
     Raises:
         InvalidValueError: It is no format, or has no name.
+
+    Example:
+        >>> class Lines(Format):
+        ...     name, about, suffix = "lines", "the base's path, a line a frame", ".lines"
+        ...     def write(self, path, motions, model):
+        ...         np.savetxt(path, motions[0].root_pos)
+        ...     def read(self, path, model):
+        ...         places = np.loadtxt(path)
+        ...         upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(places), 1))
+        ...         return (Reading(self.rate_hz, places, upright),)
+        >>> register_format(Lines())
+        >>> format_of("lines").suffix
+        '.lines'
     """
     if not isinstance(format, Format) or not getattr(format, "name", ""):
         raise InvalidValueError(f"a format must be an instance of Format, not {format!r}")
@@ -31,7 +44,12 @@ def register_format(format: Format) -> None:
 
 
 def formats() -> dict[str, Format]:
-    """Return all formats by name."""
+    """Return all formats by name.
+
+    Example:
+        >>> {"unitree", "mjlab", "gltf"} <= set(formats())
+        True
+    """
     _load_entry_points()
     return dict(_registered)
 

@@ -60,6 +60,13 @@ class DatagramError(MPLearnError, ValueError):
     Attributes:
         fault: "foreign" for something else, or for another robot; "malformed" for a datagram of
             ours that is damaged, or whose values are no posture.
+
+    Example:
+        >>> try:
+        ...     raise DatagramError("malformed", "it ends early")
+        ... except DatagramError as error:
+        ...     print(error.fault)
+        malformed
     """
 
     def __init__(self, fault: Fault, reason: str) -> None:
@@ -78,6 +85,13 @@ class Datagram(NamedTuple):
         angles: Angles of the upper joints, shape (n,) [rad].
         last: Whether the stream ends with it.
         sent_s: When it was sent, on the sender's wall clock [s]; None where it is not keyed.
+
+    Example:
+        >>> import numpy as np
+        >>> upright = np.array([0.0, 0.0, 0.9, 1.0, 0.0, 0.0, 0.0])
+        >>> posture = Datagram(stream=7, sequence=0, time_s=0.0, base=upright, angles=np.zeros(18))
+        >>> len(encode(posture, robot=1)) < 300
+        True
     """
 
     stream: int
@@ -118,7 +132,15 @@ def robot_code(joint_names: Sequence[str]) -> int:
 
 
 def encode(datagram: Datagram, robot: int, key: bytes | None = None) -> bytes:
-    """Return the bytes of a datagram for the robot with this code; keyed, it needs ``sent_s``."""
+    """Return the bytes of a datagram for the robot with this code; keyed, it needs ``sent_s``.
+
+    Example:
+        >>> import numpy as np
+        >>> upright = np.array([0.0, 0.0, 0.9, 1.0, 0.0, 0.0, 0.0])
+        >>> posture = Datagram(stream=7, sequence=0, time_s=0.0, base=upright, angles=np.zeros(18))
+        >>> type(encode(posture, robot=1)).__name__
+        'bytes'
+    """
     n = len(datagram.angles)
     header = _HEADER.pack(
         MAGIC,

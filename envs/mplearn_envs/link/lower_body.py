@@ -48,6 +48,15 @@ class LowerBody:
         spent_s: Time spent in each phase [s].
         restraint: How much of what comes is followed.
         limiter: The commands' limits.
+
+    Example:
+        >>> from mplearn_envs.link import Receiver
+        >>> from mplearn_envs.robot import humanoid
+        >>> with Receiver(humanoid(), port=0) as receiver:
+        ...     lower = LowerBody(humanoid(), receiver)
+        ...     commands = lower.update(now_s=0.0)  # nobody sends: it stands
+        >>> commands.shape, lower.phase
+        ((30,), 'waiting')
     """
 
     def __init__(

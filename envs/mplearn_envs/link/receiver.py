@@ -35,6 +35,11 @@ class LinkCounts:
             the sender shares the key; not used.
         stale: Were keyed, but sent at another time than now, or of a stream that was left: they are
             replayed, or the wall clocks disagree; not used.
+
+    Example:
+        >>> counts = LinkCounts(used=990, lost=10)
+        >>> f"{counts.lost / (counts.used + counts.lost):.0%} lost"
+        '1% lost'
     """
 
     used: int = 0
@@ -71,6 +76,18 @@ class Receiver(Closing):
 
     Raises:
         LinkError: Nobody can listen there.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn_envs.link import Sender
+        >>> from mplearn_envs.mechanics import rest_reference
+        >>> from mplearn_envs.robot import humanoid
+        >>> robot = humanoid()
+        >>> with Receiver(robot, port=0) as receiver, Sender(robot, port=receiver.port) as sender:
+        ...     data = sender.datagram(rest_reference(robot).q[:7], np.zeros(18), time_s=0.0)
+        ...     taken = receiver.take(data, now_s=0.0)
+        >>> taken.sequence, receiver.counts.used
+        (0, 1)
     """
 
     def __init__(

@@ -32,6 +32,17 @@ class Sender(Closing):
 
     Raises:
         LinkError: No such host, or nothing can be sent there.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn_envs.link import Receiver
+        >>> from mplearn_envs.mechanics import rest_reference
+        >>> from mplearn_envs.robot import humanoid
+        >>> robot = humanoid()
+        >>> with Receiver(robot, port=0) as receiver, Sender(robot, port=receiver.port) as sender:
+        ...     sender.send(rest_reference(robot).q[:7], np.zeros(18), time_s=0.0)
+        >>> sender.unsent
+        0
     """
 
     def __init__(

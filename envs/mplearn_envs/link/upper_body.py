@@ -25,6 +25,17 @@ class UpperBody:
 
     Attributes:
         target: Base height [m], roll, pitch and the upper joints' angles [rad] now, shape (U,).
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn_envs.link import Receiver, Sender
+        >>> from mplearn_envs.robot import humanoid
+        >>> robot = humanoid()
+        >>> with Receiver(robot, port=0) as receiver, Sender(robot, port=receiver.port) as sender:
+        ...     upper = UpperBody(robot, sender)
+        ...     angles = upper.update(np.zeros(len(robot.channels)), time_s=0.0)
+        >>> angles.shape
+        (18,)
     """
 
     def __init__(self, robot: Robot, sender: Sender, period_s: float = 0.004) -> None:

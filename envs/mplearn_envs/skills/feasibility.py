@@ -82,6 +82,11 @@ class Problem:
         where: The joints, channel or foot concerned.
         value: What the motion needs.
         allowed: What is allowed.
+
+    Example:
+        >>> problem = Problem("torque", "knee_l", value=140.0, allowed=120.0)
+        >>> f"{problem.where} needs {problem.value / problem.allowed:.0%} of its {problem.kind}"
+        'knee_l needs 117% of its torque'
     """
 
     kind: ProblemKind
@@ -109,6 +114,11 @@ class Feasibility:
         starts_up: Side of the foot that is in the air at the start, 0 left, 1 right, -1 none. A
             robot that stands otherwise lowers and raises its feet first.
         ends_up: The same at the end.
+
+    Example:
+        >>> verdict = Feasibility(problems=(), speed=0.5, zmp_margin_m=0.02, torque_share=0.6)
+        >>> verdict.feasible
+        True
     """
 
     problems: tuple[Problem, ...]
@@ -134,6 +144,16 @@ class FeasibilityCheck:
     Args:
         planner: Plans for the robot.
         config: What is allowed.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn_envs.mechanics import reference_robot
+        >>> from mplearn_envs.robot import humanoid
+        >>> planner = Planner(humanoid())
+        >>> ref = reference_robot(humanoid())
+        >>> still = np.tile(planner.hold(rest_reference(humanoid()), 1.0).end.target, (50, 1))
+        >>> FeasibilityCheck(planner).judge(Motion(still, 50.0), speed=0.5).feasible
+        True
     """
 
     def __init__(self, planner: Planner, config: FeasibilityConfig | None = None) -> None:

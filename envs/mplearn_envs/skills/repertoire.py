@@ -55,6 +55,15 @@ class Repertoire:
     Raises:
         LibraryError: The library is empty, is for another body, or holds more than fits.
         InvalidValueError: The capacity is not an integer above 1, or the speed not positive.
+
+    Example:
+        >>> from mplearn_envs.data.library_source import LibrarySource
+        >>> from mplearn_envs.robot import humanoid
+        >>> library = LibrarySource(None).now()  # the built-in one
+        >>> repertoire = Repertoire(library, humanoid(), capacity=32)
+        >>> slot = repertoire.slots[library["bow down"].id]
+        >>> library[repertoire.primitive(slot)].name, repertoire.primitive(0) is None  # 0 is hold
+        ('bow down', True)
     """
 
     def __init__(
@@ -267,7 +276,16 @@ _SHARED: WeakValueDictionary[Hashable, Repertoire] = WeakValueDictionary()
 
 
 class Manner(NamedTuple):
-    """How a library is performed; fields are arguments of `Repertoire`."""
+    """How a library is performed; fields are arguments of `Repertoire`.
+
+    Example:
+        >>> from mplearn_envs.data.library_source import LibrarySource
+        >>> from mplearn_envs.robot import humanoid
+        >>> slow = Manner(64, 0.3, "smooth", None, upper_body=False, novel=False)
+        >>> repertoire = shared_repertoire(LibrarySource(None).now(), humanoid(), slow)
+        >>> repertoire.capacity
+        64
+    """
 
     capacity: int | None
     speed: float
@@ -288,6 +306,15 @@ def shared_repertoire(
 
     All environments of a process that ask for the same get the same. It shares skills and memory
     with the one that it is ``like``: of the same primitives, with other transitions.
+
+    Example:
+        >>> from mplearn_envs.data.library_source import LibrarySource
+        >>> from mplearn_envs.robot import humanoid
+        >>> asked = LibrarySource(None).now(), humanoid(), Manner(
+        ...     None, 0.5, "deterministic", None, upper_body=False, novel=False
+        ... )
+        >>> shared_repertoire(*asked) is shared_repertoire(*asked)
+        True
     """
     key = (library.version, robot, manner)
     found = _SHARED.get(key)

@@ -29,6 +29,11 @@ class Foreknowledge(NamedTuple):
         durations_s: How long each takes from where it starts [s], by id.
         transitions_s: How long one takes where another has just ended [s], by both ids; after None
             it is the robot at rest.
+
+    Example:
+        >>> known = Foreknowledge({}, {7: 1.4}, {(None, 7): 1.5})
+        >>> known.durations_s[7], known.transitions_s[None, 7]
+        (1.4, 1.5)
     """
 
     verdicts: Mapping[int, Feasibility]
@@ -81,6 +86,15 @@ class Skills:
     Raises:
         LibraryError: The library is for another body.
         InvalidValueError: The speed is not positive.
+
+    Example:
+        >>> from mplearn_envs.data.library_source import LibrarySource
+        >>> from mplearn_envs.robot import humanoid
+        >>> library = LibrarySource(None).now()  # the built-in one
+        >>> skills = Skills(library, humanoid())
+        >>> bow = library["bow down"].id
+        >>> skills.feasibility(bow).feasible, skills.duration_s(bow) > library[bow].mean_duration_s
+        (True, True)
     """
 
     def __init__(

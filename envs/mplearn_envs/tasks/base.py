@@ -25,6 +25,11 @@ class Choice(NamedTuple):
         legal: Whether the mask allowed it.
         probability: How likely the transition prior makes it.
         history: Ids of the primitives performed before, the latest last, at most 100.
+
+    Example:
+        >>> choice = Choice(primitive=7, legal=True, probability=0.4, history=(3, 5))
+        >>> choice.primitive in choice.history  # not performed in this episode yet
+        False
     """
 
     primitive: int | None
@@ -61,6 +66,21 @@ class Scene(NamedTuple):
         discount: Per second.
         hold_s: Duration of holding [s].
         ways: How the demonstrator goes on, where that is not what the repertoire says.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> from mplearn_envs.tasks import FreeTask
+        >>> class Noting(FreeTask):
+        ...     def arrive(self, scene: Scene):
+        ...         self.last = scene
+        ...         return super().arrive(scene)
+        >>> task = Noting()
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", task=task, dynamics="kinematic")
+        >>> observation, info = env.reset(seed=1)
+        >>> result = env.step(int(info["action_mask"].nonzero()[0][1]))
+        >>> task.last.history == (result[4]["primitive"],), task.last.time_s > 0
+        (True, True)
     """
 
     repertoire: Repertoire
@@ -94,6 +114,22 @@ class Task(ABC):
             reset on, with 0 where nothing was earned. Others are there only when they are earned.
         reset_options: Names of what it reads of `Scene.options`: others that are given to the
             environment's ``reset`` are refused. None takes whatever there is.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> import mplearn_envs
+        >>> class Wander(Task):
+        ...     terms = ("new",)
+        ...
+        ...     def bonuses(self, choice):
+        ...         return {"new": float(choice.primitive not in choice.history)}
+        ...
+        ...     def rates(self, report):
+        ...         return {}
+        >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", task=Wander(), dynamics="kinematic")
+        >>> observation, info = env.reset(seed=1)
+        >>> info["reward_terms"]
+        {'new': 0.0, 'fall': 0.0, 'illegal': 0.0, 'novel': 0.0}
     """
 
     fallen: float = 10.0

@@ -95,6 +95,11 @@ def group_test_table(n: int = 1000, n_different: int = 200) -> Table:
     Args:
         n: Studies without a difference.
         n_different: Studies with one.
+
+    Example:
+        >>> table = group_test_table(n=2, n_different=2)
+        >>> len(table.rows), table.columns[0]
+        (5, 'test')
     """
     same, large = alarms(n), alarms(n_different, effect=1.5, seed=1)
     return Table(

@@ -65,6 +65,11 @@ def joint_error_table(seeds: Sequence[int], n_motions: int = MOTIONS) -> Table:
     Args:
         seeds: One person and performance each.
         n_motions: Motions in each performance.
+
+    Example:
+        >>> table = joint_error_table(seeds=[1], n_motions=2)
+        >>> table.columns[:3]
+        ('markers missing', 'joint error, mean', 'worst person')
     """
     rows = []
     for share in SHARES_MISSING:
@@ -116,6 +121,12 @@ def marker_residual_table(takes: Iterable[Recording]) -> Table:
 
     Args:
         takes: Recordings of known marker sets.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> table = marker_residual_table([demonstrate(["BAR", "BAL"], seed=1).recording])
+        >>> table.columns[:4]
+        ('person', 'body', 'frames', 'mean')
     """
     rows = []
     everything: dict[str, list[Followed]] = {"human": [], "robot": []}

@@ -36,7 +36,15 @@ class Judged:
 
 
 def anomaly_table(results: Iterable[tuple[str, Mapping[str, Judged]]]) -> Table:
-    """Return a table of what `judge_paper_session` and `judge_people` yielded, and all together."""
+    """Return a table of what `judge_paper_session` and `judge_people` yielded, and all together.
+
+    Example:
+        >>> from mplearn.library import AnomalyScore
+        >>> right, wrong = AnomalyScore(0.8, 0.6), AnomalyScore(4.0, 0.01)
+        >>> table = anomaly_table([("anna", {"motion": Judged((right,), (wrong,))})])
+        >>> dict(zip(table.columns, table.rows[0], strict=True))["found"]
+        '100.0 %'
+    """
     rows = []
     pooled: dict[str, list[Judged]] = {}
     for name, kinds in results:

@@ -56,6 +56,12 @@ class Outcome:
         rates: The paper's error rates.
         boundaries: How well its segments agree with the truth.
         times_real_time: Length of the session over the time that learning took.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> outcome = learn_session(demonstrate(["BAR", "BAL"] * 5, seed=1, rate_hz=50.0).recording)
+        >>> outcome.times_real_time > 1.0, outcome.rates.n_motions
+        (True, 10)
     """
 
     learner: MotionLearner
@@ -76,6 +82,13 @@ def learn_session(recording: Recording, truth: Sequence[LabelledSegment] | None 
     Args:
         recording: The session.
         truth: What was performed; the recording's labels where not given.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> session = demonstrate(["BAR", "BAL"] * 5, seed=1, rate_hz=50.0).recording
+        >>> outcome = learn_session(session)
+        >>> outcome.rates.n_classes, outcome.boundaries.recall > 0.8
+        (2, True)
     """
     truth = recording.labels if truth is None else truth
     learner = MotionLearner(LearnerConfig(recording.channels, recording.rate_hz))
@@ -149,7 +162,15 @@ def _demonstrations(rates: LearningRates) -> float:
 
 
 def learning_table(title: str, outcomes: Sequence[tuple[str, Outcome]]) -> Table:
-    """Return the outcomes beside the paper's figures."""
+    """Return the outcomes beside the paper's figures.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> outcome = learn_session(demonstrate(["BAR", "BAL"] * 5, seed=1, rate_hz=50.0).recording)
+        >>> table = learning_table("Two motions", [("anna", outcome)])
+        >>> [row[0] for row in table.rows]
+        ['paper, one person', 'anna']
+    """
     rows = [PAPER, *(outcome_row(name, outcome) for name, outcome in outcomes)]
     if len(outcomes) > 1:
         rows.append(mean_row("mean", [outcome for _, outcome in outcomes]))

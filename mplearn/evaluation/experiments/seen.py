@@ -24,6 +24,13 @@ class Seen:
         segments: What moved, and where nothing did.
         truth: What was performed.
         rate_hz: Frames per second [1/s].
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> session = demonstrate(["BAR", "BAL"] * 3, seed=1, rate_hz=50.0).recording
+        >>> seen = Seen.of(session)
+        >>> sorted(set(seen.labels) - {""}), len(seen.twice().segments) == 2 * len(seen.segments)
+        (['BAL', 'BAR'], True)
     """
 
     frames: FloatArray

@@ -63,7 +63,18 @@ def compile_kernels(recording: Recording) -> None:
 
 
 def by_person(takes: Iterable[Recording]) -> dict[str, list[Recording]]:
-    """Group takes by who performs them, in the order of their first take."""
+    """Group takes by who performs them, in the order of their first take.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import Recording
+        >>> takes = [
+        ...     Recording(np.zeros((50, 1)), 50.0, ("x",), name=name, person=name[:4])
+        ...     for name in ("anna 1", "anna 2", "carl 1")
+        ... ]
+        >>> {person: len(each) for person, each in by_person(takes).items()}
+        {'anna': 2, 'carl': 1}
+    """
     people: dict[str, list[Recording]] = defaultdict(list)
     for take in takes:
         people[take.person].append(take)

@@ -28,6 +28,14 @@ class PrimitiveCurves:
         exemplars: Demonstrations, each (L, D), their lengths differ.
         generated: The primitive's own motion, shape (T, D).
         duration_s: How long it usually takes [s].
+
+    Example:
+        >>> import numpy as np
+        >>> t = np.linspace(0, np.pi, 50)
+        >>> swing = np.stack((0.1 * np.sin(t), np.sin(t)), axis=1)
+        >>> curves = PrimitiveCurves("swing", ("hip", "knee"), (swing,), swing, duration_s=1.0)
+        >>> [curves.channels[i] for i in curves.most_active]
+        ['knee', 'hip']
     """
 
     title: str
@@ -46,6 +54,14 @@ def draw_curves(primitives: Sequence[PrimitiveCurves]) -> Figure:
     """Draw a panel for each primitive, with its three most active joints.
 
     All motions of a panel are stretched to the primitive's mean duration.
+
+    Example:
+        >>> import numpy as np
+        >>> t = np.linspace(0, np.pi, 50)
+        >>> swing = np.stack((0.1 * np.sin(t), np.sin(t)), axis=1)
+        >>> curves = PrimitiveCurves("swing", ("hip", "knee"), (swing,), swing, duration_s=1.0)
+        >>> len(draw_curves([curves]).axes[0].lines) > 0
+        True
     """
     rows = -(-len(primitives) // _COLUMNS)
     figure = new_figure(11.5, 2.35 * rows)

@@ -28,6 +28,13 @@ def draw_graph(graph: nx.DiGraph[int], labels: Mapping[int, str], least: float =
         graph: Primitives as nodes, each edge with its ``"probability"``.
         labels: Text in a node.
         least: Transitions less probable than this are left out, so that the rest can be read.
+
+    Example:
+        >>> import networkx as nx
+        >>> graph = nx.DiGraph()
+        >>> graph.add_weighted_edges_from([(1, 2, 1.0), (2, 1, 0.9), (2, 2, 0.1)], "probability")
+        >>> len(draw_graph(graph, {1: "up", 2: "down"}).axes)
+        1
     """
     order = circular_order(graph)
     at, size = _places(len(order))

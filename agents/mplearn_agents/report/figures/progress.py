@@ -26,6 +26,11 @@ def draw_progress(
         recognised: For each segment that moves, its end [s] and whether it was recognised.
         n_classes: How many kinds of motion the stream holds.
         window_s: The share of recognised segments is that of the last so many seconds [s].
+
+    Example:
+        >>> known, recognised = [(0.0, 0), (12.0, 1), (15.0, 2)], [(12.0, False), (20.0, True)]
+        >>> len(draw_progress(known, recognised, n_classes=2).axes)
+        2
     """
     figure = new_figure(11.5, 2.6)
     axes = figure.add_subplot(1, 2, 1)

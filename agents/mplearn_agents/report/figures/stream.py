@@ -27,6 +27,10 @@ class StripSegment:
         label: What is written in it; nothing for a pause or what was not recognised.
         verdict: ``"truth"``; ``"right"`` or ``"wrong"`` where it was recognised; ``"unknown"``
             where it was not; ``"still"`` for a pause.
+
+    Example:
+        >>> StripSegment(0.5, 1.7, "bow", "right").verdict
+        'right'
     """
 
     start_s: float
@@ -62,6 +66,14 @@ def draw_stream(
         found: What the learner made of it.
         truth: What the demonstrator meant.
         row_s: Length of a row [s].
+
+    Example:
+        >>> import numpy as np
+        >>> found = [StripSegment(0.5, 1.7, "bow", "right"), StripSegment(1.7, 2.5, "", "still")]
+        >>> truth = [StripSegment(0.5, 1.8, "bow", "truth")]
+        >>> figure = draw_stream(np.zeros((150, 3)), 0.0, 50.0, found, truth)
+        >>> len(figure.axes)
+        1
     """
     end_s = start_s + len(features) / rate_hz
     rows = max(1, int(np.ceil((end_s - start_s) / row_s - 1e-6)))

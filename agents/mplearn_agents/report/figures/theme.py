@@ -33,6 +33,15 @@ def figure_style() -> Iterator[None]:
 
     Raises:
         MissingDependencyError: matplotlib is not installed.
+
+    Example:
+        >>> import matplotlib
+        >>> usual = matplotlib.rcParams["axes.spines.top"]
+        >>> with figure_style():
+        ...     matplotlib.rcParams["axes.spines.top"]
+        False
+        >>> matplotlib.rcParams["axes.spines.top"] == usual
+        True
     """
     matplotlib = require("matplotlib", "report")
     with matplotlib.rc_context(
@@ -73,23 +82,47 @@ def new_figure(width_in: float, height_in: float) -> Figure:
 
 
 def svg_uri(figure: Figure) -> str:
-    """Return the figure as a data URI, for the ``src`` of an image."""
+    """Return the figure as a data URI, for the ``src`` of an image.
+
+    Example:
+        >>> from matplotlib.figure import Figure
+        >>> svg_uri(Figure((2.0, 1.0)))[:18]
+        'data:image/svg+xml'
+    """
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None})
     return data_uri(buffer.getvalue(), "image/svg+xml")
 
 
 def save_png(figure: Figure, path: str | Path) -> None:
-    """Write the figure as a PNG file, 150 dots an inch."""
+    """Write the figure as a PNG file, 150 dots an inch.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from matplotlib.figure import Figure
+        >>> save_png(Figure((2.0, 1.0)), "empty.png")
+        >>> Path("empty.png").read_bytes()[1:4]
+        b'PNG'
+    """
     figure.savefig(Path(path), format="png", dpi=150)
 
 
 def data_uri(content: bytes, mime: str) -> str:
-    """Return bytes as a data URI."""
+    """Return bytes as a data URI.
+
+    Example:
+        >>> data_uri(b"<svg/>", "image/svg+xml")
+        'data:image/svg+xml;base64,PHN2Zy8+'
+    """
     return f"data:{mime};base64,{base64.b64encode(content).decode('ascii')}"
 
 
 def readable(name: str, limit: int = 28) -> str:
-    """Return a primitive's or a joint's name as words, shortened where it is long."""
+    """Return a primitive's or a joint's name as words, shortened where it is long.
+
+    Example:
+        >>> readable("both_arms_raise"), readable("a very long name of a primitive", limit=12)
+        ('both arms raise', 'a very long…')
+    """
     words = printable(name).replace("_", " ").strip()
     return words if len(words) <= limit else words[: limit - 1].rstrip() + "…"

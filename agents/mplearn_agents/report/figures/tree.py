@@ -23,6 +23,12 @@ def draw_tree(
         parents: The parent of each node; None for the root and for what has no parent.
         labels: Text beside a leaf.
         exemplars: How many demonstrations a leaf holds; a bar shows them.
+
+    Example:
+        >>> parents = {0: None, 1: 0, 2: 0}
+        >>> figure = draw_tree(parents, {1: "bow", 2: "wave"}, {1: 7, 2: 4})
+        >>> {"bow", "wave"} <= {text.get_text().strip() for text in figure.axes[0].texts}
+        True
     """
     children: dict[int | None, list[int]] = {}
     for node, parent in parents.items():

@@ -28,7 +28,7 @@ _FLOOR_M, _LIMIT_RAD = 0.05, 0.1
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What was found out about one motion of a file.
+    r"""What was found out about one motion of a file.
 
     Attributes:
         name: What the motion is called.
@@ -40,6 +40,21 @@ class Verdict:
         left: How far it would be off without these faults.
         problems: What is wrong and not explained.
         notes: What could not be checked.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from mplearn_envs.export import RobotModel, export, format_of, perform
+        >>> from mplearn_envs.robot import humanoid
+        >>> model = RobotModel.of(humanoid())
+        >>> bow = perform(None, humanoid(), ("bow down",)).motions
+        >>> (path,) = export(bow, model, format_of("unitree"), Path("bow.csv"))
+        >>> rows = [line.split(",") for line in path.read_text().splitlines()]
+        >>> for row in rows:
+        ...     row[3:7] = row[6], *row[3:6]  # quaternions in the other order
+        >>> _ = path.write_text("\n".join(",".join(row) for row in rows))
+        >>> verdict = check(path, model)[0]
+        >>> verdict.in_order, len(verdict.faults) + len(verdict.problems) > 0
+        (False, True)
     """
 
     name: str
@@ -103,6 +118,16 @@ def check(
 
     Raises:
         RecordingError: The file cannot be read, or is of another robot.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from mplearn_envs.export import RobotModel, export, format_of, perform
+        >>> from mplearn_envs.robot import humanoid
+        >>> model = RobotModel.of(humanoid())
+        >>> bow = perform(None, humanoid(), ("bow down",)).motions
+        >>> (path,) = export(bow, model, format_of("unitree"), Path("bow.csv"))
+        >>> [verdict.in_order for verdict in check(path, model)]
+        [True]
     """
     sidecar = read_sidecar(path)
     if format is None:
