@@ -30,6 +30,13 @@ class RecognisedCorpus(NamedTuple):
         table: The segments of all takes, in the order of their names.
         refused: Why not, by name, for takes that could not be read, or seen by the library.
         n_takes: Takes in which it looked.
+
+    Example:
+        >>> from mplearn.library import RecognisedSegment, SegmentTable
+        >>> row = RecognisedSegment("walk", 0.5, 1.7, 3, "step", "step", 0.2, 0.6)
+        >>> found = RecognisedCorpus(SegmentTable([row]), {"torn": "ends in frame 7"}, n_takes=1)
+        >>> len(found.table), list(found.refused)
+        (1, ['torn'])
     """
 
     table: SegmentTable
@@ -51,7 +58,7 @@ def recognise_corpus(
     executor: Executor | None = None,
     show: Callable[[int, int], object] = lambda done, of: None,
 ) -> RecognisedCorpus:
-    """Recognise what of a library is in all recordings of a folder, and of the folders in it.
+    r"""Recognise what of a library is in all recordings of a folder, and of the folders in it.
 
     Args:
         library: File of a library, or a store.
@@ -64,6 +71,23 @@ def recognise_corpus(
     Raises:
         RecordingError: There are no recordings.
         LibraryError: There is no such library.
+
+    Example:
+        >>> import numpy as np
+        >>> from pathlib import Path
+        >>> from mplearn import LearnerConfig, MotionLearner, open_recording
+        >>> t = np.arange(600) / 50.0
+        >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)
+        >>> rows = "".join(f"{time:.2f},{value:.5f}\n" for time, value in zip(t, swing))
+        >>> Path("takes").mkdir(exist_ok=True)
+        >>> _ = Path("takes", "slow.csv").write_text("time_s,elbow\n" + rows)
+        >>> take = open_recording("takes/slow.csv")
+        >>> learner = MotionLearner(LearnerConfig(("elbow",), 50.0, segmenter="zero-velocity"))
+        >>> events = list(learner.learn_recording(take))
+        >>> path = learner.snapshot().save("swing.mplearn")
+        >>> found = recognise_corpus(path, "takes", jobs=0)
+        >>> found.table.column("name")[:3], found.n_takes
+        (['P1', 'P2', 'P1'], 1)
     """
     library, folder = Path(library).absolute(), Path(folder).absolute()  # workers may be elsewhere
     known = PrimitiveLibrary.load(library)

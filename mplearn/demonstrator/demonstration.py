@@ -95,6 +95,11 @@ def paper_session(
 
     Raises:
         InvalidValueError: The seed or the rate is not allowed.
+
+    Example:
+        >>> session = paper_session(101, rate_hz=10.0)
+        >>> len({segment.label for segment in session.truth}), len(session.truth) > 700
+        (22, True)
     """
     demonstrator = Demonstrator(person, seed, rate_hz=rate_hz, variability=variability)
     # an own source for the order: another person with the same seed performs the same script

@@ -52,6 +52,14 @@ class LearningRates(ErrorRates):
         n_inside: Motions that lie in a primitive of their class at the end, those included that it
             was formed from.
         demonstrations: For each class extracted, its motions up to its first primitive's birth.
+
+    Example:
+        >>> from mplearn.recording import LabelledSegment, Segment
+        >>> truth = [LabelledSegment(0, 60, "bow"), LabelledSegment(60, 120, "bow")]
+        >>> found = [Segment(0, 60), Segment(60, 120)]
+        >>> rates = rate_learning(truth, found, [None, None], 100.0)  # the tree was not asked
+        >>> rates.n_classes, rates.extracted, rates.coverage
+        (1, (), 0.0)
     """
 
     classes: Mapping[int, str]
@@ -109,6 +117,19 @@ def rate_learning(
 
     Raises:
         InvalidValueError: There are not as many placements as segments.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.recording import LabelledSegment, Segment
+        >>> from mplearn.tree import PrimitiveTree, TreeConfig
+        >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+        >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+        >>> placements = [tree.insert(k * lift) for k in (1.0, -1.0, 1.01, -1.01, 0.99)]
+        >>> truth = [LabelledSegment(60 * k, 60 * k + 60, "ab"[k % 2]) for k in range(5)]
+        >>> found = [Segment(each.start, each.end) for each in truth]
+        >>> rates = rate_learning(truth, found, placements, 100.0)
+        >>> rates.extracted, rates.coverage, rates.n_wrong
+        (('a', 'b'), 1.0, 0)
     """
     if len(found) != len(placements):
         raise InvalidValueError(

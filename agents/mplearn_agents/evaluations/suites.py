@@ -43,7 +43,12 @@ UNLABELLED: Mapping[str, Evaluation] = {
 
 
 def evaluations_for(setting: Setting) -> Mapping[str, Evaluation]:
-    """Return the experiments on a source of data, by name, in the order they are run."""
+    """Return the experiments on a source of data, by name, in the order they are run.
+
+    Example:
+        >>> list(evaluations_for(Setting("paper-session")))[:3]
+        ['learning', 'presentations', 'walks']
+    """
     if setting.data in BUILT_IN:
         return BUILT_IN[setting.data]
     return UNLABELLED if setting.unlabelled else OF_LABELS[setting.kind]

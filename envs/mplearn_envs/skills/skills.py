@@ -50,6 +50,14 @@ class Skill:
         motion: The same, ready to be planned: what is tracked, and what the feet do.
         version: How often the primitive's motion has changed.
         verdict: Whether the robot can perform it; None until that is asked.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn_envs.planning import Motion
+        >>> frames = np.zeros((50, 33))
+        >>> skill = Skill(frames, Motion(frames[:, :21], 50.0), version=0)
+        >>> skill.lifts, skill.verdict is None  # nobody has asked whether the robot can do it
+        (False, True)
     """
 
     frames: FloatArray

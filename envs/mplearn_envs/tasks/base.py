@@ -39,7 +39,16 @@ class Choice(NamedTuple):
 
 
 class Ways(Protocol):
-    """How a demonstrator goes on who is there while the robot acts."""
+    """How a demonstrator goes on who is there while the robot acts.
+
+    Example:
+        >>> class Always:
+        ...     def prior(self, before: int, time_s: float):
+        ...         return np.eye(32)[3]  # slot 3, whatever was before
+        >>> ways: Ways = Always()
+        >>> int(ways.prior(7, 0.0).argmax())
+        3
+    """
 
     def prior(self, before: int, time_s: float) -> FloatArray:
         """Return how likely each slot comes next, shape (capacity,).

@@ -47,6 +47,19 @@ class Watched(NamedTuple):
         joins: Whether the features go on from those before.
         moved: A change of the stream's axes that was found, and is undone from here on.
         taken: How many of the frames given were taken.
+
+    Example:
+        >>> from mplearn.body import MotionObserver
+        >>> from mplearn.demonstrator import demonstrate
+        >>> take = demonstrate(["BAR"], seed=1).recording
+        >>> observer = MotionObserver(take.marker_names, rate_hz=take.rate_hz)
+        >>> seen = observer.watch(take.frames)  # who is there is not known yet
+        >>> seen.taken, seen.features.shape
+        (1, (0, 33))
+        >>> features = observer.observe(take.frames[1:])
+        >>> seen = observer.watch(take.frames)
+        >>> seen.taken == len(take) == len(seen.features)
+        True
     """
 
     features: FloatArray
@@ -82,6 +95,17 @@ class ObserverState(State):
         arrivals: How often somebody came, or came back.
         identity: Who is there.
         known: The bodies of all who were seen.
+
+    Example:
+        >>> from mplearn.body import MotionObserver
+        >>> from mplearn.demonstrator import demonstrate
+        >>> take = demonstrate(["BAR"], seed=1).recording
+        >>> observer = MotionObserver(take.marker_names, rate_hz=take.rate_hz)
+        >>> features = observer.observe(take.frames)
+        >>> later = MotionObserver(take.marker_names, rate_hz=take.rate_hz)
+        >>> later.load_state(observer.state())  # goes on with the same person
+        >>> later.person, later.state().measuring
+        (0, False)
     """
 
     ik: FollowedState | None

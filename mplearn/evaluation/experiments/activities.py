@@ -19,7 +19,19 @@ def activities_in(recording: Recording) -> IntArray:
 
 
 def activity_table(recordings: Iterable[Recording]) -> Table:
-    """Find the activities of labelled recordings and compare them with the labels."""
+    """Find the activities of labelled recordings and compare them with the labels.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LabelledSegment, Recording
+        >>> t = np.arange(6000) / 50.0
+        >>> frames = np.stack((np.sin(4 * t) * (t < 60), np.sin(5 * t) * (t >= 60)), axis=1)
+        >>> labels = LabelledSegment(0, 3000, "arms"), LabelledSegment(3000, 6000, "legs")
+        >>> take = Recording(frames, 50.0, ("arm", "leg"), name="both", labels=labels)
+        >>> table = activity_table([take])
+        >>> dict(zip(table.columns, table.rows[0], strict=True))["ARI"]
+        '1.00'
+    """
     rows = []
     for recording in recordings:
         truth = frame_labels(recording.labels, len(recording))

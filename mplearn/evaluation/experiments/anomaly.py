@@ -67,6 +67,19 @@ def judge_people(
         takes: Recordings with labelled repetitions, of any number of people.
         incorrect: The like, performed wrongly on purpose by some of these people.
         seed: Seed of the order of presentation and of what is planted.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LabelledSegment, Recording
+        >>> wave = 1 - np.cos(2 * np.pi * np.arange(400) / 100)  # four repetitions
+        >>> def take(name, size, person="anna"):
+        ...     labels = tuple(LabelledSegment(100 * k, 100 * k + 100, name) for k in range(4))
+        ...     frames = size * wave[:, None]
+        ...     return Recording(frames, 100.0, ("elbow",), name=name, labels=labels, person=person)
+        >>> sizes = {"up": 1.0, "out": -1.0, "half up": 0.5, "half out": -0.5}
+        >>> takes = [take(name, size) for name, size in sizes.items()]
+        >>> [person for person, judged in judge_people(takes)]
+        ['anna']
     """
     wrongly = by_person(incorrect)
     for person, own in by_person(takes).items():

@@ -27,6 +27,16 @@ def boundary_table(takes: Iterable[Recording]) -> Table:
 
     Returns:
         One row a segmenter and person, and one over all people.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LabelledSegment, Recording
+        >>> wave = 1 - np.cos(2 * np.pi * np.arange(400) / 100)  # four repetitions
+        >>> labels = tuple(LabelledSegment(100 * k, 100 * k + 100, "up") for k in range(4))
+        >>> take = Recording(wave[:, None], 100.0, ("elbow",), labels=labels, person="anna")
+        >>> table = boundary_table([take])
+        >>> table.columns[:3]
+        ('segmenter', 'person', 'repetition joins: recall')
     """
     scores: dict[tuple[str, str], list[tuple[BoundaryScore, BoundaryScore]]] = defaultdict(list)
     for person, own in by_person(takes).items():

@@ -28,6 +28,19 @@ def quality_table(takes: Iterable[Recording], wrong: Iterable[Recording], seed: 
         takes: Right executions, labelled repetitions, of at least four each.
         wrong: Wrong ones of the same movements and people.
         seed: Of the order of presentation.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LabelledSegment, Recording
+        >>> wave = 1 - np.cos(2 * np.pi * np.arange(400) / 100)  # four repetitions
+        >>> def take(name, size, person="anna"):
+        ...     labels = tuple(LabelledSegment(100 * k, 100 * k + 100, name) for k in range(4))
+        ...     frames = size * wave[:, None]
+        ...     return Recording(frames, 100.0, ("elbow",), name=name, labels=labels, person=person)
+        >>> right, wrong = [take("up", 1.0), take("out", -1.0)], [take("up", 0.6)]
+        >>> table = quality_table(right, wrong)
+        >>> table.columns[:3]
+        ('person', 'right', 'wrong')
     """
     wrongly = by_person(wrong)
     rows = []

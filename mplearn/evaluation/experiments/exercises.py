@@ -60,6 +60,17 @@ def exercise_table(
 
     Returns:
         A row for each take and rate, for each person with several takes, and the means over takes.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LabelledSegment, Recording
+        >>> t = np.arange(2000) / 50.0
+        >>> frames = np.stack((np.sin(4 * t) * (t < 20), np.sin(5 * t) * (t >= 20)), axis=1)
+        >>> labels = LabelledSegment(0, 1000, "arms"), LabelledSegment(1000, 2000, "legs")
+        >>> take = Recording(frames, 50.0, ("arm", "leg"), name="both", labels=labels)
+        >>> table = exercise_table([("", [take])], rates_hz=())
+        >>> table.columns[:4], len(table.rows)
+        (('take', 'rate', 'primitives', 'activities owned'), 2)
     """
     rows = []
     left_out: list[str] = []

@@ -31,6 +31,18 @@ def factorial_table(takes: Iterable[Recording], n_pairs: int = 5) -> Table:
 
     Returns:
         One row a kind of model, for people one by one and for all together.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LabelledSegment, Recording
+        >>> wave = 1 - np.cos(2 * np.pi * np.arange(400) / 100)  # four repetitions
+        >>> def take(name, size, person="anna"):
+        ...     labels = tuple(LabelledSegment(100 * k, 100 * k + 100, name) for k in range(4))
+        ...     frames = size * wave[:, None]
+        ...     return Recording(frames, 100.0, ("elbow",), name=name, labels=labels, person=person)
+        >>> table = factorial_table([take("up", 1.0), take("out", -1.0)], n_pairs=1)
+        >>> [row[0] for row in table.rows][:2]
+        ['people, one by one', 'people, one by one']
     """
     by_class: dict[str, dict[str, list[FloatArray]]]
     by_class = defaultdict(lambda: defaultdict(list))
@@ -86,7 +98,9 @@ def _rows(whose: str, groups: Sequence[Motions], n_pairs: int) -> list[tuple[str
                 asks = needs_more_chains(model_a, learned[a], model_b, learned[b])
                 right = float(np.mean(np.array(each) > 0))
                 mean = float(np.mean(each))
-                outcomes[kind].append((right, mean / float(np.std(each)), mean, asks))
+                spread = float(np.std(each))
+                apart = mean / spread if spread > 0 else np.inf
+                outcomes[kind].append((right, apart, mean, asks))
     sizes = {kind: size for kind, (size, _) in _kinds(np.ones(1)).items()}
     rows: list[tuple[str, ...]] = []
     for kind, values in outcomes.items():

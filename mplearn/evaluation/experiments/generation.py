@@ -57,6 +57,18 @@ def generation_table(takes: Iterable[Recording]) -> Table:
 
     Args:
         takes: Recordings of markers with labelled repetitions, of any number of people.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LabelledSegment, Recording
+        >>> wave = 1 - np.cos(2 * np.pi * np.arange(400) / 100)  # four repetitions
+        >>> def take(name, size, person="anna"):
+        ...     labels = tuple(LabelledSegment(100 * k, 100 * k + 100, name) for k in range(4))
+        ...     frames = size * wave[:, None]
+        ...     return Recording(frames, 100.0, ("elbow",), name=name, labels=labels, person=person)
+        >>> table = generation_table([take("up", 1.0), take("out", -1.0)])
+        >>> table.columns[:3]
+        ('style', 'RMSE', "mean |jerk| / human's")
     """
     found: dict[str, list[Quality]] = defaultdict(list)
     n_people = 0

@@ -89,6 +89,13 @@ def segmenter_table(takes: Iterable[Recording]) -> Table:
 
     Args:
         takes: Takes of people, labelled or not.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> take = demonstrate(["BAR", "BAL"] * 4, seed=1, rate_hz=50.0).recording
+        >>> table = segmenter_table([take])
+        >>> table.rows[0][0]
+        'ours'
     """
     motions, left_out = [], []
     for take in takes:

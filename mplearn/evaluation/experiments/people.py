@@ -51,6 +51,20 @@ def learn_together(
 
     Raises:
         RecordingError: There are fewer than two people.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LabelledSegment, Recording
+        >>> wave = 1 - np.cos(2 * np.pi * np.arange(400) / 100)  # four repetitions
+        >>> def take(name, size, person="anna"):
+        ...     labels = tuple(LabelledSegment(100 * k, 100 * k + 100, name) for k in range(4))
+        ...     frames = size * wave[:, None]
+        ...     return Recording(frames, 100.0, ("elbow",), name=name, labels=labels, person=person)
+        >>> takes = [take(f"up {who}", 1.0, who) for who in ("anna", "ben")]
+        >>> takes += [take(f"out {who}", -1.0, who) for who in ("anna", "ben")]
+        >>> outcome = next(learn_together(takes, interleaved=[False]))
+        >>> outcome.people, outcome.interleaved
+        (('ben', 'anna'), False)
     """
     people = by_person(takes)
     if len(people) < 2:
@@ -102,7 +116,22 @@ def _identified(labels: Sequence[LabelledSegment], changes: Sequence[PersonChang
 
 
 def people_table(outcomes: Sequence[PeopleOutcome]) -> Table:
-    """Return the outcomes of streams of several people, with their means."""
+    """Return the outcomes of streams of several people, with their means.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LabelledSegment, Recording
+        >>> wave = 1 - np.cos(2 * np.pi * np.arange(400) / 100)  # four repetitions
+        >>> def take(name, size, person="anna"):
+        ...     labels = tuple(LabelledSegment(100 * k, 100 * k + 100, name) for k in range(4))
+        ...     frames = size * wave[:, None]
+        ...     return Recording(frames, 100.0, ("elbow",), name=name, labels=labels, person=person)
+        >>> takes = [take(f"up {who}", 1.0, who) for who in ("anna", "ben")]
+        >>> takes += [take(f"out {who}", -1.0, who) for who in ("anna", "ben")]
+        >>> table = people_table(list(learn_together(takes, interleaved=[False])))
+        >>> table.columns[:2]
+        ('session', 'extracted')
+    """
     rows: list[tuple[str, ...]] = []
     for mixed in (False, True):
         name = "interleaved" if mixed else "block-wise"

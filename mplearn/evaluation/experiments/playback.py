@@ -69,6 +69,13 @@ def loop_table(takes: Iterable[Recording], passes: int = 3) -> Table:
     Args:
         takes: Takes, labelled or not.
         passes: How often each is played.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> take = demonstrate(["BAR", "BAL"] * 4, seed=1, rate_hz=50.0).recording
+        >>> table = loop_table([take], passes=2)
+        >>> table.columns[:3], len(table.rows)
+        (('take', 'pass', 'primitives'), 1)
     """
     rows, left_out = [], []
     for take in map(_first_pass, takes):
@@ -100,6 +107,13 @@ def glitch_table(takes: Iterable[Recording]) -> Table:
 
     Args:
         takes: Takes of markers, labelled or not.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> take = demonstrate(["BAR", "BAL"] * 4, seed=1, rate_hz=50.0).recording
+        >>> table = glitch_table([take])
+        >>> table.columns[:3], len(table.rows)
+        (('take', 'bad frame', 'recognised'), 6)
     """
     rows, left_out = [], []
     for take in map(_first_pass, takes):

@@ -101,14 +101,30 @@ def foretell_paper_sessions(seeds: Iterable[int]) -> Iterator[tuple[str, Foretol
 def foretell_sessions(
     sessions: Iterable[tuple[str, Recording]],
 ) -> Iterator[tuple[str, Foretold]]:
-    """Foretell sessions, each of which has a name and labels."""
+    """Foretell sessions, each of which has a name and labels.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> session = demonstrate(["BAR", "BAL"] * 4, seed=1, rate_hz=50.0).recording
+        >>> (name, foretold), = foretell_sessions([("anna", session)])
+        >>> name, foretold.perfect.shape[1]
+        ('anna, 8 motions', 3)
+    """
     for name, session in sessions:
         features = observe(session)
         yield f"{name}, {len(session.labels)} motions", foretell(features, session.labels)
 
 
 def prediction_table(title: str, outcomes: Iterable[tuple[str, Foretold]]) -> Table:
-    """Return a row a session, and their mean."""
+    """Return a row a session, and their mean.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> session = demonstrate(["BAR", "BAL"] * 4, seed=1, rate_hz=50.0).recording
+        >>> table = prediction_table("Two motions", foretell_sessions([("anna", session)]))
+        >>> [row[0] for row in table.rows]
+        ['anna, 8 motions']
+    """
     names, rows = [], []
     for name, each in outcomes:
         names.append(name)

@@ -183,6 +183,13 @@ def presentation_table(
         sessions: Name of a group of sessions (a person, say), and a session; several of a name are
             averaged.
         config: Rules of the tree; the defaults where not given.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> session = demonstrate(["BAR", "BAL"] * 4, seed=1, rate_hz=50.0).recording
+        >>> table = presentation_table([("anna", Seen.of(session))])
+        >>> table.columns[:2], len(table.rows)
+        (('sessions of', 'protocol'), 7)
     """
     config = config or TreeConfig()
     outcomes: dict[tuple[str, str], list[Presented]] = {}

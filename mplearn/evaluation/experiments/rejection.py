@@ -120,6 +120,13 @@ def rejection_table(
         rates: Stated rates; None for the rules' own radii.
         halves: Random halves of the motions of each session; the same ones for each rate.
         config: Rules of the tree; the defaults where not given.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> session = demonstrate(["BAR", "BAL", "SQD", "SQR"] * 3, seed=1, rate_hz=50.0).recording
+        >>> table = rejection_table([("anna", Seen.of(session))], rates=[0.1], halves=1)
+        >>> [row[0] for row in table.rows]
+        ['anna']
     """
     config = config or TreeConfig()
     outcomes: dict[tuple[str, float | None], list[Rejection]] = {}

@@ -72,6 +72,13 @@ def rhythm_table(takes: Iterable[Recording], rates_hz: Sequence[float] = RATES_H
 
     Returns:
         A row for steps, for each label, and for all, at each rate.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> take = demonstrate(["BAR", "BAL"] * 4, seed=1, rate_hz=50.0).recording
+        >>> table = rhythm_table([take], rates_hz=())
+        >>> table.columns[:3]
+        ('motion', 'rate', 'bouts')
     """
     scores: dict[tuple[str, str], list[CutScore]] = defaultdict(list)
     left_out: list[str] = []

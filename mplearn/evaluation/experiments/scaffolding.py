@@ -25,6 +25,13 @@ def scaffolding_table(sessions: Iterable[Recording]) -> Table:
 
     Returns:
         Boundary F1 in each quarter of the sessions, as learning proceeds.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> session = demonstrate(["BAR", "BAL"] * 4, seed=1, rate_hz=50.0).recording
+        >>> table = scaffolding_table([session])
+        >>> [row[0] for row in table.rows]
+        ['without', 'with']
     """
     scores: dict[str, list[list[BoundaryScore]]] = defaultdict(
         lambda: [[] for _ in range(QUARTERS)]

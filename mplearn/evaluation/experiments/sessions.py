@@ -30,7 +30,20 @@ def learn_paper_sessions(seeds: Sequence[int]) -> Iterator[tuple[str, Outcome]]:
 
 
 def learn_people(takes: Iterable[Recording], orders: int = ORDERS) -> Iterator[tuple[str, Outcome]]:
-    """Learn each person's takes, joined into sessions in several orders, by a new learner each."""
+    """Learn each person's takes, joined into sessions in several orders, by a new learner each.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LabelledSegment, Recording
+        >>> wave = 1 - np.cos(2 * np.pi * np.arange(400) / 100)  # four repetitions
+        >>> def take(name, size):
+        ...     labels = tuple(LabelledSegment(100 * k, 100 * k + 100, name) for k in range(4))
+        ...     frames = size * wave[:, None]
+        ...     return Recording(frames, 100.0, ("elbow",), name=name, labels=labels, person="anna")
+        >>> outcomes = learn_people([take("up", 1.0), take("out", -1.0)], orders=1)
+        >>> [(name, outcome.rates.n_classes) for name, outcome in outcomes]
+        [('anna, order 0', 4)]
+    """
     for person, own in by_person(takes).items():
         for order in range(orders):
             session = make_session(own, np.random.default_rng(order))
@@ -48,6 +61,18 @@ def observed_sessions(
         takes: Recordings with labelled repetitions, of any number of people.
         orders: Sessions a person.
         executions: How often each repetition comes in a session.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LabelledSegment, Recording
+        >>> wave = 1 - np.cos(2 * np.pi * np.arange(400) / 100)  # four repetitions
+        >>> def take(name, size):
+        ...     labels = tuple(LabelledSegment(100 * k, 100 * k + 100, name) for k in range(4))
+        ...     frames = size * wave[:, None]
+        ...     return Recording(frames, 100.0, ("elbow",), name=name, labels=labels, person="anna")
+        >>> sessions = list(observed_sessions([take("up", 1.0), take("out", -1.0)], orders=2))
+        >>> [name for name, session in sessions]
+        ['anna, order 0', 'anna, order 1']
     """
     for person, own in by_person(takes).items():
         for order in range(orders):

@@ -101,6 +101,20 @@ def shards_of_people(
 
     Raises:
         RecordingError: There are fewer than two people.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import LabelledSegment, Recording
+        >>> wave = 1 - np.cos(2 * np.pi * np.arange(400) / 100)  # four repetitions
+        >>> def take(name, size, person="anna"):
+        ...     labels = tuple(LabelledSegment(100 * k, 100 * k + 100, name) for k in range(4))
+        ...     frames = size * wave[:, None]
+        ...     return Recording(frames, 100.0, ("elbow",), name=name, labels=labels, person=person)
+        >>> takes = [take(f"up {who}", 1.0, who) for who in ("anna", "ben")]
+        >>> takes += [take(f"out {who}", -1.0, who) for who in ("anna", "ben")]
+        >>> learned, asked = shards_of_people(takes)
+        >>> len(learned), len(asked)
+        (2, 2)
     """
     people = by_person(takes)
     if len(people) < 2:
@@ -138,6 +152,14 @@ def shard_table(title: str, learned: Sequence[Recording], asked: Sequence[Record
         title: What they are.
         learned: A labelled session a shard.
         asked: Labelled sessions of the same people and motions.
+
+    Example:
+        >>> from mplearn.demonstrator import demonstrate
+        >>> def session(seed):
+        ...     return demonstrate(["BAR", "BAL"] * 4, seed=seed, rate_hz=50.0).recording
+        >>> table = shard_table("Two halves", [session(1), session(2)], [session(3)])
+        >>> [row[0] for row in table.rows]
+        ['one pass', 'shards, merged']
     """
     config = LearnerConfig(learned[0].channels, learned[0].rate_hz)
     whole = MotionLearner(config)

@@ -42,6 +42,18 @@ def content_table(takes: Sequence[Recording], seed: int = 0) -> Table:
 
     Returns:
         For each style, and for all, a row for contents as named and one for merged ones.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn import Recording
+        >>> lift = np.sin(np.linspace(0, np.pi, 80)) ** 2
+        >>> def take(name, size, n):
+        ...     frames = np.outer(size * lift, [1.0, 0.5])
+        ...     return Recording(frames, 50.0, ("x", "y"), name=f"dataset-2_{name}_active_{n:03}")
+        >>> shown = {"bow": 1.0, "wave-left-hand": -1.0}
+        >>> takes = [take(name, shown[name], n) for name in shown for n in range(1, 5)]
+        >>> [row[0] for row in content_table(takes).rows]
+        ['active', 'active']
     """
     told = [(take, content) for take in takes if (content := content_of(take.name))]
     styles = sorted({content.style for _, content in told})

@@ -18,6 +18,16 @@ class Goal(ABC):
 
     Attributes:
         tolerance: The gap at which it is reached.
+
+    Example:
+        >>> from mplearn_envs.data.library_source import LibrarySource
+        >>> from mplearn_envs.robot import humanoid
+        >>> from mplearn_envs.skills.repertoire import Repertoire
+        >>> from mplearn_envs.tasks.goals import PrimitiveGoals
+        >>> library = LibrarySource(None).now()  # the built-in one
+        >>> goal: Goal = PrimitiveGoals(Repertoire(library, humanoid())).given("squat down")
+        >>> goal.gap(library["squat down"].id, None) <= goal.tolerance
+        True
     """
 
     tolerance: float
@@ -41,6 +51,17 @@ class GoalKind(ABC):
 
     Attributes:
         repertoire: What the robot can perform.
+
+    Example:
+        >>> from mplearn_envs.data.library_source import LibrarySource
+        >>> from mplearn_envs.robot import humanoid
+        >>> from mplearn_envs.skills.repertoire import Repertoire
+        >>> from mplearn_envs.tasks.goals import HandGoals
+        >>> repertoire = Repertoire(LibrarySource(None).now(), humanoid())
+        >>> kind: GoalKind = HandGoals(repertoire, tolerance_m=0.05, far_m=0.15)
+        >>> low, high = kind.bounds()
+        >>> low.shape
+        (8,)
     """
 
     repertoire: Repertoire

@@ -59,6 +59,15 @@ class HandGoals(GoalKind):
     Attributes:
         tolerance_m: How near a hand must come [m].
         far_m: Drawn points are at least so far from where the hand is at the start [m].
+
+    Example:
+        >>> from mplearn_envs.data.library_source import LibrarySource
+        >>> from mplearn_envs.robot import humanoid
+        >>> from mplearn_envs.skills.repertoire import Repertoire
+        >>> repertoire = Repertoire(LibrarySource(None).now(), humanoid())
+        >>> goals = HandGoals(repertoire, tolerance_m=0.05, far_m=0.15)
+        >>> str(goals.given(("left", (0.3, 0.2, 1.0))))
+        'the left hand at [0.3, 0.2, 1.0]'
     """
 
     tolerance_m: float

@@ -56,6 +56,15 @@ class PostureGoals(GoalKind):
 
     Attributes:
         tolerance_rad: How near each coordinate must come [rad].
+
+    Example:
+        >>> from mplearn_envs.data.library_source import LibrarySource
+        >>> from mplearn_envs.robot import humanoid
+        >>> from mplearn_envs.skills.repertoire import Repertoire
+        >>> repertoire = Repertoire(LibrarySource(None).now(), humanoid())
+        >>> goals = PostureGoals(repertoire, tolerance_rad=0.2)
+        >>> str(goals.given({humanoid().channels[1]: 0.1}))
+        "the posture {'base_roll': 0.1}"
     """
 
     tolerance_rad: float

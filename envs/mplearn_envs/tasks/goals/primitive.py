@@ -49,7 +49,17 @@ class PrimitiveGoal(Goal):
 
 @dataclass(frozen=True)
 class PrimitiveGoals(GoalKind):
-    """Goals of primitives."""
+    """Goals of primitives.
+
+    Example:
+        >>> from mplearn_envs.data.library_source import LibrarySource
+        >>> from mplearn_envs.robot import humanoid
+        >>> from mplearn_envs.skills.repertoire import Repertoire
+        >>> repertoire = Repertoire(LibrarySource(None).now(), humanoid())
+        >>> goal = PrimitiveGoals(repertoire).given("squat down")
+        >>> str(goal)
+        "primitive 'squat down'"
+    """
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Return the bounds of what goals show, shape (C,) each."""
