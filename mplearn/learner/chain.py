@@ -154,6 +154,11 @@ class Chain:
         """Take note that what comes next does not follow what came."""
         self._broken = True
 
+    def goes_on_with(self, segment: Segment) -> bool:
+        """Return whether a segment begins where the latest motion ended."""
+        latest = self._segments[-1].segment.end if self._segments else -1
+        return not self._broken and latest == segment.start
+
     def foresee(self, k: int) -> tuple[NextMotion, ...]:
         """Return the ``k`` motions most likely to come next, see `foresee`."""
         return foresee(self.graph, self._segments, self.rate_hz, k, broken=self._broken)

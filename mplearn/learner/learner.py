@@ -639,7 +639,8 @@ class MotionLearner:
 
     def _place(self, segment: Segment, frames: FloatArray) -> list[Event]:
         """Learn from a segment in which something moves, as it is seen, shape (L, V)."""
-        placement = self.tree.insert(frames, self.person)
+        goes_on = self.chain.goes_on_with(segment)
+        placement = self.tree.insert(frames, self.person, goes_on=goes_on)
         events: list[Event] = [SegmentClosed(segment, placement)]
         if placement.recognised:
             events.append(Recognised(segment, placement.node_id, placement.distance))

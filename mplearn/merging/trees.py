@@ -198,6 +198,7 @@ def _with_one_root(
         frames=frames,
         matrix=np.zeros((len(members),) * 2),
         children=(*mine.children, *theirs.children),
+        settled=tuple(n for n in (*mine.settled, *theirs.settled) if n in members),
         n_placed=mine.n_placed + theirs.n_placed,
         n_frames=mine.n_frames + theirs.n_frames,
     )

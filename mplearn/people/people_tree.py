@@ -192,12 +192,13 @@ class PeopleTree:
 
     # ---- learning
 
-    def insert(self, frames: FloatArray, person: int = 0) -> Placement:
+    def insert(self, frames: FloatArray, person: int = 0, *, goes_on: bool = False) -> Placement:
         """Place a segment, shape (L, D), and let the trees grow.
 
         Args:
             frames: The segment.
             person: Who moves.
+            goes_on: Whether it begins in the frame in which the person's one before it ended.
 
         Returns:
             As `PrimitiveTree.insert`, of primitives; its distance is that to the nearest of the
@@ -213,7 +214,7 @@ class PeopleTree:
             self.sharing()
             self._trees[person] = self._new_tree()
             self._require_exemplars()
-        placement = self._trees[person].insert(frames)
+        placement = self._trees[person].insert(frames, goes_on=goes_on)
         if placement.refused:
             return placement
         self.n_seen += 1

@@ -103,6 +103,10 @@ class TreeConfig:
             or after both, is alike as well, are less likely alike by chance: where each is farther
             than the scale from the node that it fits best they become a node below this share of
             the scale; 0 for `pair_share` alone.
+        ignore_fragments: Whether nothing becomes a primitive that is an execution of a sure one
+            together with the segment right before or after it: a motion that is cut in two where
+            someone hesitated is not two motions. What only ever leads into a motion that lasts
+            three times as long, or longer, is no primitive then, either.
         confirmed: Members from which on a primitive is sure; with fewer it is provisional.
         patience: A provisional primitive that nothing has joined after so many further segments is
             forgotten; after four times as many as there are primitives, if that is more.
@@ -163,6 +167,7 @@ class TreeConfig:
     pair_share: float = newer(0.6, absent=1.0)
     pair_extent: float = newer(1.1, absent=math.inf)
     sequence_share: float = newer(0.8, absent=0.0)
+    ignore_fragments: bool = newer(True, absent=False)
     confirmed: int = newer(3, absent=1)
     patience: int = newer(64, absent=64)
     reach: float = 1.5
@@ -200,6 +205,7 @@ class TreeConfig:
             pair_share=1.0,
             pair_extent=math.inf,
             sequence_share=0.0,
+            ignore_fragments=False,
             confirmed=1,
             young_reach=0.0,
             least_reach=0.0,

@@ -20,6 +20,8 @@ from .nodes.search import IndexState, NodeIndex
 from .placement import Match
 from .rejection import Impostors, spreads
 
+_ROUNDING = 1e-9  # share of a radius; an impostor that lies on the threshold lies outside
+
 
 class Recognition(NamedTuple):
     """What a segment was recognised as.
@@ -142,7 +144,7 @@ class Recogniser:
         if false_acceptance is not None:
             units = spreads(index, self._bank)
             impostors = Impostors.of(index, self._bank, units)
-            index.caps = impostors.threshold(false_acceptance) * units
+            index.caps = impostors.threshold(false_acceptance) * units * (1 - _ROUNDING)
         return Recogniser(config, self._bank, index, self.shortest_frames)
 
     def recognise(self, frames: FloatArray) -> Recognition:

@@ -338,7 +338,6 @@ class _Reversal:
             node.stand_for(number, *self.stood_for[number])
         gone = node.thin(self.structure.config.max_exemplars, self.structure.length_of)
         self.memory.release(*gone)
-        node.settled.difference_update(gone)
 
     def _take_from_others(self, mine: set[int]) -> None:
         """Take exemplars from leaves, or the root, that they have come to since."""
@@ -348,9 +347,7 @@ class _Reversal:
             keeps = node.id == ROOT or len(places) < len(node.members)
             if node.id in self.leaves or node.frozen or not places or not keeps:
                 continue
-            gone = node.remove(places)
-            self.memory.release(*gone)
-            node.settled.difference_update(gone)
+            self.memory.release(*node.remove(places))
             self.structure.index.put(node, self.memory.bank)
 
     def _hang(self) -> None:

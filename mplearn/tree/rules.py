@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..recording import BoolArray, FloatArray, IntArray
+from .exemplars.normalisation import normalised
 from .exemplars.spread import moments
 from .nodes.clustering import clusters_below, gap, nearest_usual, separation, two_branches
 from .nodes.node import Node
@@ -20,6 +21,7 @@ from .nodes.structure import Structure
 from .placement import ROOT, Change, Match
 
 _FAR = 1e12  # farther than any two segments
+_PLAYED_BACK = 0.05  # over the scale: nobody hesitates again so exactly
 _UNKNOWN = 3.0  # leaves that the scale of all motion counts for beside that of those
 
 
@@ -34,7 +36,7 @@ def form_primitives(structure: Structure, node: Node, when: int) -> Change:
     config = structure.config
     change = Change()
     while True:
-        loose = [i for i, number in enumerate(node.members) if number not in node.settled]
+        loose = [i for i, n in enumerate(node.members) if node.id == ROOT or n not in node.settled]
         matrix = node.matrix[np.ix_(loose, loose)]
         limit = cutoff(structure, node)
         groups = _clusters(structure, [node.members[i] for i in loose], matrix, limit)
@@ -66,7 +68,7 @@ def _clusters(
     Executions of one motion are nearer to each other than they are to no motion at all. Two that
     are near each other say less than three that are: pairs count only where there is no larger
     cluster, and must be the nearer; less so where they came in a sequence that came twice, and are
-    nothing that is known.
+    nothing that is known. Fragments of what is known count only where they are played back.
 
     Args:
         structure: The tree.
@@ -77,7 +79,9 @@ def _clusters(
     config, least = structure.config, structure.least
     extents = np.minimum(structure.memory.bank.extents(members), _FAR)
     sizes = np.sqrt(np.multiply.outer(extents, extents))
-    alike = np.minimum(config.extent_share * sizes, limit)
+    fragments = np.array([number in structure.root.settled for number in members], bool)
+    exactly = np.where(fragments[:, None] | fragments, _PLAYED_BACK * limit, np.inf)
+    alike = np.minimum(np.minimum(config.extent_share * sizes, limit), exactly)
 
     def found(most: FloatArray, least: int) -> list[IntArray]:
         return clusters_below(matrix / np.clip(most, 1e-12, _FAR), 1.0, least)
@@ -86,8 +90,8 @@ def _clusters(
     if groups or least > 2:
         return groups
     nearer = config.pair_extent * sizes
-    most = np.minimum(nearer, config.pair_share * limit)
-    twice = np.minimum(nearer, config.sequence_share * limit)
+    most = np.minimum(np.minimum(nearer, config.pair_share * limit), exactly)
+    twice = np.minimum(np.minimum(nearer, config.sequence_share * limit), exactly)
     loose = (most < matrix) & (matrix <= twice)
     if loose.any():
         loose &= _came_in_sequence(structure, members, matrix <= alike)
@@ -125,6 +129,33 @@ def _is_new(structure: Structure, number: int, limit: float) -> bool:
     """Return whether a segment that waits is farther than a limit from what it fits best."""
     matches = structure.index.search(structure.memory.bank[number], structure.memory.bank)
     return not matches or matches[0].ratio * structure.index.radius(matches[0].node) > limit
+
+
+def settle_fragments(structure: Structure, number: int, longest: int) -> None:
+    """Let no primitive be made of what is only a part of a known one.
+
+    People hesitate: now and then a known motion is cut in two. What waits, and is an execution of a
+    sure primitive together with what came right before or after it, is a fragment of that.
+
+    Args:
+        structure: The tree.
+        number: The segment that came now; the one before it ended where it begins.
+        longest: Most frames of a motion.
+    """
+    root, memory, pair = structure.root, structure.memory, {number - 1, number}
+    if pair.isdisjoint(root.members) or not pair <= memory.frames.keys():
+        return
+    frames = np.concatenate([memory.frames[each] for each in sorted(pair)])
+    if len(frames) > longest:
+        return
+    bank, form = memory.bank, structure.config.normalisation
+    whole = bank.model(normalised(frames, form), len(frames))
+    best = next(iter(structure.index.search(whole, bank)), None)
+    if best is None or best.ratio > 1:
+        return
+    home = structure.nodes[best.node]
+    if home.is_leaf and home.n_placed >= structure.config.confirmed:
+        root.settled |= pair.intersection(root.members)
 
 
 def _leaf_of(structure: Structure, members: Sequence[int], limit: float) -> Node | None:

@@ -40,6 +40,7 @@ from .rules import (
     forget_chances,
     form_primitives,
     merge_duplicates,
+    settle_fragments,
     shed_outliers,
     split_mixed,
 )
@@ -290,7 +291,9 @@ class PrimitiveTree:
 
     def most_repeated(self) -> Repetition:
         """Return what comes nearest to a primitive among the segments that wait to become one."""
-        return most_repeated(self._structure.root.matrix, self._memory.scale())
+        root = self._structure.root
+        waits = [i for i, number in enumerate(root.members) if number not in root.settled]
+        return most_repeated(root.matrix[np.ix_(waits, waits)], self._memory.scale())
 
     def unplaced(self) -> dict[int, tuple[FloatArray, LeftRightHMM]]:
         """Return the segments that wait to become part of a primitive, and a model of each.
@@ -316,11 +319,15 @@ class PrimitiveTree:
 
     # ---- learning
 
-    def insert(self, frames: FloatArray) -> Placement:
+    def insert(self, frames: FloatArray, *, goes_on: bool = False) -> Placement:
         """Place a segment, shape (L, D), and let the tree grow.
 
         A segment that is too short or too long for a motion, or lacks a channel for most of the
         time, is refused: it changes nothing.
+
+        Args:
+            frames: The segment.
+            goes_on: Whether it begins in the frame in which the one before it ended.
 
         Raises:
             FrameError: The frames have another width, or hold infinite values.
@@ -338,6 +345,8 @@ class PrimitiveTree:
         node = self.node(matches[0].node if ratio <= 1 else ROOT)
         recognised = node.id != ROOT and node.is_leaf
         structure.add(node, number)
+        if goes_on and self.config.ignore_fragments:
+            settle_fragments(structure, number, longest)
         waiting = node.matrix[-1, :-1] if node.id == ROOT else np.zeros(0)
         self._memory.meet(np.concatenate([distances, waiting]))
         like = self._waiting_like(node)

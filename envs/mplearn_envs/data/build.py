@@ -29,7 +29,8 @@ def build_default() -> PrimitiveLibrary:
     script = markov_script(N_MOTIONS, np.random.default_rng(SEED), balance=BALANCE)
     demonstration = demonstrate(script, SEED)
     recording = demonstration.recording
-    rules = replace(TreeConfig(), sequence_share=0.0)  # version 0's, as is the next line
+    # The rules of version 0, here and in the next lines.
+    rules = replace(TreeConfig(), sequence_share=0.0, ignore_fragments=False)
     config = LearnerConfig(recording.channels, recording.rate_hz, scaffolding=False, tree=rules)
     learner = MotionLearner(config)
     votes: defaultdict[int, Counter[str]] = defaultdict(Counter)

@@ -89,7 +89,8 @@ def taught(people: Collection[int], n_motions: int = N_SHOWN) -> MotionLearner:
     learner: MotionLearner | None = None
     for person in people:
         recording = shown_by(person, n_motions).recording
-        rules = replace(TreeConfig(), sequence_share=0.0)  # version 1's, as is the next line
+        # The rules of version 1, here and in the next lines.
+        rules = replace(TreeConfig(), sequence_share=0.0, ignore_fragments=False)
         config = LearnerConfig(recording.channels, RATE_HZ, scaffolding=False, tree=rules)
         learner = learner or MotionLearner(config)
         for _ in learner.learn_recording(recording, at_once=len(recording.frames)):

@@ -85,7 +85,8 @@ class Node:
         n_placed: Segments ever placed in it.
         n_frames: Frames of those.
         children: Ids of the nodes below.
-        settled: Those of its exemplars that went to one of them.
+        settled: Those of its exemplars that went to one of them; in the root, that are fragments of
+            executions of one.
         history: Kind and time of what happened to it: ("born", n), ("split", n), ("merged", n),
             ("moved", n), ("undone", n).
         whole: Whether a person said that it is one motion: the rules never split it.
@@ -149,6 +150,7 @@ class Node:
         gone = [self.members[i] for i in positions]
         self.members = [m for i, m in enumerate(self.members) if i not in set(positions)]
         self.matrix = without(self.matrix, positions)
+        self.settled.difference_update(gone)
         for number in gone:
             self.stood_for.pop(number, None)
         return gone

@@ -210,9 +210,7 @@ class Structure:
         above.children.remove(node.id)
         places = [i for i, number in enumerate(above.members) if number in node.members]
         if above.id != ROOT:
-            gone = above.remove(places)
-            above.settled.difference_update(gone)
-            self.memory.release(*gone)
+            self.memory.release(*above.remove(places))
         node.parent = parent.id
         node.history.append(("moved", when))
         parent.children.append(node.id)
@@ -254,6 +252,4 @@ class Structure:
         return change.then(self._tidy(above, when))
 
     def _thin(self, node: Node) -> None:
-        gone = node.thin(self.config.max_exemplars, self.length_of)
-        node.settled.difference_update(gone)
-        self.memory.release(*gone)
+        self.memory.release(*node.thin(self.config.max_exemplars, self.length_of))

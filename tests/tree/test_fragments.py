@@ -1,0 +1,102 @@
+"""A known motion that is cut in two now and then is not two motions."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mplearn.merging import merge_trees
+from mplearn.recording import FloatArray
+from mplearn.tree import PrimitiveTree, TreeConfig
+
+D, RATE_HZ, T = 6, 50.0, 60
+TIME = np.sin(np.outer(np.linspace(0, np.pi, T), [1, 2, 3]))
+SHAPES = np.random.default_rng(3).normal(0, 1, (12, D, 3))
+KEPT = replace(TreeConfig(), ignore_fragments=False)
+
+
+def motion(kind: int, rng: np.random.Generator) -> FloatArray:
+    """A motion of a kind, shape (T, D)."""
+    return np.asarray(TIME @ (SHAPES[kind] + rng.normal(0, 0.05, (D, 3))).T)
+
+
+def taught(config: TreeConfig, rng: np.random.Generator) -> PrimitiveTree:
+    """A tree that was shown six kinds of motion six times."""
+    tree = PrimitiveTree(config, D, RATE_HZ)
+    for k in range(36):
+        tree.insert(motion(k % 6, rng))
+    assert len(tree.leaves) == 6
+    return tree
+
+
+def hesitate(tree: PrimitiveTree, kind: int, at: int, rng: np.random.Generator) -> tuple[int, int]:
+    """Show a motion cut in two; return the numbers of its parts."""
+    whole = motion(kind, rng)
+    return tree.insert(whole[:at]).number, tree.insert(whole[at:], goes_on=True).number
+
+
+def waiting(tree: PrimitiveTree) -> set[int]:
+    """What waits to become a primitive."""
+    return set(tree.unplaced())
+
+
+@pytest.mark.parametrize("at", [14, 24, 40])
+@pytest.mark.parametrize("kind", range(6))
+def test_parts_of_a_known_motion_become_no_primitive(kind: int, at: int) -> None:
+    rng = np.random.default_rng(kind)
+    tree, kept = taught(TreeConfig(), rng), taught(KEPT, np.random.default_rng(kind))
+    known = tree.leaves
+    for k in range(4):
+        hesitate(tree, kind, at, rng)
+        hesitate(kept, kind, at, np.random.default_rng((kind, k)))
+        tree.insert(motion((kind + k) % 6, rng))
+    assert tree.leaves == known
+    assert waiting(tree) == set()
+    assert len(kept.leaves) > len(known)  # what would have come of it
+
+
+def test_what_comes_alone_becomes_a_primitive_though_it_is_like_a_part() -> None:
+    rng = np.random.default_rng(0)
+    tree = taught(TreeConfig(), rng)
+    known = tree.leaves
+    parts = [hesitate(tree, 2, 24, rng) for _ in range(2)]
+    for _ in range(3):
+        tree.insert(motion(2, rng)[:24])
+        tree.insert(motion(0, rng))
+    assert len(tree.leaves) == len(known) + 1
+    (new,) = set(tree.leaves) - set(known)
+    assert parts[0][0] in tree.node(new).members  # by then it is known what they are
+
+
+def test_parts_that_do_not_go_on_are_motions() -> None:
+    rng = np.random.default_rng(0)
+    tree = taught(TreeConfig(), rng)
+    for _ in range(3):
+        whole = motion(4, rng)
+        tree.insert(whole[:24])
+        tree.insert(whole[24:])
+    assert len(tree.leaves) == 8
+
+
+def test_parts_that_are_played_back_exactly_are_motions() -> None:
+    rng = np.random.default_rng(0)
+    tree = taught(TreeConfig(), rng)
+    whole = motion(1, rng)
+    for _ in range(3):
+        tree.insert(whole[:24])
+        tree.insert(whole[24:] + rng.normal(0, 1e-4, whole[24:].shape), goes_on=True)
+    assert len(tree.leaves) == 8
+    assert not tree.node(0).settled
+
+
+def test_what_is_a_part_is_told_on_by_state_and_merging() -> None:
+    rng = np.random.default_rng(1)
+    tree, other = taught(TreeConfig(), rng), taught(TreeConfig(), rng)
+    for each in (tree, other):
+        hesitate(each, 3, 24, rng)
+        assert len(each.node(0).settled) == 2
+        assert waiting(each) == set()
+    again = PrimitiveTree(tree.config, D, RATE_HZ)
+    again.load_state(tree.state())
+    assert again.node(0).settled == tree.node(0).settled
+    assert waiting(merge_trees([tree, other]).tree) == set()
