@@ -12,6 +12,7 @@ from ...recording import FloatArray, IntArray
 from ...state import Array, Blob, SharedState, State, require
 from ..config import TreeConfig
 from .bank import ExemplarBank
+from .neighbours import COPY
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +171,7 @@ class DistanceSample:
     def _measured_scale(self, config: TreeConfig) -> float:
         n = len(self.numbers)
         matrix, mean = self._matrix[:n, :n], self.mean()
-        apart = np.where(matrix > 1e-6 * mean, matrix, np.inf)  # a copy says nothing of variation
+        apart = np.where(matrix > COPY * mean, matrix, np.inf)
         nearest = apart.min(axis=1, initial=np.inf)
         nearest = nearest[np.isfinite(nearest)]
         if not len(nearest):
