@@ -103,3 +103,19 @@ def test_a_frozen_leaf_or_one_that_a_person_made_sheds_nothing() -> None:
     assert set(tree.node(frozen).members) == seen
     kept = set(tree.node(first).members)
     assert tree.node(first).whole and (both <= kept or len(kept) == tree.config.max_exemplars)
+
+
+def test_near_copies_change_no_scale() -> None:
+    rng = np.random.default_rng(5)
+    t = np.linspace(0, 1, 40)[:, None]
+    kinds = rng.normal(0, 1, (8, 1, 4))
+    shown = [
+        np.sin(2 * np.pi * t * (1 + kinds[k % 8])) * (1 + rng.normal(0, 0.1, 4)) for k in range(24)
+    ]
+    tree = PrimitiveTree(TreeConfig(), 4, 50.0)
+    for frames in shown:
+        tree.insert(frames)
+    before = tree._memory.scale()
+    for frames in shown:  # played back, but for what a sensor adds
+        tree.insert(frames + rng.normal(0, 1e-4, frames.shape))
+    assert tree._memory.scale() == pytest.approx(before, rel=0.1)
