@@ -411,7 +411,9 @@ def merge_files(parts: Sequence[Path], to: Path, person: str) -> None:
         MPLearnError: One cannot be read, or the file cannot be written.
     """
     state = merged_state((_learner_of(part) for part in parts), [person] * len(parts))
-    replace(FILES, compression=0).write(to, to_plain(state))  # it is read once, and goes
+    replace(FILES, compression=0).write(
+        to, to_plain(state, whole=True)
+    )  # it is read once, and goes
 
 
 def _learner_of(path: Path) -> MotionLearner:

@@ -450,7 +450,7 @@ class MotionLearner:
         Raises:
             StateError: The file cannot be written.
         """
-        FILES.write(Path(path), to_plain(self.state()))
+        FILES.write(Path(path), to_plain(self.state(), whole=True))
         return Path(path)
 
     @classmethod
@@ -466,7 +466,7 @@ class MotionLearner:
         """
         content = FILES.read(Path(path))
         with within(str(path)):
-            return cls.from_state(from_plain(LearnerState, content), lazily=lazily)
+            return cls.from_state(from_plain(LearnerState, content, whole=True), lazily=lazily)
 
     # ---- being merged, see `mplearn.merging`
 

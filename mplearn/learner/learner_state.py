@@ -11,7 +11,7 @@ from ..errors import StateError
 from ..graph import GraphState
 from ..people import PeopleState
 from ..segmentation import SegmenterState
-from ..state import Count, FileFormat, Range, State, require
+from ..state import Count, FileFormat, Range, State, from_plain, require, to_plain
 from .absurd import AbsurdState
 from .buffer import BufferState
 from .chain import ChainState
@@ -121,6 +121,16 @@ def _one_watch(content: dict[str, Any]) -> dict[str, Any]:
     return content
 
 
+def _whole(content: Any) -> Any:
+    """Bring the content of a file up to date that left out what had its usual value."""
+    return to_plain(from_plain(LearnerState, content), whole=True)
+
+
 FILES = FileFormat(
-    "mplearn-learner", "learner", StateError, 2, migrations={1: _one_watch}, compression=1
+    "mplearn-learner",
+    "learner",
+    StateError,
+    3,
+    migrations={1: _one_watch, 2: _whole},
+    compression=1,
 )

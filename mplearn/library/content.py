@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 from ..errors import LibraryError
 from ..graph import GraphState
-from ..state import FileFormat, Range, State, require, require_no_cycle
+from ..state import (
+    FileFormat,
+    Range,
+    State,
+    from_plain,
+    newer,
+    require,
+    require_no_cycle,
+    to_plain,
+)
 from ..tree.recogniser import RecogniserState
 from .primitive import Primitive, TreeNode
-
-FILES = FileFormat("mplearn-library", "library", LibraryError)
 
 
 @dataclass(frozen=True, eq=False)
 class LibraryState(State):
-    """All that a library holds; attributes are those of `PrimitiveLibrary`."""
+    """All that a library holds; attributes are those of `PrimitiveLibrary`.
+
+    Attributes:
+        version: Of the library that it was; empty where nobody said.
+    """
 
     primitives: tuple[Primitive, ...]
     graph: GraphState
@@ -25,6 +36,7 @@ class LibraryState(State):
     body: str
     tree: tuple[TreeNode, ...]
     recogniser: RecogniserState | None
+    version: str = newer("", absent="")
 
     def check(self) -> None:
         """Check that the nodes make one tree, in which each primitive has its place."""
@@ -56,3 +68,11 @@ class LibraryState(State):
             require(ids.issuperset(leaves), "recogniser.index.ids", "must be primitives")
             above = parents.keys() >= set(index.parents.tolist())
             require(above, "recogniser.index.parents", "must be nodes of the tree")
+
+
+def _whole(content: Any) -> Any:
+    """Bring the content of a file up to date that left out what had its usual value."""
+    return to_plain(from_plain(LibraryState, content), whole=True)
+
+
+FILES = FileFormat("mplearn-library", "library", LibraryError, 2, migrations={1: _whole})

@@ -25,7 +25,7 @@ from ..graph import (
 )
 from ..offers import ask
 from ..recording import FloatArray, Recording
-from ..state import from_plain, to_plain, within
+from ..state import from_plain, require, to_plain, within
 from ..tree.recogniser import Recogniser, Recognition
 from .content import FILES, LibraryState
 from .novelty import AnomalyScore, MotionNovelty, novelty_of
@@ -158,7 +158,7 @@ class PrimitiveLibrary:
     @cached_property
     def version(self) -> str:
         """Hash of all that the library holds, names included: 16 hexadecimal digits."""
-        return FILES.digest(to_plain(self.state()))[:16]
+        return FILES.digest(to_plain(self._content()))[:16]
 
     # ---- what it knows
 
@@ -357,7 +357,7 @@ class PrimitiveLibrary:
         Raises:
             LibraryError: The file cannot be written.
         """
-        FILES.write(Path(path), to_plain(self.state()))
+        FILES.write(Path(path), to_plain(self.state(), whole=True))
         return Path(path)
 
     @classmethod
@@ -375,11 +375,47 @@ class PrimitiveLibrary:
             return library
         content = FILES.read(Path(path))
         try:
-            return cls.from_state(from_plain(LibraryState, content))
+            return cls.from_state(from_plain(LibraryState, content, whole=True))
         except StateError as error:
             raise LibraryError(f"{path} does not describe a library: {error}") from error
 
     def state(self) -> LibraryState:
+        """Return all that the library holds, and its version."""
+        return replace(self._content(), version=self.version)
+
+    @classmethod
+    def from_state(cls, state: LibraryState) -> PrimitiveLibrary:
+        """Return the library that `state` described.
+
+        Raises:
+            StateError: Its parts do not fit each other, or are not those that its version says.
+        """
+        with within("graph"):
+            graph = TransitionGraph.from_state(state.graph)
+        with within("recogniser"):
+            known = state.recogniser
+            recogniser = None if known is None else Recogniser.from_state(known)
+        with within("primitives"):
+            library = cls(
+                primitives=state.primitives,
+                graph=graph,
+                channels=state.channels,
+                rate_hz=state.rate_hz,
+                body=state.body,
+                tree=state.tree,
+                recogniser=recogniser,
+            )
+        if state.version:
+            problem = (
+                f"must be {library.version}, the hash of the rest, not {state.version!r:.60}: "
+                "something was lost or changed"
+            )
+            require(state.version == library.version, "version", problem)
+        return library
+
+    # ---- inside
+
+    def _content(self) -> LibraryState:
         """Return all that the library holds."""
         return LibraryState(
             primitives=self.primitives,
@@ -390,31 +426,6 @@ class PrimitiveLibrary:
             tree=self.tree,
             recogniser=None if self.recogniser is None else self.recogniser.state(),
         )
-
-    @classmethod
-    def from_state(cls, state: LibraryState) -> PrimitiveLibrary:
-        """Return the library that `state` described.
-
-        Raises:
-            StateError: Its parts do not fit each other.
-        """
-        with within("graph"):
-            graph = TransitionGraph.from_state(state.graph)
-        with within("recogniser"):
-            known = state.recogniser
-            recogniser = None if known is None else Recogniser.from_state(known)
-        with within("primitives"):
-            return cls(
-                primitives=state.primitives,
-                graph=graph,
-                channels=state.channels,
-                rate_hz=state.rate_hz,
-                body=state.body,
-                tree=state.tree,
-                recogniser=recogniser,
-            )
-
-    # ---- inside
 
     @cached_property
     def _by_key(self) -> dict[Key, Primitive]:

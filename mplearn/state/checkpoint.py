@@ -20,6 +20,7 @@ from .structure import from_plain
 
 T = TypeVar("T")
 _KEY = "$key"
+_WHOLE = "$whole"  # what a document names that, with its parts, leaves out no field
 
 
 class Checkpoint(NamedTuple):
@@ -74,7 +75,7 @@ def checkpoint(state: Any, known: Container[str] = ()) -> Checkpoint:
                 new[key] = data or _packed(part)[2]
         return {_KEY: key}
 
-    document = to_bytes(to_plain(state, note))
+    document = to_bytes({_WHOLE: to_plain(state, note, whole=True)})
     return Checkpoint(document, tuple(found), new)
 
 
@@ -100,11 +101,11 @@ def resumed(kind: type[T], document: bytes, part: Callable[[str], bytes]) -> T:
 
     def plain(value: Any) -> Any:
         if isinstance(value, list):
-            return [plain(item) for item in value]
+            return [at(f"[{i}]", item) for i, item in enumerate(value)]
         if not isinstance(value, dict):
             return value
         if _KEY not in value:
-            return {name: plain(item) for name, item in value.items()}
+            return {name: at(name, item) for name, item in value.items()}
         key = value[_KEY]
         if not isinstance(key, str):
             raise StateError(f"a part must be named by its key, not {key!r:.60}")
@@ -116,8 +117,18 @@ def resumed(kind: type[T], document: bytes, part: Callable[[str], bytes]) -> T:
             seen[key] = Blob(content) if isinstance(content, np.ndarray) else content
         return seen[key]
 
+    def at(place: str, value: Any) -> Any:
+        if not isinstance(value, (dict, list)):
+            return value
+        try:
+            return plain(value)
+        except StateError as error:
+            raise error.below(place) from None
+
     try:
-        return from_plain(kind, plain(from_bytes(document)))
+        content = from_bytes(document)
+        whole = isinstance(content, dict) and content.keys() == {_WHOLE}
+        return from_plain(kind, plain(content[_WHOLE] if whole else content), whole=whole)
     except RecursionError as error:
         raise StateError("its parts are nested too deep") from error
 
@@ -148,7 +159,7 @@ def _packed(part: Part) -> tuple[str, tuple[Part, ...], bytes]:
         inner.append(each)
         return {_KEY: key_of(each)}
 
-    data = to_bytes(part.array if isinstance(part, Blob) else fields_of(part, note))
+    data = to_bytes(part.array if isinstance(part, Blob) else fields_of(part, note, whole=True))
     key = hash_of(data)
     object.__setattr__(part, "content", (key, tuple(inner)))
     return key, tuple(inner), data

@@ -102,7 +102,7 @@ class Blob:
 Share: TypeAlias = Callable[[Blob | SharedState], Any]
 
 
-def to_plain(value: Any, share: Share | None = None) -> Any:
+def to_plain(value: Any, share: Share | None = None, *, whole: bool = False) -> Any:
     """Return dataclasses as dictionaries, tuples and sets as lists, blobs as arrays.
 
     Arrays are not copied.
@@ -110,6 +110,9 @@ def to_plain(value: Any, share: Share | None = None) -> Any:
     Args:
         value: A state, a configuration, or anything they hold.
         share: Says what stands for a part that is kept by its content; the part itself by default.
+        whole: With all fields, as what is stored has them: one that is lost is then missed. Else a
+            `newer` one is left out where it has the value that its absence means, so that equal
+            content of any version has one hash.
 
     Example:
         >>> from mplearn.tree import TreeConfig
@@ -123,21 +126,18 @@ def to_plain(value: Any, share: Share | None = None) -> Any:
     if isinstance(value, Blob):
         return value.array
     if isinstance(value, (tuple, list)):
-        return [to_plain(item, share) for item in value]
+        return [to_plain(item, share, whole=whole) for item in value]
     if isinstance(value, dict):
-        return {key: to_plain(item, share) for key, item in value.items()}
+        return {key: to_plain(value[key], share, whole=whole) for key in sorted(value)}
     if isinstance(value, (set, frozenset)):
         return sorted(value)
     if is_dataclass(value):
-        return fields_of(value, share)
+        return fields_of(value, share, whole=whole)
     return value.item() if isinstance(value, np.generic) else value
 
 
-def fields_of(value: Any, share: Share | None = None) -> dict[str, Any]:
-    """Return the fields of a dataclass as plain values by name.
-
-    A `newer` field is left out where it has the value that its absence means, so that what an older
-    version wrote is written again as it was.
+def fields_of(value: Any, share: Share | None = None, *, whole: bool = False) -> dict[str, Any]:
+    """Return the fields of a dataclass as plain values by name, see `to_plain`.
 
     Example:
         >>> from mplearn.segmentation import TurnConfig
@@ -146,9 +146,9 @@ def fields_of(value: Any, share: Share | None = None) -> dict[str, Any]:
     """
     names, absent = _names(cast(Any, type(value)))
     return {
-        saved: to_plain(getattr(value, name), share)
+        saved: to_plain(getattr(value, name), share, whole=whole)
         for name, saved in names.items()
-        if name not in absent or getattr(value, name) != absent[name]
+        if whole or name not in absent or getattr(value, name) != absent[name]
     }
 
 

@@ -105,8 +105,8 @@ def newer(default: T, *, absent: T) -> T:
 
     Args:
         default: What it is in a new configuration.
-        absent: What a file means that does not name it: how things were before. It is written only
-            where it is something else, so that an old file's content stays the same to the bit.
+        absent: What an older file means that does not name it: how things were before. Where it is
+            that, it is left out of what is hashed, so that an old file's content keeps its hash.
 
     Example:
         >>> from dataclasses import dataclass

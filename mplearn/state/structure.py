@@ -13,6 +13,7 @@ from typing import (
     Annotated,
     Any,
     Literal,
+    NamedTuple,
     TypeAlias,
     TypeVar,
     Union,
@@ -39,20 +40,35 @@ from .fields import (
 )
 
 T = TypeVar("T")
-Scope: TypeAlias = dict[str, int]  # lengths of the axes that have names, in one state
+
+
+class Scope(NamedTuple):
+    """What the reader of a field knows of the state that it is in.
+
+    Attributes:
+        whole: Whether each field must be there.
+        lengths: Of the axes that have names.
+    """
+
+    whole: bool
+    lengths: dict[str, int]
+
+
 Reader: TypeAlias = Callable[[Any, Scope], Any]
 
 _LONGEST_TEXT = 100_000
 
 
-def from_plain(kind: type[T], value: Any) -> T:
+def from_plain(kind: type[T], value: Any, *, whole: bool = False) -> T:
     """Return the typed state, or configuration, that plain values describe.
 
-    A field that is missing takes its default, if it has one; one that is not known is refused.
+    A field that is not known is refused.
 
     Args:
         kind: A dataclass.
         value: What `to_plain` returned, or an instance of ``kind``, which is checked all the same.
+        whole: Whether each field must be there, as where `to_plain` wrote it whole. Else one that
+            is missing takes its default, if it has one: what is read may be older than the field.
 
     Raises:
         StateError: They describe none; its place says where.
@@ -67,7 +83,7 @@ def from_plain(kind: type[T], value: Any) -> T:
         Traceback (most recent call last):
         mplearn.errors.StateError: ...speed...
     """
-    return cast(T, _reader(cast(Any, kind))(value, {}))
+    return cast(T, _reader(cast(Any, kind))(value, Scope(whole, {})))
 
 
 def validated(state: T) -> T:
@@ -317,7 +333,7 @@ def _array_check(dtype: np.dtype[Any], marker: Array) -> Callable[[Any, Scope | 
         if not isinstance(value, np.ndarray) or value.dtype != dtype:
             raise StateError(f"must be an array of {dtype}, not {shown(value)}")
         if scope is not None:
-            _check_shape(value.shape, marker.shape, scope)
+            _check_shape(value.shape, marker.shape, scope.lengths)
         if not (bounded and value.size):
             return
         if marker.nan:
@@ -341,16 +357,16 @@ def _array_check(dtype: np.dtype[Any], marker: Array) -> Callable[[Any, Scope | 
 
 
 def _check_shape(
-    shape: tuple[int, ...], wanted: tuple[int | str | None, ...], scope: Scope
+    shape: tuple[int, ...], wanted: tuple[int | str | None, ...], lengths: dict[str, int]
 ) -> None:
     fits = len(shape) == len(wanted)
     for length, name in zip(shape, wanted, strict=False):
         if isinstance(name, str):
-            fits = fits and scope.setdefault(name, length) == length
+            fits = fits and lengths.setdefault(name, length) == length
         else:
             fits = fits and name in (None, length)
     if not fits:
-        named = [str(scope.get(str(name), name)) if name is not None else "*" for name in wanted]
+        named = [str(lengths.get(str(name), name)) if name is not None else "*" for name in wanted]
         raise StateError(f"must have shape ({', '.join(named)}), not {shape}")
 
 
@@ -369,7 +385,7 @@ def _dataclass(kind: type) -> Reader:
                 known.append((each.name, _reader(hints[each.name]), optional))
         return known
 
-    def read(value: Any, _: Scope) -> Any:
+    def read(value: Any, above: Scope) -> Any:
         typed = isinstance(value, kind)
         if typed and vars(value).get("_checked"):
             return value
@@ -386,11 +402,11 @@ def _dataclass(kind: type) -> Reader:
         strange = [key for key in given if key not in names]
         if strange:
             raise StateError(f"has no field {strange[0]!r:.60}; known are {sorted(names)}")
-        scope: Scope = {}
-        found = {} if typed else absent_fields(kind)
+        scope = Scope(above.whole, {})
+        found = {} if typed or above.whole else absent_fields(kind)
         for name, one, optional in readers():
             if name not in given:
-                if optional:
+                if optional and not above.whole:
                     continue
                 raise StateError("is missing", name)
             try:

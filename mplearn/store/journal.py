@@ -25,6 +25,7 @@ UNDOABLE = 100  # commands, the latest, that can be undone
 ENTRIES = 1_000  # commands that are kept
 HAPPENINGS = 10_000  # of all primitives
 _BLOCK = 64  # that are kept together
+_FULL = HAPPENINGS // _BLOCK  # of such blocks
 
 What: TypeAlias = Literal["born", "confirmed", "forgotten", "merged", "split", "command"]
 
@@ -131,9 +132,19 @@ class JournalState(State):
     next_number: Count = 1
 
     def check(self) -> None:
-        """Check that the numbers rise."""
+        """Check that what is kept are the latest ones, each once and none left out."""
         numbers = [*(each.number for each in self.entries), self.next_number]
-        require(all(a < b for a, b in pairwise(numbers)), "entries", "must have numbers that rise")
+        in_turn = all(b == a + 1 for a, b in pairwise(numbers))
+        require(in_turn, "entries", f"must be numbered in turn, up to {self.next_number - 1}")
+        wanted = min(self.next_number - 1, ENTRIES)
+        n_entries = len(self.entries)
+        require(n_entries == wanted, "entries", f"must be {wanted}, not {n_entries}")
+        sizes = [len(each.happenings) for each in self.happenings]
+        fits = all(size == _BLOCK for size in sizes[:-1]) and max(sizes, default=0) <= _BLOCK
+        full, rest = divmod(self.n_happenings, _BLOCK)
+        wanted = min(full, _FULL) * _BLOCK + rest
+        fits &= sum(sizes) == wanted
+        require(fits, "happenings", f"must be {wanted} in blocks of {_BLOCK}, not in {sizes}")
 
 
 @dataclass
@@ -246,7 +257,7 @@ class Journal:
             if len(self._open) == _BLOCK:
                 self._full.append(HappeningsState(tuple(self._open)))
                 self._open = []
-        del self._full[: -(HAPPENINGS // _BLOCK)]
+        del self._full[:-_FULL]
 
     def history(self, primitive: int) -> tuple[Happening, ...]:
         """Return what happened to a primitive, the oldest first."""

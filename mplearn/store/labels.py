@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from ..errors import InvalidValueError
 from ..library import Primitive
-from ..state import Count, State
+from ..state import Count, SharedState
 
 _DEFAULT = re.compile(r"P\d+")
 _SPARE = 1000  # names of primitives that are gone, for when they come back
@@ -28,7 +28,7 @@ class NoteText:
 
 
 @dataclass(frozen=True, eq=False)
-class LabelsState(State):
+class LabelsState(SharedState):
     """Names by id, and notes by the number of the command."""
 
     names: tuple[tuple[Count, str], ...] = ()
@@ -47,6 +47,7 @@ class Labels:
         state = state or LabelsState()
         self.names: dict[int, str] = dict(state.names)
         self.notes: dict[int, NoteText] = dict(state.notes)
+        self._state = state
 
     def rename(self, id: int, name: str, known: Collection[int]) -> None:
         """Give a primitive a name.
@@ -90,8 +91,11 @@ class Labels:
             del self.names[id]
 
     def state(self) -> LabelsState:
-        """Return everything."""
-        return LabelsState(tuple(self.names.items()), tuple(self.notes.items()))
+        """Return everything: the same object as long as nothing has changed."""
+        names, notes = tuple(self.names.items()), tuple(self.notes.items())
+        if (names, notes) != (self._state.names, self._state.notes):
+            self._state = LabelsState(names, notes)
+        return self._state
 
 
 def named(primitive: Primitive, name: str) -> Primitive:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..learner import LearnerState
-from ..state import Count, SharedState, State
+from ..state import Count, SharedState, State, require
 from .journal import JournalState
 from .labels import LabelsState
 
@@ -42,3 +42,14 @@ class LifeState(State):
     chunk_frame: Count
     chunk_when: float
     revision: Count
+
+    def check(self) -> None:
+        """Check that what people said is about what there was."""
+        free_id, next_number = self.learner.tree.free_id, self.journal.next_number
+        for k, (id, _) in enumerate(self.labels.names):
+            require(id < free_id, f"labels.names[{k}]", f"must be about an id below {free_id}")
+        for k, (number, note) in enumerate(self.labels.notes):
+            place = f"labels.notes[{k}]"
+            require(number < next_number, place, f"must be of a command before {next_number}")
+            about = note.primitive is None or note.primitive < free_id
+            require(about, place, f"must be about an id below {free_id}")

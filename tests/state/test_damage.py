@@ -1,7 +1,7 @@
 """A damaged state is refused with the place of the damage, or is the same all the same.
 
-``python tests/state/test_damage.py 1500`` tries so many damages of each kind of learner, and says
-what became of them.
+``python tests/state/test_damage.py 1500 7`` tries so many damages of learners, libraries and lives,
+drawn with seed 7, and says what became of them.
 """
 
 import sys
@@ -20,7 +20,9 @@ from mplearn.evaluation.observing import observe
 from mplearn.evaluation.streams import join_people
 from mplearn.learner import LearnerState
 from mplearn.library.content import FILES, LibraryState
-from mplearn.state import from_plain, to_plain
+from mplearn.state import checkpoint, from_bytes, from_plain, resumed, to_bytes, to_plain
+from mplearn.store import Freeze, LifelongLearner, Merge, Note, Rename
+from mplearn.store.life_state import LifeState
 
 
 def one_person() -> MotionLearner:
@@ -40,6 +42,22 @@ def two_people() -> MotionLearner:
     learner = MotionLearner(LearnerConfig(stream.channels, stream.rate_hz))
     learner.learn_many(stream.frames[: int(0.93 * len(stream.frames))])
     return learner
+
+
+def a_life() -> LifelongLearner:
+    """A lifelong learner that did what people asked, and took one of it back."""
+    life = LifelongLearner(one_person())
+    first, second, third = life.learner.tree.leaves[:3]
+    for command in (
+        Rename(first, "bow"),
+        Note("slow", second),
+        Merge(second, third),
+        Freeze(first),
+    ):
+        life.execute(command)
+    life.undo()
+    life.undo()
+    return life
 
 
 def tried(plain, load, save, n, seed):
@@ -66,9 +84,37 @@ def tried(plain, load, save, n, seed):
 
 def tried_learner(learner, n, seed=0):
     return tried(
-        to_plain(learner.state()),
-        lambda plain: MotionLearner.from_state(from_plain(LearnerState, plain)),
-        lambda found: to_plain(found.state()),
+        to_plain(learner.state(), whole=True),
+        lambda plain: MotionLearner.from_state(from_plain(LearnerState, plain, whole=True)),
+        lambda found: to_plain(found.state(), whole=True),
+        n,
+        seed,
+    )
+
+
+def tried_checkpoint(life, n, seed=0):
+    part = checkpoint(life.state()).new.__getitem__
+    mark, plain = document_of(life.state())
+    return tried(
+        plain,
+        lambda wrong: LifelongLearner.from_state(resumed(LifeState, to_bytes({mark: wrong}), part)),
+        lambda found: document_of(found.state())[1],
+        n,
+        seed,
+    )
+
+
+def document_of(state):
+    """Return what says that a checkpoint's document is whole, and what it holds."""
+    ((mark, content),) = from_bytes(checkpoint(state).document).items()
+    return mark, content
+
+
+def tried_library(library, n, seed=0):
+    return tried(
+        to_content(library),
+        lambda wrong: PrimitiveLibrary.from_state(from_plain(LibraryState, wrong, whole=True)),
+        to_content,
         n,
         seed,
     )
@@ -83,6 +129,24 @@ def test_a_damaged_learner_is_refused_or_the_same(learner):
     counts, silent = tried_learner(learner, 400)
     assert not silent
     assert counts["refused"] > 360
+
+
+def test_a_damaged_checkpoint_is_refused_or_the_same(life):
+    counts, silent = tried_checkpoint(life, 300)
+    assert not silent
+    assert counts["refused"] > 260
+
+
+def test_an_older_document_may_leave_out_what_is_newer(life):
+    state = life.state()
+    part = checkpoint(state).new.__getitem__
+    mark, content = document_of(state)
+    del content["learner"]["config"]["scaffolding"]
+    with pytest.raises(StateError, match=r"learner\.config\.scaffolding: is missing"):
+        resumed(LifeState, to_bytes({mark: content}), part)
+    older = resumed(LifeState, to_bytes(content), part)
+    config = replace(state.learner.config, scaffolding=False)
+    assert older == replace(state, learner=replace(state.learner, config=config))
 
 
 def test_what_a_learner_holds_is_refused_where_it_is_damaged(learner):
@@ -115,30 +179,23 @@ def test_a_learner_goes_on_from_a_file_bit_for_bit(learner, tmp_path):
 
 
 @pytest.fixture(scope="module")
+def life():
+    return a_life()
+
+
+@pytest.fixture(scope="module")
 def library():
     return two_people().snapshot()
 
 
 def test_a_damaged_library_is_refused_or_the_same(library):
-    plain = to_content(library)
-    counts, silent = tried(
-        plain,
-        lambda wrong: PrimitiveLibrary.from_state(from_plain(LibraryState, wrong)),
-        to_content,
-        400,
-        0,
-    )
-    legal = {  # nothing else says that it is wrong
-        "recogniser.bank.columns": "nan",  # a value that was not measured
-        "recogniser": "none",  # a library that only acts
-    }
-    wrong = [what for what in silent if legal.get(what.place) != what.kind]
-    assert not [what for what in wrong if not what.place.startswith("tree[")]
+    counts, silent = tried_library(library, 400)
+    assert not silent
     assert counts["refused"] > 360
 
 
 def to_content(library):
-    return to_plain(library.state())
+    return to_plain(library.state(), whole=True)
 
 
 def changed(library, **changes):
@@ -174,7 +231,11 @@ def test_what_used_to_get_past_the_reader(library, tmp_path, place, change):
 
 
 if __name__ == "__main__":
-    n = int(sys.argv[1])
-    for make in (one_person, two_people):
-        found, taken = tried_learner(make(), n, seed=1)
-        print(f"{make.__name__}: {dict(found)} {taken}")
+    n, seed = int(sys.argv[1]), int(sys.argv[2])
+    for name, (found, taken) in {
+        "one person": tried_learner(one_person(), n, seed),
+        "two people": tried_learner(two_people(), n, seed),
+        "library": tried_library(two_people().snapshot(), n, seed),
+        "checkpoint": tried_checkpoint(a_life(), n, seed),
+    }.items():
+        print(f"{name}: {dict(found)} {taken}")

@@ -57,7 +57,7 @@ class Sender:
             float(library.rate_hz),
             library.body,
         )
-        return packed(to_plain(delivery))
+        return packed(to_plain(delivery, whole=True))
 
 
 class Receiver:
@@ -72,7 +72,7 @@ class Receiver:
         Raises:
             LibraryError: Something was sent before that this receiver has not got.
         """
-        delivery = from_plain(Delivery, unpacked(content, blob))
+        delivery = from_plain(Delivery, unpacked(content, blob), whole=True)
         known = self._known | {p.id: p for p in delivery.changed}
         missing = [id for id in delivery.ids if id not in known]
         if missing:

@@ -52,11 +52,12 @@ class IndexState(State):
     caps: Annotated[FloatArray, Array("n", low=0.0, high=np.inf)] | None = None
 
     def check(self) -> None:
-        """Check that ids rise, that each node has exemplars, and that none lies below itself."""
+        """Check that ids rise, that each node has exemplars once, and none lies below itself."""
         require(bool((np.diff(self.ids) > 0).all()), "ids", "must rise")
         require(len(self.members) == len(self.ids), "members", f"must be {len(self.ids)} lists")
         for k, group in enumerate(self.members):
-            require(bool(group), f"members[{k}]", "must hold a number")
+            once = len(set(group)) == len(group) > 0
+            require(once, f"members[{k}]", "must hold a number, and each once")
         parents = dict(zip(self.ids.tolist(), self.parents.tolist(), strict=True))
         require_no_cycle(parents, lambda id: f"parents[{list(parents).index(id)}]")
 
