@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ...recording import FloatArray, Recording, marker_channels
+from ...recording import FloatArray, Recording
 from ..clock import Clock, even_clock
 from ..files import bad_file, cmu_subject, stem
 from ..findings import Findings
 from ..numbers import measured_rows, not_seen
 from ..options import option
-from ..placing.space import Space, placed
+from ..placing.placed_markers import placed_markers
+from ..placing.space import Space
 from ..rates import rate_beside
 from ..reader import Hints
 from .names import chosen_names
@@ -107,15 +108,8 @@ def read_block(
     flat = points[:, kept].reshape(len(points), -1)
     points = clock.even(flat).reshape(-1, len(kept), 3)
     rate_hz = hints.rate_hz or _rate(path, said_hz, clock, findings)
-    at = placed(path, points, names, rate_hz, space, hints, findings)
-    return Recording(
-        at.points.reshape(len(points), -1),
-        rate_hz,
-        marker_channels(names),
-        stem(path),
-        cmu_subject(stem(path)),
-        report=findings.report(rate_hz, at.unit_m, at.up),
-    )
+    person = cmu_subject(stem(path))
+    return placed_markers(path, points, names, rate_hz, space, hints, findings, person=person)
 
 
 def _clock(path: Path, block: Block, clocks: FloatArray, findings: Findings) -> Clock:

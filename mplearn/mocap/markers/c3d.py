@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InvalidValueError
-from ...recording import FloatArray, Recording, marker_channels
-from ..files import bad_file, read_bytes, stem
+from ...recording import FloatArray, Recording
+from ..files import bad_file, read_bytes
 from ..findings import Findings
 from ..options import option
+from ..placing.placed_markers import placed_markers
 from ..placing.size import said_unit
-from ..placing.space import Space, placed, to_z_up
+from ..placing.space import Space, to_z_up
 from ..rates import rate_beside
 from ..reader import Hints, Reader
 from .c3d_file import C3DContent, parse_c3d
@@ -50,15 +51,9 @@ class C3DReader(Reader):
             )
         points, names = _measured(path, content, findings)
         rate_hz = hints.rate_hz or _rate(path, content, findings)
-        at = placed(path, points, names, rate_hz, _space(path, hints, content), hints, findings)
-        return Recording(
-            frames=at.points.reshape(n_frames, -1),
-            rate_hz=rate_hz,
-            channels=marker_channels(names),
-            name=stem(path),
-            person=next(iter(content.texts("SUBJECTS", "NAMES")), ""),
-            report=findings.report(rate_hz, at.unit_m, at.up),
-        )
+        space = _space(path, hints, content)
+        person = next(iter(content.texts("SUBJECTS", "NAMES")), "")
+        return placed_markers(path, points, names, rate_hz, space, hints, findings, person=person)
 
 
 def _measured(

@@ -33,14 +33,15 @@ from typing import ClassVar
 import numpy as np
 
 from ...errors import RecordingError
-from ...recording import FloatArray, IntArray, LabelledSegment, Recording, marker_channels
+from ...recording import FloatArray, IntArray, LabelledSegment, Recording
 from ..clock import Clock, even_clock, in_seconds
 from ..files import bad_file, head_text, read_text, stem
 from ..findings import Findings
 from ..numbers import measured_rows, says_missing, without_unseen
 from ..options import option
+from ..placing.placed_markers import placed_markers
 from ..placing.size import named_unit
-from ..placing.space import Space, placed
+from ..placing.space import Space
 from ..rates import rate_beside
 from ..reader import Hints, Reader
 from .columns import (
@@ -129,15 +130,8 @@ class CSVReader(Reader):
         points = points[:, kept]
         space = replace(self.usual, unit_m=table.unit_m or 1.0, says_unit=table.unit_m is not None)
         warn_of_pictures(points, names, findings)
-        at = placed(path, points, names, rate_hz, space, hints, findings)
-        return Recording(
-            at.points.reshape(len(points), -1),
-            rate_hz,
-            marker_channels(names),
-            stem(path),
-            person,
-            labels,
-            report=findings.report(rate_hz, at.unit_m, at.up),
+        return placed_markers(
+            *(path, points, names, rate_hz, space, hints, findings), person=person, labels=labels
         )
 
 

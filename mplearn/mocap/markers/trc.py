@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ...recording import FloatArray, Recording, marker_channels
+from ...recording import FloatArray, Recording
 from ..clock import even_clock, in_seconds
 from ..files import bad_file, cmu_subject, read_text, stem
 from ..findings import Findings
 from ..numbers import measured_rows, not_seen, number
+from ..placing.placed_markers import placed_markers
 from ..placing.size import said_unit
-from ..placing.space import Space, placed
+from ..placing.space import Space
 from ..reader import Hints, Reader
 from .columns import meaning_of
 from .names import chosen_names
@@ -49,15 +50,8 @@ class TRCReader(Reader):
         header.compare(path, "NumFrames", len(values), "frames", findings)
         header.compare(path, "NumMarkers", sum(bool(label) for label in labels), "names", findings)
         rate_hz, points = _in_time(path, header, values[:, 1], measured[:, kept], hints, findings)
-        at = placed(path, points, names, rate_hz, _space(path, header, hints), hints, findings)
-        return Recording(
-            frames=at.points.reshape(len(points), -1),
-            rate_hz=rate_hz,
-            channels=marker_channels(names),
-            name=stem(path),
-            person=cmu_subject(stem(path)),
-            report=findings.report(rate_hz, at.unit_m, at.up),
-        )
+        space, person = _space(path, header, hints), cmu_subject(stem(path))
+        return placed_markers(path, points, names, rate_hz, space, hints, findings, person=person)
 
 
 def _tabbed(text: str) -> str:

@@ -9,13 +9,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from ...recording import FloatArray, IntArray, Recording, marker_channels
-from ..files import bad_file, read_bytes, stem
+from ...recording import FloatArray, IntArray, Recording
+from ..files import bad_file, read_bytes
 from ..findings import Findings
 from ..numbers import without_unseen
 from ..options import option
+from ..placing.placed_markers import placed_markers
 from ..placing.size import named_unit
-from ..placing.space import Space, placed
+from ..placing.space import Space
 from ..reader import Hints, Reader
 from .columns import meaning_of
 from .names import chosen_names
@@ -67,14 +68,7 @@ class XDFReader(Reader):
         unit = described_unit(stream.info, stream.n_channels, columns)
         space = Space(unit or 1.0, says_unit=unit is not None)
         points = points if len(kept) == points.shape[1] else points[:, kept]
-        at = placed(path, points, names, rate_hz, space, hints, findings)
-        return Recording(
-            at.points.reshape(len(points), -1),
-            rate_hz,
-            marker_channels(names),
-            stem(path),
-            report=findings.report(rate_hz, at.unit_m, at.up),
-        )
+        return placed_markers(path, points, names, rate_hz, space, hints, findings)
 
 
 def described_markers(

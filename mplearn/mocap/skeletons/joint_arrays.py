@@ -13,14 +13,15 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import RecordingError
-from ...recording import FloatArray, Recording, marker_channels
-from ..files import bad_file, stem, suffix
+from ...recording import FloatArray, Recording
+from ..files import bad_file, suffix
 from ..findings import Findings
 from ..markers.columns import MEDIAPIPE_POSE
 from ..markers.pictures import hold_scores, warn_of_pictures
 from ..numbers import without_unseen
 from ..options import option
-from ..placing.space import Space, placed
+from ..placing.placed_markers import placed_markers
+from ..placing.space import Space
 from ..rates import rate_beside
 from ..reader import Hints, Reader
 from .motion_features import RATES_HZ, joints_of_features
@@ -218,14 +219,7 @@ class JointArrayReader(Reader):
             names = tuple(f"person{p}:{name}" for p in range(len(people)) for name in names)
         points = np.concatenate([points[:, kept] for points in people], axis=1)
         warn_of_pictures(points, names, findings)
-        at = placed(path, points, names, rate_hz, USUAL, hints, findings)
-        return Recording(
-            at.points.reshape(len(points), -1),
-            rate_hz,
-            marker_channels(names),
-            stem(path),
-            report=findings.report(rate_hz, at.unit_m, at.up),
-        )
+        return placed_markers(path, points, names, rate_hz, USUAL, hints, findings)
 
 
 def _as_people(path: Path, array: FloatArray) -> list[FloatArray]:
