@@ -75,7 +75,7 @@ def merged_learner(learners: Iterable[MotionLearner], people: Sequence[str] = ()
     merged, several = _merged(learners, people)
     merged.tree.wake()
     if several:
-        merged.chain.revise(merged.tree.withdraw_young())
+        merged.chain.revise(merged.tree.prune())
     return merged
 
 

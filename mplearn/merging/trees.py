@@ -98,7 +98,7 @@ def _placed(tree: PrimitiveTree, most: int) -> Change:
     born, moved = list[int](), dict[int, int]()
     for _ in range(most):
         older = tree.leaves
-        change = tree.place_waiting()
+        change = tree.place_unplaced()
         late = _merge(tree, older, change.born)
         moved |= {number: late.get(id, id) for number, id in change.moved}
         born += [id for id in change.born if id not in late]

@@ -142,7 +142,7 @@ def remove(sharing: Sharing, id: int, *, forget: bool) -> Change:
     return settled(sharing, Change(moved=() if forget else tuple(moved), removed=removed))
 
 
-def withdraw_young(sharing: Sharing) -> Change:
+def prune(sharing: Sharing) -> Change:
     """Let what is no primitive by the rules of several people wait until it is shown more often.
 
     Its leaves were born while each person was alone. What a person had a hand in stays.

@@ -25,7 +25,7 @@ from ..tree import (
     TreeConfig,
 )
 from .config import PeopleConfig
-from .editing import withdraw_young
+from .editing import prune
 from .people_state import PeopleState, PersonState
 from .primitives import OnePersonsPrimitives, Primitives, SharedPrimitives
 from .reversal import PeopleEdit
@@ -150,7 +150,7 @@ class PeopleTree:
         """Return what comes nearest to a primitive among the segments that wait to become one."""
         found = [tree.most_repeated() for tree in self._trees.values()]
         best = max(found, key=lambda each: (each.times, -each.apart))
-        return best._replace(n_waiting=sum(each.n_waiting for each in found))
+        return best._replace(n_unplaced=sum(each.n_unplaced for each in found))
 
     def unplaced(self) -> dict[int, tuple[FloatArray, LeftRightHMM]]:
         """Return the segments that are in no primitive, shape (L, D), and a model of each.
@@ -310,7 +310,7 @@ class PeopleTree:
             if isinstance(tree, KeptTree):
                 tree.wake()
 
-    def withdraw_young(self) -> Change:
+    def prune(self) -> Change:
         """Let primitives wait again that have fewer members than several people need.
 
         They were born while each person was alone. Where there is one person, nothing changes.
@@ -318,7 +318,7 @@ class PeopleTree:
         primitives = self._primitives
         if not isinstance(primitives, SharedPrimitives) or len(self._trees) == 1:
             return Change()
-        return withdraw_young(primitives.sharing)
+        return prune(primitives.sharing)
 
     def adopt(self, trees: dict[int, PrimitiveTree], n_seen: int) -> None:
         """Go on with other trees, by person, that have seen so many segments."""

@@ -76,7 +76,7 @@ class ReceivedSource(Source):
 
     def close(self) -> None:
         """End it, and wait for the thread."""
-        unread = self._inbox.close() + self._sequencer.n_waiting
+        unread = self._inbox.close() + self._sequencer.n_pending
         self.tally.unread += 0 if self._over else unread
         self._over = True
         if self._thread is not threading.current_thread():

@@ -65,7 +65,7 @@ class Sequencer:
         return bool(self._pending)
 
     @property
-    def n_waiting(self) -> int:
+    def n_pending(self) -> int:
         """Number of frames that are held back; they are forgotten where it is not finished."""
         return len(self._pending) + len(self._unpaced)
 

@@ -106,7 +106,7 @@ class Writer:
             self._wake.notify_all()
 
     @property
-    def n_waiting(self) -> int:
+    def n_pending(self) -> int:
         """Records that are not written yet."""
         return len(self._rows)
 

@@ -393,14 +393,14 @@ class PrimitiveTree:
         """Begin to model all segments again where the variance of all motion has changed much."""
         memory, structure = self._memory, self._structure
         if memory.renewal is None:
-            floor = memory.outgrown()
+            floor = memory.updated_floor()
             if floor is None:
                 return
             memory.renew(floor, structure.groups)
         if not self._time_passes:
             structure.remeasured(memory.get_done(structure.groups))
 
-    def place_waiting(self) -> Change:
+    def place_unplaced(self) -> Change:
         """Place what waits in the root where it fits by now, or in primitives of its own."""
         structure, bank = self._structure, self.bank
         found = [(n, structure.index.search(bank[n], bank)[:1]) for n in structure.root.members]

@@ -80,7 +80,7 @@ def test_what_came_nearest_to_a_primitive_is_told():
     mine.end_stream()
     assert not mine.tree.leaves
     found = mine.tree.most_repeated()
-    assert found.times == 2 and found.apart < 1 and found.n_waiting >= 5
+    assert found.times == 2 and found.apart < 1 and found.n_unplaced >= 5
     once = learner()
     once.learn_many(walk(POSTURES, range(7)))
     once.end_stream()

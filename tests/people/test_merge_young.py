@@ -41,18 +41,18 @@ def test_what_one_person_showed_twice_waits_and_what_two_did_stays(shards):
     assert meanings(tree, shows) == [*COMMON, BOTH, ONE]
     (gone,) = (id for id in tree.leaves if shows[tree.node(id).members[0]] == ONE)
     members = tree.node(gone).members
-    change = tree.withdraw_young()
+    change = tree.prune()
     assert change.removed == (gone,) and not change.born
     assert sorted(change.moved) == sorted((n, ROOT) for n in members)
     assert meanings(tree, shows) == [*COMMON, BOTH]
     assert set(members) <= set(tree.node(ROOT).members)
-    assert not tree.withdraw_young().removed
+    assert not tree.prune().removed
     sound(tree)
 
 
 def test_what_waits_is_a_primitive_once_it_is_shown_as_often_as_several_people_need(shards):
     tree, shows = united(shards[0])
-    tree.withdraw_young()
+    tree.prune()
     said = [tree.insert(shards[1](0, ONE), 0) for _ in range(2)]
     assert [len(placement.born) for placement in said] == [0, 1]
     shows |= {placement.number: ONE for placement in said}
@@ -63,12 +63,12 @@ def test_what_a_person_had_a_hand_in_and_who_is_alone_stay(shards):
     tree, _ = united(shards[0])
     (young,) = (id for id in tree.leaves if tree.n_placed(id) < RULES.min_exemplars)
     tree.freeze(young)
-    assert not tree.withdraw_young().removed
+    assert not tree.prune().removed
     assert young in tree.leaves
     alone = shards[0][0][0].copy()
-    assert not alone.withdraw_young().removed
+    assert not alone.prune().removed
     alone.sharing()
-    assert not alone.withdraw_young().removed
+    assert not alone.prune().removed
 
 
 def test_where_nothing_was_shown_often_all_waits_and_learning_goes_on(shards):

@@ -291,6 +291,6 @@ def test_a_clock_that_stands_holds_nothing_for_ever() -> None:
     samples = [sample(None, 1.0, 0.01 * i, 5.0, stream=silent) for i in range(5000)]
     sequencer = Sequencer(Tally(), ordered=False)
     items = [item for each in samples for item in sequencer.take([each], each.arrived_s)]
-    assert sequencer.n_waiting < 2048
+    assert sequencer.n_pending < 2048
     assert all("show no rate" in text for text in texts_of(items, "damaged"))
     assert len(texts_of(items, "damaged")) == 2

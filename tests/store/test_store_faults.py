@@ -222,7 +222,7 @@ def test_on_a_full_disk_learning_goes_on_and_catches_up(tmp_path: Path) -> None:
             time.sleep(0.002)
     assert isinstance(life.store.problem, StoreWriteError)
     life.execute(Note("nobody waits for this one"), when=1.0)
-    assert life.store._running().n_waiting < 1200 / 50 + 2  # a checkpoint stands for what is older
+    assert life.store._running().n_pending < 1200 / 50 + 2  # a checkpoint stands for what is older
     behind = StoreReader(path).life
     assert 400 - 50 <= behind.n_frames < life.n_frames  # others read what is there
     life.store._connection.execute("PRAGMA max_page_count = 1000000")

@@ -102,7 +102,7 @@ def test_what_was_removed_and_learned_anew_comes_back_once(then):
     members, before = sorted(tree.node(home[0]).members), tree.state().nodes
     tree.remove(home[0])
     edit = NodesEdit.between(before, tree.state().nodes, tree.bank.floor.copy())
-    (anew,) = tree.place_waiting().born
+    (anew,) = tree.place_unplaced().born
     tree.exchange(edit.reversed())  # now it is a primitive twice, of the same executions
     if then == "merged":
         tree.merge(home[0], anew)

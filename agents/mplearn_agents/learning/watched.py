@@ -221,6 +221,6 @@ def why_nothing(learner: MotionLearner, n_moving: int, watched_s: float) -> str:
     if not math.isfinite(found.apart):
         apart = "nothing to compare with"
     return (
-        f"Why: of {found.n_waiting} segments {came}, the nearest {apart}. Show each motion at "
+        f"Why: of {found.n_unplaced} segments {came}, the nearest {apart}. Show each motion at "
         f"least {least} times, more where it varies widely; or let the recording be learned twice."
     )

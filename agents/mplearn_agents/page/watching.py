@@ -325,7 +325,7 @@ class Watcher:
             | {
                 "revision": self._told_revision,
                 "waiting": {
-                    "n": waiting.n_waiting,
+                    "n": waiting.n_unplaced,
                     "times": waiting.times,
                     "of": tree.config.min_exemplars,
                 },

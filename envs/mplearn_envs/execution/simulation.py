@@ -154,8 +154,8 @@ class Simulation:
         n_knots = len(plan.q) - 1
         n_steps = len(plan.commands) // n_knots
         at_once = n_knots if on_frame is None else -(-frame_steps // n_steps)
-        guided = self.feedback == "always" or (self.feedback == "steps" and plan.steps)
-        law = make_ankle_feedback(self.robot, plan, guided)
+        corrects = self.feedback == "always" or (self.feedback == "steps" and plan.steps)
+        law = make_ankle_feedback(self.robot, plan, corrects)
         robot = Simulated.of(self.model, self.data, self._feet)
         track = Track.begin(self.data, n_knots)
         done, fallen = 0, False

@@ -49,7 +49,7 @@ class SegmentMemory:
         points = normalisation.points_of(frames, self.config.normalisation)
         self._spread.update(points)
         if not self._sample.numbers:
-            floor = self.outgrown()
+            floor = self.updated_floor()
             self.bank.floor = self.bank.floor if floor is None else floor
         seen = normalisation.centred(points, self.config.normalisation)
         self.bank.add(number, self.bank.model(seen, len(frames)))
@@ -88,7 +88,7 @@ class SegmentMemory:
                 if self.renewal is not None:
                     self.renewal.drop(number)
 
-    def outgrown(self) -> FloatArray | None:
+    def updated_floor(self) -> FloatArray | None:
         """Return the variance floor of new models, if that of all motion has changed much."""
         floor = self.config.variance_floor**2 * self._spread.variances()
         change = floor / self.bank.floor
