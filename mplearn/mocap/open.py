@@ -23,12 +23,12 @@ from .markers.csv_table import CSVReader
 from .markers.motive import MotiveReader
 from .markers.nexus import NexusReader
 from .markers.qualisys import QualisysReader
-from .markers.storage import StorageReader
 from .markers.trc import TRCReader
 from .markers.ui_prmd import UIPRMDReader
 from .markers.xdf import XDFReader
 from .people import each_person
 from .placing.handedness import right_handed
+from .placing.level import leveled, told_of_lean, turn_to_level
 from .reader import Hints, Reader, joined
 from .registry import reader_for, reader_of, register_reader, suffixes
 from .resample import resample
@@ -37,7 +37,9 @@ from .skeletons.bvh import BVHReader
 from .skeletons.g1_csv import G1CSVReader
 from .skeletons.joint_arrays import JointArrayReader
 from .skeletons.mvnx import MVNXReader
+from .skeletons.opensim import OpenSimReader
 from .skeletons.smpl import SMPLReader
+from .skeletons.theia import TheiaReader
 
 # the most general first: the latest is asked first
 for _reader in (
@@ -47,13 +49,14 @@ for _reader in (
     QualisysReader(),
     MotiveReader(),
     TRCReader(),
-    StorageReader(),
+    OpenSimReader(),
     BVHReader(),
     AMCReader(),
     MVNXReader(),
     SMPLReader(),
     JointArrayReader(),
     C3DReader(),
+    TheiaReader(),
     XDFReader(),
     UIPRMDReader(),
     KeyPointsReader(),
@@ -364,6 +367,10 @@ def _read(
             part = replace(part, report=ReadReport(take.reader.format, part.rate_hz))
         if hints is not None and hints.mirrored:
             part = right_handed(file, part)
+        if hints is not None and hints.level:
+            part = leveled(part, turn_to_level(file, part))
+        else:
+            part = told_of_lean(part)
         parts.append(part)
     recording = parts[0] if len(parts) == 1 else joined(take.name, parts)
     return recording if rate_hz is None else resample(recording, rate_hz)

@@ -13,10 +13,15 @@ _COMMAND_LINE = {
     "skeleton": "--skeleton",
     "angle_unit": "--angles",
     "mirrored": "--mirrored",
+    "level": "--level",
     "names": "--map",
     "person": "--person",
 }
-_PYTHON = {"names": "names={...}", "person": "Recording.person"}  # what is no hint
+_PYTHON = {  # what is no hint, or takes one value alone
+    "names": "names={...}",
+    "person": "Recording.person",
+    "level": "Hints(level=True)",
+}
 _on_command_line: ContextVar[bool] = ContextVar("_on_command_line", default=False)
 
 

@@ -33,6 +33,8 @@ class Hints:
         angle_unit: What the angles of a BVH or AMC file are in: ``"degrees"`` or ``"radians"``.
         mirrored: Whether the file's axes are left-handed, as those of Unity and Unreal are: then
             people would be mirrored, and one axis is turned round.
+        level: Whether the camera was tilted: then people are turned so that who stands straight is
+            upright.
         joint_axes: With joint positions, also how each joint is turned: three points more
             (``Head>x``), 0.1 m along axes that turn with it.
 
@@ -47,6 +49,7 @@ class Hints:
     skeleton: Path | str | None = None
     angle_unit: str | None = None
     mirrored: bool = False
+    level: bool = False
     joint_axes: bool = False
 
     def __post_init__(self) -> None:

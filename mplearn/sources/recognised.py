@@ -13,6 +13,7 @@ from ..errors import MPLearnError
 from ..mocap.findings import Findings
 from ..mocap.markers.names import chosen_names
 from ..mocap.placing.handedness import OTHER_HAND, right_handed
+from ..mocap.placing.level import leveled, turn_to_level
 from ..mocap.placing.space import Space, placed
 from ..recording import BoolArray, FloatArray, IntArray, Recording, marker_channels
 from .registry import Wanted
@@ -356,7 +357,10 @@ class RecognisedSource(Source):
             )
             if hints.mirrored:
                 recording, turn = right_handed(path, recording), OTHER_HAND @ turn
-                told = recording.report or told
+            if hints.level:
+                tilt = turn_to_level(path, recording)
+                recording, turn = leveled(recording, tilt), tilt @ turn
+            told = recording.report or told
             report = [f"warning: {text}" for text in told.warnings] + list(told.notes)
         if self._wanted.observe == "positions":
             return Sight(labels, unit_m, turn, None, recording.channels, tuple(report))

@@ -1,10 +1,12 @@
-"""The person of `rigs`, written as AMC with its ASF, as MVNX and as poses of SMPL.
+"""The person of `rigs`, written as AMC with its ASF, as MVNX, as poses of SMPL and of
+Theia, and as coordinates of OpenSim.
 
 All hang in a T pose, x forward, y left, z up; what they do is what the BVH rigs do.
 """
 
 from __future__ import annotations
 
+import struct
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -196,4 +198,135 @@ def write_smpl_of(path: Path, limbs: Limbs, rate_hz: float) -> Path:
         trans=limbs.places[:, 0],
         mocap_framerate=rate_hz,
     )
+    return path
+
+
+THEIA_PARTS = {
+    "worldbody": "",
+    "head": "Neck",
+    "torso": "Spine1",
+    **{
+        f"{letter}_{segment}": f"{side}{part}"
+        for letter, side in (("l", "Left"), ("r", "Right"))
+        for segment, part in (
+            *(("uarm", "Arm"), ("larm", "ForeArm"), ("hand", "Hand"), ("thigh", "UpLeg")),
+            *(("shank", "Leg"), ("foot", "Foot"), ("toes", "Toe")),
+        )
+    },
+    "pelvis": "Hips",
+    "pelvis_shifted": "Hips",
+}
+"""What of a plain rig each of Theia's segments turns with."""
+
+
+def theia_poses(limbs: Limbs) -> np.ndarray:
+    """How Theia's segments lie in its world (x right, y ahead, z up), shape (T, S, 4, 4) [mm]."""
+    to_file = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    poses = np.tile(np.eye(4), (len(limbs.turns), len(THEIA_PARTS), 1, 1))
+    for k, (segment, part) in enumerate(THEIA_PARTS.items()):
+        if not part:
+            continue
+        joint = limbs.names.index(part)
+        place = limbs.places[:, joint]
+        if segment == "torso":  # it begins between the shoulders
+            sides = [limbs.names.index(f"{side}Arm") for side in ("Left", "Right")]
+            place = limbs.places[:, sides].mean(axis=1)
+        poses[:, k, :3, :3] = to_file @ limbs.turns[:, joint] @ to_file.T
+        poses[:, k, :3, 3] = 1000.0 * place @ to_file.T
+    return poses
+
+
+def write_theia_of(path: Path, limbs: Limbs, rate_hz: float) -> Path:
+    """Write the poses of a plain rig's segments as Theia has them in C3D files."""
+    labels = [f"{segment}_4X4" for segment in THEIA_PARTS]
+    return write_c3d_poses(path, theia_poses(limbs), labels, rate_hz=rate_hz)
+
+
+def opensim_coordinates(limbs: Limbs) -> dict[str, np.ndarray]:
+    """Coordinates of Rajagopal's model [rad, m]: it turns about z, x, y, from arms that hang."""
+    to_file = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    found = {}
+
+    def add(names: str, turns: np.ndarray, side: float = 1.0) -> None:
+        angles = Rotation.from_matrix(to_file @ turns @ to_file.T).as_euler("ZXY")
+        for name, angle in zip(names.split(), angles.T * [[1.0], [side], [side]], strict=False):
+            found[name] = -angle if name.startswith("knee") else angle
+
+    def against(part: str, other: str) -> np.ndarray:
+        one, below = (limbs.turns[:, limbs.names.index(name)] for name in (other, part))
+        return one.transpose(0, 2, 1) @ below
+
+    add("pelvis_tilt pelvis_list pelvis_rotation", limbs.turns[:, 0])
+    add("lumbar_extension lumbar_bending lumbar_rotation", against("Spine1", "Hips"))
+    hips = [limbs.names.index(f"{side}UpLeg") for side in ("Left", "Right")]
+    origin = limbs.places[:, hips].mean(axis=1) + limbs.turns[:, 0] @ [0.07, 0.0, 0.066]
+    for axis, values in zip("xyz", (origin @ to_file.T).T, strict=True):
+        found[f"pelvis_t{axis}"] = values
+    for side, letter, sign in (("Left", "l", -1.0), ("Right", "r", 1.0)):
+        hang = Rotation.from_euler("x", 90.0 * sign, degrees=True).as_matrix()
+        legs = [f"{side}{part}" for part in ("UpLeg", "Leg", "Foot")]
+        add(f"hip_flexion_{letter} hip_adduction_{letter} hip_rotation_{letter}",
+            against(legs[0], "Hips"), sign)  # fmt: skip
+        add(f"knee_angle_{letter}", against(legs[1], legs[0]))
+        add(f"ankle_angle_{letter}", against(legs[2], legs[1]))
+        arm = against(f"{side}Arm", "Spine1") @ hang.T
+        add(f"arm_flex_{letter} arm_add_{letter} arm_rot_{letter}", arm, sign)
+        add(f"elbow_flex_{letter}", hang @ against(f"{side}ForeArm", f"{side}Arm") @ hang.T)
+    return found
+
+
+def write_mot_of(path: Path, limbs: Limbs, rate_hz: float) -> Path:
+    """Write a plain rig as coordinates of OpenSim's models, in degrees."""
+    found = opensim_coordinates(limbs)
+    lines = ["Coordinates", "version=1", f"nRows={len(limbs.turns)}", f"nColumns={len(found) + 1}"]
+    lines += ["inDegrees=yes", "", "Units are S.I. units (second, meters, Newtons, ...)", ""]
+    lines += ["endheader", "\t".join(["time", *found])]
+    table = [x if name[-3:-1] == "_t" else np.degrees(x) for name, x in found.items()]
+    lines += [
+        "\t".join([f"{t / rate_hz:.5f}", *(f"{x:.7f}" for x in row)])
+        for t, row in enumerate(np.transpose(table))
+    ]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def write_c3d_poses(
+    path: Path, poses: np.ndarray, labels: list[str], *, rate_hz: float, ratio: int = 1
+) -> Path:
+    """Poses of segments, shape (T, S, 4, 4) [mm], without points, as Theia writes them."""
+    n_frames = len(poses) // ratio
+    length = max(map(len, labels), default=1)
+    texts = b"".join(label.encode().ljust(length) for label in labels)
+
+    def record(name: str, number: int, content: bytes) -> bytes:
+        head = struct.pack("<bb", len(name), number) + name.encode()
+        return head + struct.pack("<h", 2 + len(content)) + content
+
+    def value(name: str, number: int, kind: int, raw: bytes, sizes: tuple[int, ...] = ()) -> bytes:
+        return record(
+            name, number, struct.pack("<bB", kind, len(sizes)) + bytes(sizes) + raw + b"\0"
+        )
+
+    def parameters(n_blocks: int) -> bytes:
+        start, number = struct.pack("<h", 2 + n_blocks), struct.pack
+        records = (
+            record("POINT", -1, b"\0") + value("USED", 1, 2, number("<h", 0))
+            + value("FRAMES", 1, 2, number("<h", n_frames)) + value("UNITS", 1, -1, b"mm", (2,))
+            + value("RATE", 1, 4, number("<f", rate_hz / ratio)) + value("DATA_START", 1, 2, start)
+            + value("SCALE", 1, 4, number("<f", -1.0)) + record("ROTATION", -2, b"\0")
+            + value("USED", 2, 2, number("<h", poses.shape[1])) + value("DATA_START", 2, 2, start)
+            + value("RATIO", 2, 2, number("<h", ratio)) + value("RATE", 2, 4, number("<f", rate_hz))
+            + value("LABELS", 2, -1, texts, (length, len(labels))) + record("ANALOG", -3, b"\0")
+            + value("USED", 3, 2, number("<h", 0))
+        )  # fmt: skip
+        return bytes([1, 0x50, n_blocks, 84]) + records
+
+    n_blocks = -(-len(parameters(0)) // 512)
+    counts = (2, 0x50, 0, 0, 1, n_frames, 0, -1.0, 2 + n_blocks, 0, rate_hz / ratio)
+    data = struct.pack("<BB5HfHHf", *counts).ljust(512, b"\0")
+    data += parameters(n_blocks).ljust(512 * n_blocks, b"\0")
+    rows = np.zeros((*poses.shape[:2], 17), dtype="<f4")
+    rows[..., :16] = poses.swapaxes(-1, -2).reshape(*poses.shape[:2], 16)
+    data += rows.tobytes()
+    path.write_bytes(data + b"\0" * (-len(data) % 512))
     return path

@@ -41,6 +41,11 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         help="their axes are left-handed, as those of Unity and Unreal: people would be mirrored",
     )
     group.add_argument(
+        "--level",
+        action="store_true",
+        help="the camera was tilted: turn people so that who stands straight is upright",
+    )
+    group.add_argument(
         "--map",
         type=Path,
         metavar="FILE",
@@ -99,6 +104,7 @@ def hints_of(args: argparse.Namespace, *, joint_axes: bool = False) -> Hints:
         skeleton=args.skeleton,
         angle_unit=args.angles,
         mirrored=args.mirrored,
+        level=args.level,
         joint_axes=joint_axes,
     )
 

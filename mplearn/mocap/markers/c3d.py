@@ -49,9 +49,11 @@ class C3DReader(Reader):
             findings.warn(
                 "no point is said to be measured, in no frame: they are taken as they are"
             )
+        space = space_of(path, hints, content)
+        if not content.points.shape[1]:
+            raise bad_file(path, "it holds no points", "a C3D file with markers")
         points, names = _measured(path, content, findings)
         rate_hz = hints.rate_hz or _rate(path, content, findings)
-        space = _space(path, hints, content)
         person = next(iter(content.texts("SUBJECTS", "NAMES")), "")
         return placed_markers(path, points, names, rate_hz, space, hints, findings, person=person)
 
@@ -118,7 +120,12 @@ def _rate(path: Path, content: C3DContent, findings: Findings) -> float:
     return rates[0]
 
 
-def _space(path: Path, hints: Hints, content: C3DContent) -> Space:
+def space_of(path: Path, hints: Hints, content: C3DContent) -> Space:
+    """Return what a C3D file says of its unit and axes.
+
+    Raises:
+        RecordingError: A unit that nobody knows, or axes that are none.
+    """
     text = next(iter(content.texts("POINT", "UNITS")), "")
     unit = said_unit(path, text, hints)
     up = next(iter(content.texts("POINT", "Y_SCREEN")), "").lower().removeprefix("+")

@@ -8,7 +8,7 @@ oracle of the tests.
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import prod
 from pathlib import Path
 from typing import TypeAlias
@@ -25,6 +25,8 @@ _DEC = 85
 _BYTE_ORDER = {84: "<", _DEC: "<", 86: ">"}  # PC, DEC, SGI
 _INTEGERS = {1: "i1", 2: "i2"}
 _EXPECTED = "a whole C3D file"
+_POSE = 17  # numbers of a pose
+_SQUARE = 0.02  # by which a turn is off a rotation, at most
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,8 @@ class C3DContent:
         rate_hz: Frames per second after the header [1/s].
         said_frames: How many frames the file says that it holds, if that is not what it holds.
         unmeasured: Whether no point is said to be measured, and all are there nevertheless.
+        poses: How segments lie, as Theia writes them where there are no points, shape (T, S, 4, 4);
+            NaN where not seen.
     """
 
     points: FloatArray
@@ -44,6 +48,7 @@ class C3DContent:
     rate_hz: float
     said_frames: int | None = None
     unmeasured: bool = False
+    poses: FloatArray | None = None
 
     def texts(self, group: str, name: str) -> list[str]:
         """Return a parameter's texts; none where it is missing or holds numbers."""
@@ -78,17 +83,16 @@ def parse_c3d(path: Path, data: bytes) -> C3DContent:
     n_points, n_analog, first, last = struct.unpack_from(order + "4H", data, 2)
     (start,) = struct.unpack_from(order + "H", data, 16)
     scale, rate_hz = (float(_reals(data[i : i + 4], processor)[0]) for i in (12, 20))
-    if n_points == 0:
-        raise bad_file(path, "it holds no points", "a C3D file with markers")
-    if start < 2 or not np.isfinite(scale) or scale == 0.0:
-        raise bad_file(path, f"frames at block {start}, scale {scale}", _EXPECTED)
-
     begin = (start - 1) * _BLOCK
     n_blocks = data[at + 2]
-    stop = min(len(data), at + n_blocks * _BLOCK if n_blocks else begin)
+    stop = min(len(data), at + n_blocks * _BLOCK if n_blocks else max(begin, 0))
     content = C3DContent(
         np.empty((0, 0, 3)), _parameters(path, data, at + 4, stop, processor), rate_hz
     )
+    if n_points == 0:
+        return _with_poses(path, data, content, last - first + 1, processor)
+    if start < 2 or not np.isfinite(scale) or scale == 0.0:
+        raise bad_file(path, f"frames at block {start}, scale {scale}", _EXPECTED)
     width, real = 4 * n_points + n_analog, scale < 0.0
     n_bytes = width * (4 if real else 2)
     n_used = len(data.rstrip(b"\0")) - begin
@@ -107,6 +111,44 @@ def parse_c3d(path: Path, data: bytes) -> C3DContent:
     points[nowhere if unmeasured else gone] = np.nan
     return C3DContent(
         points, content.parameters, rate_hz, None if said == n_frames else said, unmeasured
+    )
+
+
+def _with_poses(
+    path: Path, data: bytes, content: C3DContent, in_header: int, processor: int
+) -> C3DContent:
+    """Return a content without points with the poses of its segments.
+
+    They are matrices, column by column, and how sure each is; as many as `ROTATION:RATIO` says to
+    a frame.
+    """
+    start, used, ratio = (
+        int(value[0]) if len(value := content.numbers("ROTATION", name)) else default
+        for name, default in (("DATA_START", 0), ("USED", 0), ("RATIO", 1))
+    )
+    begin, n_segments, ratio = (start % 65536 - 1) * _BLOCK, used % 65536, max(ratio, 1)
+    if begin < 2 * _BLOCK or not n_segments:
+        raise bad_file(path, "it holds no points", "a C3D file with markers, or poses of segments")
+    n_bytes = 4 * _POSE * n_segments * ratio
+    n_used = len(data.rstrip(b"\0")) - begin
+    said, n_frames = _frame_count(content, in_header, n_bytes, len(data) - begin, n_used)
+    if n_frames < 1:
+        raise bad_file(
+            path, f"{said} frames, {len(data)} of {begin + said * n_bytes} bytes", _EXPECTED
+        )
+    values = _reals(data[begin : begin + n_frames * n_bytes], processor)
+    table = values.reshape(n_frames * ratio, n_segments, _POSE)
+    poses = table[..., : _POSE - 1].reshape(*table.shape[:2], 4, 4).swapaxes(-1, -2).copy()
+    turns = poses[..., :3, :3]
+    square = np.abs(turns.swapaxes(-1, -2) @ turns - np.eye(3)).max(axis=(-1, -2)) < _SQUARE
+    poses[~(square & np.isfinite(poses).all(axis=(-1, -2)))] = np.nan
+    rates = content.numbers("ROTATION", "RATE")
+    return replace(
+        content,
+        points=np.empty((len(poses), 0, 3)),
+        poses=poses,
+        rate_hz=float(rates[0]) if len(rates) and rates[0] > 0 else content.rate_hz * ratio,
+        said_frames=None if said == n_frames else said,
     )
 
 
