@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 
+from ..recording import FloatArray
 from .joint_tree import JointTree
 from .name_hints import says_head, says_leg
 from .proportions import ARM, LEG, STRANGE, LimbLaw, fit_limb
@@ -189,20 +190,45 @@ def _trunk(tree: JointTree, pair: _Ways, up: int) -> tuple[int, ...]:
 
 
 def _head(tree: JointTree, arms: _Ways, spine: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the nodes on the longest way from the arms' root that is neither limb nor spine."""
+    """Return the nodes on the way from the arms' root that is neither limb nor spine to the top.
+
+    Of several, hair and what is carried among them, it is the way that names call a head's, else
+    the one that leads farthest along the trunk; where no trunk is known, the longest.
+    """
     root, ways = arms
     taken = {*ways[0], *spine}
-    best: tuple[float, tuple[int, ...]] = (0.0, ())
+    along = tree.points[:, root] - tree.points[:, spine[0]] if len(spine) > 1 else None
     # where the neck hangs one joint below the arms' root, the way starts there
     for start in (root, *spine[-2:-1]):
-        for branch in tree.edges[start]:
-            if branch in taken or branch == root:
-                continue
-            if start == root or branch not in spine:
-                length, way = tree.longest(branch, start)
-                length += tree.length(start, branch)
-                if length > best[0]:
-                    best = (length, way)
-        if best[1]:
-            break
-    return best[1] if best[0] > 0.02 * tree.extent else ()
+        branches = [
+            branch
+            for branch in tree.edges[start]
+            if branch not in taken and branch != root and (start == root or branch not in spine)
+        ]
+        found = [way for branch in branches for way in _ways_to_ends(tree, branch, start)]
+        named = [way for way in found if says_head([n for h in way for n in tree.names[h]])]
+        lengths = {way: _length(tree, (start, *way)) for way in named or found}
+        lengths = {way: length for way, length in lengths.items() if length > 0.02 * tree.extent}
+        if not lengths:
+            continue
+        if along is None:
+            return max(lengths, key=lambda way: lengths[way])
+        return max(lengths, key=lambda way: _rise(tree, start, way[-1], along))
+    return ()
+
+
+def _ways_to_ends(tree: JointTree, node: int, away_from: int) -> list[tuple[int, ...]]:
+    """Return the ways from a node to all ends that do not go by another."""
+    beyond = [other for other in tree.edges[node] if other != away_from]
+    ways = [way for other in beyond for way in _ways_to_ends(tree, other, node)]
+    return [(node, *way) for way in ways] or [(node,)]
+
+
+def _length(tree: JointTree, way: tuple[int, ...]) -> float:
+    return sum(tree.length(a, b) for a, b in pairwise(way))
+
+
+def _rise(tree: JointTree, start: int, end: int, along: FloatArray) -> float:
+    """Return how far along the trunk, vectors (T, 3), a node usually is from another [m]."""
+    way = tree.points[:, end] - tree.points[:, start]
+    return float(np.median((way * along).sum(axis=1) / np.linalg.norm(along, axis=1)))

@@ -79,6 +79,16 @@ NAMES = {
 }
 
 
+# what hangs on which part: chains of places [m] on it, those with a side on both
+COSTUMES = {
+    "hair": ("head", [(0, 0.07, 0.2), (0, 0.1, 0.1), (-0.05, 0.1, -0.2), (-0.05, 0.1, -0.4)]),
+    "skirt": ("pelvis", [(0.08, 0.1, -0.02), (0.11, 0.14, -0.25), (0.14, 0.17, -0.6)]),
+    "tail": ("pelvis", [(-0.1, 0, 0), (-0.3, 0, -0.1), (-0.6, 0, -0.2), (-0.9, 0, -0.15)]),
+    "staff": ("chest", [(-0.15, 0, 0), (-0.15, 0.4, 0.6), (-0.15, 0.6, 1.0)]),
+    "wings": ("chest", [(-0.1, 0.05, 0.15), (-0.2, 0.4, 0.4), (-0.2, 0.9, 0.5), (-0.2, 1.3, 0.3)]),
+}  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Rig:
     """How a person is written.
@@ -92,6 +102,7 @@ class Rig:
         bends: Whether a longer spine shares out the bends, instead of having stiff joints.
         without: Parts left out: "clavicle", "toes", "ends".
         fingers, twists, helpers, face, prop: Joints that no body needs.
+        costume: Keys of `COSTUMES`, chains of joints that hang on trunk or head.
         metacarpals: Whether each finger begins with a joint near the wrist.
         unit_m: Length of the file's unit [m].
         up: The file's vertical axis.
@@ -111,6 +122,7 @@ class Rig:
     helpers: bool = False
     face: bool = False
     prop: bool = False
+    costume: tuple[str, ...] = ()
     unit_m: float = 0.01
     up: str = "y"
     yaw: float = 0.0
@@ -259,6 +271,15 @@ def _nodes(body: Body, postures: np.ndarray, rig: Rig) -> list[_Node]:
         _arm(rig, side, add, top, named, pos, mat, on, end, shift)
     for side in "rl" if rig.reverse else "lr":
         _leg(rig, side, add, root, named, pos, mat, on, end)
+    for costume in rig.costume:
+        part, places = COSTUMES[costume]
+        moved = shift if part == "head" else np.zeros(3)
+        for sign in (1, -1) if places[-1][1] and costume != "staff" else (1,):
+            base = {"pelvis": root, "chest": top, "head": neck}[part]
+            for x, y, z in places:
+                base = add(
+                    f"{costume}{sign}_{z}", base, on(part, x, sign * y, z) + moved, mat[part]
+                )
     return nodes
 
 
@@ -357,6 +378,8 @@ RIGS = (
     Rig(fingers=True, metacarpals=True, without=("ends",)),
     Rig(twists=True, helpers=True),
     Rig(names="numbers", zero="hang", prop=True, fingers=True),
+    Rig(costume=("hair", "skirt", "tail", "staff"), names="mixamo"),
+    Rig(costume=("wings",), zero="bones"),
     Rig(unit_m=1.0),
     Rig(unit_m=0.0254),
     Rig(up="z", yaw=0.7),
