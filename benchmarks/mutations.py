@@ -24,6 +24,7 @@ from rich.table import Table
 from mplearn.errors import MPLearnError
 from mplearn.mocap import open_recording
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "mocap"))
 
 from mocap_writers import WRITERS, write

@@ -29,6 +29,7 @@ from mplearn.learner import LearnerConfig, MotionLearner
 from mplearn.mocap import Hints, open_recording
 from mplearn.recording import Recording
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "anatomy"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "mocap"))
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from c3d_poses import write_c3d_poses
 from known_person import RATE_HZ, Truth
 from other_formats import (
     THEIA_PARTS,
     limbs_of,
     theia_poses,
     write_amc_of,
-    write_c3d_poses,
     write_mot_of,
     write_mvnx_of,
     write_smpl_of,

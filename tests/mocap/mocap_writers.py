@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from c3d_poses import write_c3d_poses
 
 UI_PRMD_NAME = "m01_s01_e01_positions.txt"
 
@@ -58,6 +59,22 @@ def write_c3d(
         content["data"]["analogs"] = np.ones((1, 1, 10 * len(points)))
     content.write(str(path))
     return path
+
+
+def write_theia(path: Path) -> Path:
+    """Poses of the trunk and the legs of somebody who stands and sways."""
+    places = {"worldbody": (0.0, 0.0, 0.0), "pelvis": (0.0, 0.0, 950.0)}
+    places |= {"torso": (0.0, 20.0, 1420.0), "head": (0.0, 30.0, 1560.0)}
+    for side, sign in (("l", -1.0), ("r", 1.0)):
+        for name, height in (("thigh", 900.0), ("shank", 480.0), ("foot", 80.0)):
+            places[f"{side}_{name}"] = (90.0 * sign, 0.0, height)
+        places[f"{side}_toes"] = (90.0 * sign, 150.0, 20.0)
+    poses = np.tile(np.eye(4), (12, len(places), 1, 1))
+    sway = 0.02 * np.sin(np.arange(12) / 5.0)[:, None, None]
+    at = np.array(list(places.values()))
+    poses[:, :, :3, 3] = at + sway * at[:, 2:]
+    labels = [f"{name}_4X4" for name in places]
+    return write_c3d_poses(path, poses, labels, rate_hz=100.0)
 
 
 ASF = """# a skeleton
@@ -645,6 +662,7 @@ Writer = Callable[[Path], Path]
 WRITERS: dict[str, tuple[str, Writer]] = {
     "UI-PRMD": (UI_PRMD_NAME, write_ui_prmd),
     "C3D": ("take.c3d", write_c3d),
+    "Theia": ("take.c3d", write_theia),
     "AMC": ("take.amc", write_default_amc),
     "BVH": ("take.bvh", write_bvh),
     "TRC": ("take.trc", write_trc),

@@ -34,7 +34,7 @@ from mplearn.mocap import (
 from mplearn.recording import Recording
 
 FORMATS = sorted(WRITERS)
-WITHOUT_ROWS = {"C3D", "MVNX", "SMPL", "XDF", "joint array"}
+WITHOUT_ROWS = {"C3D", "Theia", "MVNX", "SMPL", "XDF", "joint array"}
 SKELETAL = {"AMC", "BVH", "G1 CSV", "MVNX", "SMPL"}
 # in body lengths, of anything: no person in metres
 FROM_THE_BODY = {"DeepLabCut", "SLEAP", "key points"}

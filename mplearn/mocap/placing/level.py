@@ -20,6 +20,8 @@ _LOOK = 400  # frames
 _PARTS = (("head", "shoulder"), ("pelvis", "thigh"), ("knee",), ("ankle", "heel", "toe"))
 _STRAIGHT = 0.95  # of the way by hips and knees that is the way from the feet to the head
 _FEWEST = 0.1  # of the frames, in which somebody stands straight
+_SHORTEST_S = 0.5  # in all
+_FARTHEST_M = 1000.0
 _TELLING_DEG, _FARTHEST_DEG = (15.0, 50.0)  # leaning less people do; who leans more lies
 _STEADY_DEG = 6.0  # by which half of the frames may differ
 
@@ -34,7 +36,7 @@ def lean_of(recording: Recording) -> FloatArray | None:
         return None
     places = [place_of(name).part for name in recording.marker_names]
     some = recording.markers[:: -(-len(recording) // _LOOK)]
-    seen = ~np.isnan(some)
+    seen = np.abs(some) < _FARTHEST_M  # which NaN is not
     levels = []
     for part in _PARTS:
         kind = next((each for each in part if each in places), None)
@@ -48,7 +50,8 @@ def lean_of(recording: Recording) -> FloatArray | None:
     ways = (top - feet, top - hips, hips - knees, knees - feet)
     whole, *parts = (np.linalg.norm(way, axis=1) for way in ways)
     straight = np.flatnonzero(whole > _STRAIGHT * np.sum(parts, axis=0))
-    if len(straight) < max(1.0, _FEWEST * len(some)):
+    lasts_s = len(straight) / len(some) * len(recording) / recording.rate_hz
+    if len(straight) < _FEWEST * len(some) or lasts_s < _SHORTEST_S:
         return None
     up = (top - feet)[straight] / whole[straight, None]
     middle = np.median(up, axis=0)
