@@ -9,13 +9,18 @@ read, as it is of classes that were renamed since, is compiled again as well; nu
 C, which take every array of every record apart: longer to compile than a short kernel itself.
 `kernel` and `inner_kernel` leave them out where many kernels call each other with large records;
 `inlined` kernels are never compiled by themselves.
+
+**Shapes that do not match.** For each assignment of an array to a part of another (``a[:3] = b``)
+numba compiles what puts both shapes into a message, with all of its text handling, again in each
+kernel that calls that one, a tenth to a fifth of all compiling. It asks who compiles for another
+message: that of our kernels names no shapes.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, TypeVar, cast
 
@@ -23,8 +28,11 @@ import numba
 import numpy as np
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
+from numba.extending import overload
+from numba.np import arrayobj
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
+_ASKED = "raise_with_shape_context"  # what numba asks in that case
 # options that numba has and its types do not name
 _NO_C: dict[str, Any] = {"no_cfunc_wrapper": True}
 _NO_PYTHON: dict[str, Any] = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
@@ -43,8 +51,10 @@ def njit(**options: Any) -> Callable[[_Kernel], _Kernel]:
 
     def compiled(function: _Kernel) -> _Kernel:
         made: Any = numba.njit(**options)(function)
-        if options.get("cache") and hasattr(made, "py_func"):  # else numba is switched off
-            made._cache = _Cache(function)
+        if hasattr(made, "py_func"):  # else numba is switched off
+            made._compiler = _Compiler(made._compiler)
+            if options.get("cache"):
+                made._cache = _Cache(function)
         return cast("_Kernel", made)
 
     return compiled
@@ -81,6 +91,43 @@ def fingerprint(function: Callable[..., Any]) -> str:
     found = hashlib.sha256()
     _add(function, found, set())
     return found.hexdigest()
+
+
+class _Compiler:
+    """Numba's compiler of a kernel, with a short message about shapes that do not match."""
+
+    def __init__(self, compiler: Any) -> None:
+        self._compiler = compiler
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._compiler, name)
+
+    def compile(self, args: Any, return_type: Any) -> Any:
+        with _short_message():
+            return self._compiler.compile(args, return_type)
+
+
+@contextmanager
+def _short_message() -> Iterator[None]:
+    usual = getattr(arrayobj, _ASKED, None)  # numba lets one thread at a time compile
+    setattr(arrayobj, _ASKED, _raise_of_shapes)
+    try:
+        yield
+    finally:
+        setattr(arrayobj, _ASKED, usual)
+
+
+def _raise_of_shapes(given: tuple[int, ...], wanted: tuple[int, ...]) -> None:
+    """Raise what an assignment between different shapes raises in a kernel."""
+    raise NotImplementedError  # what is compiled is below
+
+
+@overload(_raise_of_shapes)
+def _raise_of_shapes_compiled(given: Any, wanted: Any) -> Callable[..., None]:
+    def impl(given: Any, wanted: Any) -> None:
+        raise ValueError("cannot assign slice from input of different size")
+
+    return impl
 
 
 class _Cache(FunctionCache):

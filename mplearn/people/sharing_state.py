@@ -81,9 +81,18 @@ class SharingState(State):
                 f"node {id} must lie below one of {sorted({ROOT, *above})}, not {parent}",
             )
         require_no_cycle(parents, lambda id: f"parents[{list(parents).index(id)}]")
+        with_leaf = {(leaf.person, leaf.primitive) for leaf in self.leaves}
         for k, each in enumerate(self.provisional):
             place = f"provisional[{k}].primitive"
             require(each.primitive in primitives, place, "must be a primitive")
+            free = (each.person, each.primitive) not in with_leaf
+            require(free, place, f"must be one of which person {each.person} has no leaf")
+            last = int(each.numbers.max())
+            require(
+                last < self.n_seen,
+                f"provisional[{k}].numbers",
+                f"must be below {self.n_seen}, not {last}",
+            )
         homes = {(each.person, each.primitive) for each in self.provisional}
         require(len(homes) == len(self.provisional), "provisional", "must differ")
         for name in ("together", "apart"):

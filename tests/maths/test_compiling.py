@@ -6,7 +6,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numba
+import numpy as np
 import pytest
+
+from mplearn.maths.compiling import njit
 
 CALLER = """
 from mplearn.maths.compiling import njit
@@ -102,3 +106,22 @@ def test_a_kernel_is_compiled_again_where_a_class_of_its_arguments_was_renamed(
         assert total(pair(1.0, 2.0)) == 3.0
         hits.append(bool(total.stats.cache_hits))
     assert hits == [False, True, False, True]
+
+
+@njit()
+def _put(out: Any, values: Any) -> None:
+    out[1:] = values
+
+
+def test_shapes_that_do_not_match_are_refused_in_few_words_in_our_kernels_alone() -> None:
+    out = np.zeros(4)
+    _put(out, np.arange(3.0))
+    _put(out, np.ones(1))
+    assert out.tolist() == [0.0, 1.0, 1.0, 1.0]
+    with pytest.raises(ValueError, match="different size"):
+        _put(out, np.ones(2))
+    code = next(iter(_put.inspect_llvm().values()))
+    theirs = numba.njit(_put.py_func)
+    with pytest.raises(ValueError, match=r"shape \(3,\) from input of shape \(2,\)"):
+        theirs(out, np.ones(2))
+    assert len(code) < 0.5 * len(next(iter(theirs.inspect_llvm().values())))
