@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..files import bad_file
-from ..findings import Findings
-from .bvh_numbers import missing_or_number, split_glued
-from .kinematics import Joint
-from .skeletal import Column
+from ...files import bad_file
+from ...findings import Findings
+from ..kinematics import Joint
+from ..skeletal import Column
+from .numbers import missing_or_number, split_glued
 
 _WORD = re.compile(r"[{}]|[^\s{}]+")
 _KIND = "(rotation|rot|position|pos|translation)"

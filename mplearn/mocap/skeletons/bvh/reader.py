@@ -17,15 +17,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ...recording import FloatArray, Recording
-from ..files import bad_file, read_text
-from ..findings import Findings
-from ..placing.space import Space
-from ..reader import Hints, Reader
-from .bvh_hierarchy import parse_hierarchy
-from .bvh_motion import parse_motion
-from .kinematics import Joint
-from .skeletal import SkeletalMotion, are_radians, skeletal_recording
+from ....recording import FloatArray, Recording
+from ...files import bad_file, read_text
+from ...findings import Findings
+from ...placing.space import Space
+from ...reader import Hints, Reader
+from ..kinematics import Joint
+from ..skeletal import SkeletalMotion, are_radians, skeletal_recording
+from .hierarchy import parse_hierarchy
+from .motion import parse_motion
 
 # the format names neither: centimetres are usual, and so is y up
 _SPACE = Space(0.01, "y", "z", says_unit=False)

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from ..numbers import plain_number
+from ...numbers import plain_number
 
 _UNSIGNED = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eEdD][-+]?\d+)?"  # in one way only: no backtracking
 _NUMBER = re.compile(rf"[-+]?{_UNSIGNED}")

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ...recording import FloatArray, IntArray
-from ..files import bad_file
-from ..findings import Findings
-from ..options import option
-from .bvh_numbers import missing_or_number, split_glued
+from ....recording import FloatArray, IntArray
+from ...files import bad_file
+from ...findings import Findings
+from ...options import option
+from .numbers import missing_or_number, split_glued
 
 _HEADER = re.compile(r"\s*(frame\s*time|frames?)\s*:?\s*(?![a-z])(.*)", re.IGNORECASE)
 _STEP = re.compile(r"\s*([-+]?[\d.,]+(?:[edED][-+]?\d+)?)\s*(ms|msec|milliseconds)?", re.I)

@@ -1,0 +1,3 @@
+"""BVH: hierarchy and motion as text, in all its dialects."""
+
+from .reader import BVHReader as BVHReader
