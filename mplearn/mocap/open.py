@@ -367,12 +367,12 @@ def _read(
             part = replace(part, report=ReadReport(take.reader.format, part.rate_hz))
         if hints is not None and hints.mirrored:
             part = right_handed(file, part)
-        if hints is not None and hints.level:
-            part = leveled(part, turn_to_level(file, part))
-        else:
-            part = told_of_lean(part)
         parts.append(part)
     recording = parts[0] if len(parts) == 1 else joined(take.name, parts)
+    if hints is not None and hints.level:
+        recording = leveled(recording, turn_to_level(take.files[0], recording))
+    else:
+        recording = told_of_lean(recording)
     return recording if rate_hz is None else resample(recording, rate_hz)
 
 

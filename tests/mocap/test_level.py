@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mocap_writers import write_bvh
+from mocap_writers import write_bvh, write_ui_prmd
 from scipy.spatial.transform import Rotation
 
 from mplearn.demonstrator import demonstrate
 from mplearn.errors import RecordingError, RecordingWarning
 from mplearn.mocap import Hints, open_recording
+from mplearn.mocap.markers.ui_prmd import PLUG_IN_GAIT_MARKERS
 from mplearn.mocap.skeletons.joint_arrays import LAYOUTS
 from mplearn.recording import Recording, marker_channels
 
@@ -73,6 +74,23 @@ def test_where_nobody_stands_there_is_nothing_to_go_by(tmp_path: Path) -> None:
         open_recording(write_bvh(tmp_path / "a.bvh"), positions=True, hints=Hints(level=True))
     with pytest.raises(RecordingError, match="nobody is seen to stand straight"):
         open_recording(write_bvh(tmp_path / "a.bvh"), hints=Hints(level=True))  # angles
+
+
+def test_parts_of_a_take_are_turned_as_a_whole(tmp_path: Path, moving: Recording) -> None:
+    points = np.zeros((len(moving), len(PLUG_IN_GAIT_MARKERS), 3))
+    for k, name in enumerate(PLUG_IN_GAIT_MARKERS):
+        if name in moving.marker_names:  # others were never seen
+            points[:, k] = np.nan_to_num(moving.markers[:, moving.marker_names.index(name)])
+    tilt = Rotation.from_euler("x", 20.0, degrees=True).as_matrix()
+    for part, frames in enumerate((slice(0, 60), slice(60, 120)), start=1):
+        write_ui_prmd(tmp_path / f"m01_s01_e0{part}_positions.txt", points[frames] @ tilt.T)
+    take = open_recording(tmp_path, hints=Hints(level=True))
+    with pytest.warns(RecordingWarning, match=SAID):
+        plain = open_recording(tmp_path)
+    known = ~np.isnan(plain.markers).any(axis=2)
+    turn, off = Rotation.align_vectors(take.markers[known], plain.markers[known])
+    assert off < 1e-4
+    assert np.degrees(turn.magnitude()) == pytest.approx(20.0, abs=6.0)
 
 
 def test_an_array_seen_from_above(tmp_path: Path) -> None:
