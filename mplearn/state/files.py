@@ -130,10 +130,13 @@ class FileFormat:
             raise self.error(f"{path} is damaged: its checksum does not match its content")
         try:
             content = unpacked(header["content"], blob)
+        except StateError as error:
+            raise self.error(f"{path} {error}") from error
+        try:
             for version in range(schema, self.schema):
                 content = self.migrations[version](content)
         except StateError as error:
-            raise self.error(f"{path} {error}") from error
+            raise self.error(f"{path} cannot be brought up to date: {error}") from error
         except (ValueError, TypeError, LookupError, AttributeError) as error:
             raise self.error(f"{path} cannot be brought up to date: {error!r}") from error
         return content

@@ -10,6 +10,8 @@ import pytest
 
 import mplearn_envs
 from mplearn import PrimitiveLibrary
+from mplearn.errors import LibraryError
+from mplearn.library.content import FILES
 from mplearn.state import to_plain
 from mplearn.state.packing import packed
 
@@ -45,3 +47,12 @@ def test_what_is_read_is_written_again(path, tmp_path):
     assert header["schema"] == 1
     lean = packed(to_plain(replace(again.state(), version="")))  # as the older code wrote it
     assert lean == (header["content"], blob)
+
+
+def test_an_older_file_that_is_damaged_is_refused_with_the_place(tmp_path):
+    content = FILES.read(OLD)
+    del content["version"]
+    content["primitives"][1]["rate_hz"] = "fast"
+    replace(FILES, schema=1, migrations={}).write(tmp_path / "old.mplearn", content)
+    with pytest.raises(LibraryError, match=r"old\.mplearn cannot be .*primitives\[1\]\.rate_hz: "):
+        PrimitiveLibrary.load(tmp_path / "old.mplearn")

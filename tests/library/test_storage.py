@@ -153,7 +153,7 @@ def without(key):
 @pytest.mark.parametrize(
     ("change", "match"),
     [
-        (lambda header: header | {"schema": 2}, "newer mplearn"),
+        (lambda header: header | {"schema": FILES.schema + 1}, "newer mplearn"),
         (lambda header: header | {"schema": "x"}, "damaged"),
         (lambda header: header | {"format": "other"}, "not an mplearn library"),
         (lambda header: [1, 2], "not an mplearn library"),
