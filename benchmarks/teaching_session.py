@@ -3,7 +3,7 @@
 Four primitives are taught (both arms raise and lower, bend down and return); the teacher goes on
 when the page says that they are learned. Then their sequencing is taught. At the end tree and
 graph are those of figures 6 and 7. ``python -m benchmarks.teaching_session --out FOLDER`` writes
-pictures.
+pictures; ``--film FILE`` also a film of the page, from the first frame to the walk.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ import signal
 import subprocess
 import sys
 import time
+from base64 import b64decode
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -272,6 +273,56 @@ def session(
         return found
 
 
+class Film:
+    """What a page shows, as a film: a picture at each moment of an even clock.
+
+    Args:
+        path: The file, .mp4.
+        fps: Pictures per second [1/s].
+    """
+
+    def __init__(self, path: Path, fps: float = 12.0) -> None:
+        self.path, self.fps = path, fps
+        self._pictures: list[tuple[float, bytes]] = []
+
+    def begin(self, page: Any) -> None:
+        """Take each picture that the browser draws of a page, from now on."""
+        cast = page.context.new_cdp_session(page)
+
+        def take(drawn: dict[str, Any]) -> None:
+            self._pictures.append((drawn["metadata"]["timestamp"], b64decode(drawn["data"])))
+            with suppress(Exception):  # of playwright: the page may be closed by now
+                cast.send("Page.screencastFrameAck", {"sessionId": drawn["sessionId"]})
+
+        cast.on("Page.screencastFrame", take)
+        cast.send("Page.startScreencast", {"format": "jpeg", "quality": 92})
+
+    def write(self) -> float:
+        """Write the film, from the first picture that shows something; return its length [s]."""
+        import imageio_ffmpeg
+
+        def shown(data: bytes) -> Image.Image:
+            return Image.open(BytesIO(data)).convert("RGB")
+
+        drawn = (shown(data).getextrema() for _, data in self._pictures)
+        first = next(k for k, bands in enumerate(drawn) if any(low < high for low, high in bands))
+        times = np.array([at for at, _ in self._pictures[first:]]) - self._pictures[first][0]
+        writer = imageio_ffmpeg.write_frames(
+            str(self.path),
+            shown(self._pictures[first][1]).size,
+            fps=self.fps,
+            quality=None,
+            macro_block_size=2,
+            output_params=["-crf", "30", "-preset", "veryfast", "-movflags", "+faststart"],
+        )
+        writer.send(None)
+        for at in np.arange(0.0, times[-1], 1.0 / self.fps):
+            _, data = self._pictures[first + int(np.searchsorted(times, at, "right")) - 1]
+            writer.send(np.asarray(shown(data)).tobytes())
+        writer.close()
+        return float(times[-1])
+
+
 def main() -> None:
     """Replay the experiment and write pictures."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -280,7 +331,9 @@ def main() -> None:
     parser.add_argument("--width", type=int, default=1280)
     parser.add_argument("--height", type=int, default=720)
     parser.add_argument("--theme", choices=["light", "dark"], default="light")
+    parser.add_argument("--film", type=Path, help="film to write, .mp4")
     args = parser.parse_args()
+    film = None if args.film is None else Film(args.film)
     args.out.mkdir(parents=True, exist_ok=True)
 
     def picture(page: Any, name: str) -> None:
@@ -308,8 +361,11 @@ def main() -> None:
             picture=picture,
             size=(args.width, args.height),
             theme=args.theme,
+            begin=(lambda page: None) if film is None else film.begin,
             end=end,
         )
+    if film is not None:
+        print(f"film of {film.write():.0f} s: {args.film}")
     for key, value in found.items():
         print(f"{key}: {value}")
 

@@ -320,6 +320,19 @@ def test_interrupted_there_is_no_traceback(library_file):
         assert err == "mplearn: interrupted\n"
 
 
+def test_interrupted_while_it_is_loaded_there_is_no_traceback():
+    program = (
+        "import os, signal, sys\nfrom mplearn_agents.__main__ import main\n"
+        "class Finder:\n"
+        "    def find_spec(name, path, target=None):\n"
+        "        if name == 'mplearn_agents.cli':\n"
+        "            print('loading', flush=True), os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Finder)\nmain()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "loading\n", "")
+
+
 def test_streams_are_put_back():
     before = sys.stdout, sys.stderr
     with inert_output():

@@ -25,7 +25,7 @@ from mplearn.learner import (
 from mplearn.recording import Segment
 from mplearn.tree import Placement
 
-from .messages import Header
+from .messages import Header, mention
 
 
 def tell(events: Iterable[Event], rate_hz: float) -> Iterator[Header]:
@@ -87,9 +87,9 @@ def _why(placement: Placement) -> str:
         why = "nothing is known to compare it with"
     elif placement.ratio > 1.0:
         times = f"{max(placement.ratio, 1.01):.{2 if placement.ratio < 1.1 else 1}f}"
-        why = f"nearest is {{{placement.nearest}}}, {times} times as far as allowed"
+        why = f"nearest is {mention(placement.nearest)}, {times} times as far as allowed"
     else:
-        why = f"it is near {{{placement.nearest}}}, but not surely of it"
+        why = f"it is near {mention(placement.nearest)}, but not surely of it"
     return why + ("; it came before, and waits" if placement.like is not None else "")
 
 
@@ -103,16 +103,16 @@ def _said(event: Event, rate_hz: float) -> tuple[str, str, int | None] | None:
                 return "rejected", f"not recognised: {_why(placement)}", placement.nearest
         case PrimitiveBorn(_, id, n, provisional):
             sure = "" if provisional else ", and is sure"
-            return "born", f"new: {{{id}}}, from {n} demonstrations{sure}", id
+            return "born", f"new: {mention(id)}, from {n} demonstrations{sure}", id
         case PrimitiveConfirmed(_, id, n):
-            return "learned", f"learned: {{{id}}}, shown {n} times", id
+            return "learned", f"learned: {mention(id)}, shown {n} times", id
         case PrimitiveForgotten(_, id):
-            return "gone", f"forgotten: {{{id}}} never came again", id
+            return "gone", f"forgotten: {mention(id)} never came again", id
         case PrimitiveMerged(_, id, absorbed):
-            return "merged", f"{{{absorbed}}} turned out to be {{{id}}}", id
+            return "merged", f"{mention(absorbed)} turned out to be {mention(id)}", id
         case PrimitiveSplit(_, id, into):
-            parts = " and ".join(f"{{{each}}}" for each in into)
-            return "split", f"{{{id}}} turned out to be {parts}", into[0] if into else None
+            parts = " and ".join(mention(each) for each in into)
+            return "split", f"{mention(id)} turned out to be {parts}", into[0] if into else None
         case PersonChanged(_, person, new):
             return "person", f"person {person + 1} " + ("is new here" if new else "is back"), None
         case FramesLost(start, end, reason):

@@ -102,7 +102,11 @@ class Hub:
         self._n_rows = 0
         self._person, self._robot_pose = _NO_POSE, _NO_POSE
         self._learner = Worker("learner", watch, (settings,), self.hear, self._learner_ended)
-        self._robot = Worker("robot", perform, (), self.hear, self._robot_ended) if robot else None
+        self._robot = (
+            Worker("robot", perform, (), self.hear, self._robot_ended, grace_s=0.2)  # keeps nothing
+            if robot
+            else None
+        )
         self._state = {"learner": "starting", "robot": "starting" if robot else "none"}
 
     @property

@@ -43,6 +43,20 @@ def as_text(header: Mapping[str, Any]) -> str:
     return json.dumps(header, separators=(",", ":"), allow_nan=False)
 
 
+def mention(id: int | None) -> str:
+    """Return what stands in a text for a primitive's name, whatever that is when it is shown."""
+    return f"{{{id}}}"
+
+
+def literal(text: object) -> str:
+    """Return a text as part of another, where none of it stands for a primitive.
+
+    >>> literal("{1} is a name"), mention(1)
+    ('{{1} is a name', '{1}')
+    """
+    return str(text).replace("{", "{{")
+
+
 def tick(person: Poses, robot: Poses, first: int, rows: Poses) -> bytes:
     """Return what a page needs at every tick.
 

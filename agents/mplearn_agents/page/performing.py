@@ -19,7 +19,7 @@ from mplearn_envs.robot import humanoid
 
 from .figures import shapes_of
 from .happenings import happening
-from .messages import Header, Poses, number, unpack
+from .messages import Header, Poses, literal, mention, number, unpack
 from .outbox import Outbox
 from .robot import SHOWN_HZ, SPEED, PageRobot, Performed, pose_of
 from .shelf import Receiver
@@ -60,7 +60,7 @@ class Stage:
         self._robot = PageRobot(body)
         self._asked: deque[int] = deque()
         self._steps_left = 0  # of a walk
-        self._paths: list[tuple[Future[list[int]], Header]] = []  # that are looked for
+        self._paths: list[tuple[int, Future[list[int]], Header]] = []  # that are looked for
         self._next: Performed | None = None
         self._playing: Performed | None = None
         self._frame = 0
@@ -103,7 +103,7 @@ class Stage:
             if text:
                 self._outbox.post(reply | {"ok": True, "text": text})
         except MPLearnError as error:
-            self._outbox.post(reply | {"ok": False, "text": str(error)})
+            self._outbox.post(reply | {"ok": False, "text": literal(error)})
         self._status_at = 0.0
 
     def _do(self, asked: Header, reply: Header) -> str:
@@ -124,7 +124,7 @@ class Stage:
             case "perform":
                 id = library[number(asked, "id")].id
                 self._queue([id])
-                return f"the robot performs {{{id}}}"
+                return f"the robot performs {mention(id)}"
             case "walk":
                 length = number(asked, "length")
                 if not 1 <= length <= MOST_ASKED:
@@ -133,7 +133,7 @@ class Stage:
                 return f"the robot walks {length} steps"
             case "path":
                 goal = library[number(asked, "id")].id
-                self._paths.append((self._robot.path(goal), reply))
+                self._paths.append((goal, self._robot.path(goal), reply))
                 return ""
             case other:
                 raise InvalidValueError(f"nobody knows how to {other[:40]!r}")
@@ -170,15 +170,16 @@ class Stage:
 
     def _take_paths(self) -> None:
         """Let the robot go where a way was found, and say so."""
-        while self._paths and self._paths[0][0].done():
-            found, reply = self._paths.pop(0)
+        while self._paths and self._paths[0][1].done():
+            goal, found, reply = self._paths.pop(0)
             try:
                 path = found.result()
             except MPLearnError as error:
-                self._outbox.post(reply | {"ok": False, "text": str(error)})
+                text = f"{mention(goal)}: {literal(error)}"
+                self._outbox.post(reply | {"ok": False, "text": text})
                 continue
             self._queue(path)
-            text = "the robot goes " + " → ".join(f"{{{id}}}" for id in path)
+            text = "the robot goes " + " → ".join(mention(id) for id in path)
             self._outbox.post(reply | {"ok": True, "text": text})
 
     def _pose(self, pose: Poses) -> None:
@@ -190,8 +191,8 @@ class Stage:
             return
         self._next = None
         if performed.problem:
-            what = "walk on" if performed.id is None else f"perform {{{performed.id}}}"
-            text = f"the robot cannot {what}: {performed.problem}"
+            what = "walk on" if performed.id is None else f"perform {mention(performed.id)}"
+            text = f"the robot cannot {what}: {literal(performed.problem)}"
             self._outbox.post(happening("robot", text, 0.0, performed.id))
             self._queue([], 0 if performed.id is None else self._steps_left)
             return
@@ -203,7 +204,7 @@ class Stage:
         self._playing = None
         self._status_at = 0.0
         if performed.fallen:
-            text = f"the robot fell at {{{performed.id}}}; it stands up"
+            text = f"the robot fell at {mention(performed.id)}; it stands up"
             self._outbox.post(happening("robot", text, 0.0))
             self._queue([])
             self._next = None  # it was simulated from where the robot lay

@@ -208,7 +208,7 @@ class PageRobot:
             except NoPathError:
                 continue
         if not paths:
-            raise NoPathError(f"no way leads to {{{goal}}} from where the robot stands")
+            raise NoPathError("no way leads there from where the robot stands")
         return min(paths, key=len)
 
     def _known(self) -> Performer:

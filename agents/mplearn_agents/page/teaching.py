@@ -22,7 +22,7 @@ from mplearn.store import (
     Unfreeze,
 )
 
-from .messages import Header
+from .messages import Header, literal, mention
 
 LONGEST_NAME, LONGEST_NOTE = 80, 1000
 
@@ -55,11 +55,11 @@ def in_words(command: Command, lifelong: LifelongLearner) -> str:
     library = lifelong.snapshot()
 
     def name(id: int) -> str:
-        return library[id].name if id in library else f"P{id}"
+        return literal(library[id].name) if id in library else f"P{id}"
 
     match command:
         case Rename(id, new):
-            return f"{name(id)} is called {new} now"
+            return f"{name(id)} is called {literal(new)} now"
         case Merge(first, second):
             return f"{name(first)} and {name(second)} are one"
         case Split(id):
@@ -71,9 +71,9 @@ def in_words(command: Command, lifelong: LifelongLearner) -> str:
         case Unfreeze(id):
             return f"{name(id)} may change again"
         case Note(text, None):
-            return f"note: {text}"
+            return f"note: {literal(text)}"
         case Note(text, int(id)):
-            return f"note on {name(id)}: {text}"
+            return f"note on {name(id)}: {literal(text)}"
         case Pause():
             return "learning is paused"
         case Resume():
@@ -92,7 +92,7 @@ def history(lifelong: LifelongLearner, asked: Mapping[str, Any]) -> list[Header]
     lines: list[Header] = []
     for each in lifelong.history(_id(asked)):
         entry = None if each.entry is None else entries.get(each.entry)
-        others = " and ".join(f"{{{id}}}" for id in each.others)
+        others = " and ".join(mention(id) for id in each.others)
         match each.what:
             case "command" if entry is not None:
                 undone = " (undone)" if entry.undone else ""

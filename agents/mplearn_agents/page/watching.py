@@ -29,7 +29,7 @@ from mplearn_agents.learning.pauses import short_pauses
 from .figures import CLIP_HZ, motions_of
 from .happenings import happening, tell
 from .knowledge import knowledge
-from .messages import Header, clip, number, unpack
+from .messages import Header, clip, literal, mention, number, unpack
 from .outbox import Message, Outbox
 from .shelf import Sender
 from .teaching import do, history
@@ -67,7 +67,7 @@ def watch(settings: Watch, connection: Connection) -> None:
     try:
         Watcher(settings, connection, outbox).run()
     except MPLearnError as error:
-        outbox.post({"kind": "failed", "text": str(error)})
+        outbox.post({"kind": "failed", "text": literal(error)})
     finally:
         outbox.close()
 
@@ -186,7 +186,7 @@ class Watcher:
                 self._end()
             case "broken":
                 self._state = "broken"
-                self._happened("source", f"the source broke: {item}")
+                self._happened("source", literal(f"the source broke: {item}"))
         now = time.monotonic()
         if now - self._told_at > KNOWLEDGE_S:
             self._told_at = now
@@ -207,7 +207,7 @@ class Watcher:
         except MPLearnError as error:
             if self._figure is None:
                 raise
-            self._happened("source", f"{len(block)} frames were not learned: {error}")
+            self._happened("source", literal(f"{len(block)} frames were not learned: {error}"))
 
     def _learn(self, block: Block) -> None:
         if self._figure is None:
@@ -269,12 +269,12 @@ class Watcher:
         """Tell teachers of what would be printed where nobody looks."""
         if issubclass(category, StoreWarning | RecordingWarning):
             what = "store" if issubclass(category, StoreWarning) else "source"
-            self._happened(what, str(message))
+            self._happened(what, literal(message))
 
     def _changed(self, change: Change) -> None:
         if change.kind in ("connected", "disconnected"):
             self._state = "live" if change.kind == "connected" else "disconnected"
-        self._happened("source", change.text)
+        self._happened("source", literal(change.text))
 
     def _end(self) -> None:
         self._state = "ended"
@@ -408,7 +408,7 @@ class Watcher:
                 reply["text"] = self._do(asked)
             self._outbox.post(reply | {"ok": True})
         except MPLearnError as error:
-            self._outbox.post(reply | {"ok": False, "text": str(error)})
+            self._outbox.post(reply | {"ok": False, "text": literal(error)})
         self._told_at = 0.0
 
     def _do(self, asked: Header) -> str:
@@ -431,7 +431,7 @@ class Watcher:
         id = number(asked, "id")
         blob = clip(number(asked, "ref"), CLIP_HZ, motions_of(self._library, id))
         self._outbox.post({"kind": "clip", "client": asked.get("client")}, blob)
-        return f"{{{id}}}"
+        return mention(id)
 
     def _known(self) -> LifelongLearner:
         if self._lifelong is None:

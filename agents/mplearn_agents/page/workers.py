@@ -14,7 +14,6 @@ from .messages import Header, unpack
 from .outbox import Outbox
 
 SOONEST_S, LATEST_S = 0.5, 10.0  # pause before a process is started again
-_GRACE_S = 5.0
 
 Hear = Callable[[Header, bytes], None]
 
@@ -28,6 +27,7 @@ class Worker:
         arguments: See there.
         hear: Called in the event loop with each message.
         ended: Called in the event loop when the process has ended, with the reason.
+        grace_s: How long it may go on with what it does when all end [s].
     """
 
     def __init__(
@@ -37,8 +37,10 @@ class Worker:
         arguments: tuple[Any, ...],
         hear: Hear,
         ended: Callable[[str], None],
+        grace_s: float = 5.0,
     ) -> None:
         self.name = name
+        self._grace_s = grace_s
         self._target, self._arguments = target, arguments
         self._hear, self._ended = hear, ended
         self._pause_s = SOONEST_S
@@ -90,7 +92,7 @@ class Worker:
             return
         outbox.post({"kind": "end", "do": "end"})
         await asyncio.to_thread(outbox.close)
-        await asyncio.to_thread(process.join, _GRACE_S)
+        await asyncio.to_thread(process.join, self._grace_s)
         if process.is_alive():
             process.kill()
             await asyncio.to_thread(process.join)

@@ -153,7 +153,7 @@ def test_experiment_4_1_of_the_paper(chromium):
 
 def test_a_learner_that_was_killed_goes_on_and_all_end_together(new_page, tmp_path):
     store = ("--store", str(tmp_path / "life.db"))
-    with live("demonstrator:3", "--speed", "4", "--no-robot", *store) as (url, process):
+    with live("demonstrator:3", "--speed", "16", "--no-robot", *store) as (url, process):
         page = known(new_page(url), 3)
         state, id = page.locator("#state"), rows(page).first.get_attribute("data-id")
         rows(page).first.click()

@@ -149,6 +149,30 @@ def test_names_are_text_never_markup(server, new_page):
     assert page.locator("img, script:not([src]), main b, iframe").count() == 0
 
 
+def test_names_in_braces_stand_for_no_primitive(server, new_page):
+    server.hear(world.stream())
+    server.hear(world.knowledge(2, ["{2}", "wave"]))
+    page = new_page(server.url)
+    until(lambda: rows(page).count() == 2, 10)
+    text = f"{messages.mention(2)} is called {messages.literal('{1} {{2}} {x}')} now"
+    server.hear({"kind": "event", "what": "command", "text": text, "time_s": 1.0})
+    first = page.locator("#log li").first
+    until(lambda: "is called" in first.text_content(), 5)
+    assert first.locator("span").text_content() == "wave is called {1} {{2}} {x} now"
+
+
+def test_a_search_that_is_left_hides_nothing(server, new_page):
+    server.hear(world.knowledge(12))
+    page = new_page(server.url)
+    until(lambda: rows(page).count() == 12, 10)
+    page.keyboard.press("/")
+    page.keyboard.insert_text("nobody")
+    until(lambda: rows(page).count() == 0, 5)
+    page.keyboard.press("Escape")
+    until(lambda: rows(page).count() == 12, 5)
+    assert page.input_value("#search") == ""
+
+
 def test_it_says_what_is_present_next_and_rejected(server, new_page):
     server.hear(world.stream())
     server.hear(world.knowledge(5, ["bow down", "bow up", "squat", "kick", "wave"]))

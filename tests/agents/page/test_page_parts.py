@@ -215,6 +215,11 @@ def test_each_request_is_a_command_and_can_be_undone(taught):
     assert not life.learner.paused
     lines = teaching.history(life, {"id": a})
     assert any("Anna" in line["text"] and "undone" in line["text"] for line in lines)
+    said = teaching.do(life, {"do": "rename", "id": a, "name": "{7}"}, "Anna")
+    assert said.endswith("is called {{7} now")  # which stands for no primitive
+    assert (
+        teaching.do(life, {"do": "undo"}, "Anna") == f"undone: {before[1][0]} is called {{{{7}} now"
+    )
 
 
 @pytest.mark.parametrize(

@@ -231,12 +231,18 @@ const does = {
   help: () => find("#keys").showModal(),
 };
 for (const [id, act] of Object.entries(does)) find(`#${id}`).addEventListener("click", act);
-search.addEventListener("input", () => { tree.search(search.value); mark(); });
+search.addEventListener("input", () => searched(search.value));
 search.addEventListener("keydown", (e) => {
   if (e.key !== "Enter") return;
   const first = matches()?.values().next().value;
   if (first !== undefined) choose(first);
 });
+
+function searched(text) {
+  if (search.value !== text) search.value = text;
+  tree.search(text);
+  mark();
+}
 
 const KEYS = [
   ["/", "search a primitive", () => { search.focus(); search.select(); }],
@@ -263,7 +269,7 @@ for (const [key, text] of KEYS) {
 }
 addEventListener("keydown", (e) => {
   const typing = e.target.closest?.("input, textarea");
-  if (e.key === "Escape" && typing) { typing.blur(); return; }
+  if (e.key === "Escape" && typing) { typing.blur(); if (typing === search) searched(""); return; }
   if (typing || find("#keys").open) return;
   if ((e.ctrlKey || e.metaKey) && e.key.toLowerCase() === "z") { (e.shiftKey ? does.redo : does.undo)(); e.preventDefault(); return; }
   if (e.ctrlKey || e.metaKey || e.altKey) return;

@@ -84,7 +84,8 @@ export class Side {
     for (const item of this.log.children) set(item.lastElementChild, this.text(item.dataset.text));
   }
 
-  text(text) { return text.replace(/\{(\d+)\}/g, (_, id) => this.label(Number(id))); }
+  // A text with the names of primitives in it; two braces are one that stands for none.
+  text(text) { return text.replace(/\{\{|\{(\d+)\}/g, (_, id) => (id === undefined ? "{" : this.label(Number(id)))); }
 }
 
 export function set(node, text) { if (node.textContent !== text) node.textContent = text; }
