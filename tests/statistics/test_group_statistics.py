@@ -2,6 +2,7 @@
 
 import math
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -196,3 +197,37 @@ def test_each_has_its_plot() -> None:
     assert len(plot_transitions(transitions(table), groups).axes) == 3  # two matrices, one scale
     reference = SegmentTable(table[:200])
     assert plot_quality({"all": quality(table, reference)}).axes
+
+
+@pytest.mark.parametrize("n", [3, 90])
+def test_plots_are_legible_whatever_primitives_are_called_and_however_many(
+    n: int, tmp_path: Path
+) -> None:
+    rng, units = np.random.default_rng(0), ("anna", "ben", "cleo")
+    names = ("$\\frac{", "a" * 80, *(f"P{k}" for k in range(n - 2)))
+    groups = {"anna": "usual", "ben": "usual", "cleo": "$slow_{"}
+    values = rng.uniform(1.0, 2.0, (3, n))
+    values[:, 1] = np.nan
+    figure = plot_measure(Measure("duration [s]", units, names, values), groups)
+    figure.savefig(tmp_path / "measure.png", dpi=40)
+    width, height = figure.get_size_inches()
+    assert width <= 17.0 and height <= 40.0
+    shown = [text.get_text() for axes in figure.axes for text in axes.get_xticklabels()]
+    assert shown == ["$\\frac{", "a" * 21 + "…", *names[2:]]
+    assert len({axes.get_ylim() for axes in figure.axes}) == 1  # comparable
+    dots = [line.get_ydata() for axes in figure.axes for line in axes.lines]
+    found = np.sort(np.concatenate([np.asarray(each, float) for each in dots]))
+    np.testing.assert_array_equal(found, np.sort(values[np.isfinite(values)]))
+
+    counts = rng.integers(0, 3, (3, n, n)) + np.eye(n)
+    figure = plot_transitions(Transitions(units, names, counts), groups)
+    figure.savefig(tmp_path / "transitions.png", dpi=40)
+    for axes, chosen in zip(figure.axes, ([2], [0, 1]), strict=False):
+        size = axes.get_window_extent().transformed(figure.dpi_scale_trans.inverted())
+        label = axes.get_yticklabels()[0]
+        assert label.get_fontsize() / 72.0 < size.height / n  # none covers the next
+        drawn = axes.images[0].get_array()
+        share = counts[chosen].sum(axis=0)
+        share /= share.sum(axis=1, keepdims=True)
+        np.testing.assert_allclose(np.ma.filled(drawn, 0.0), share)
+    assert label.get_fontsize() > 5.0
