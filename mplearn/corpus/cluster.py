@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, TypeVar
@@ -13,6 +14,7 @@ from ..extras import require
 T = TypeVar("T")
 
 _RETRIES = 3  # of a task whose machine or process is lost
+_TRACEBACK = re.compile(r"Traceback \(most recent call last\):\n(?:[ \t].*\n)*")
 
 
 class RayTasks:
@@ -55,13 +57,13 @@ class RayTasks:
 
 
 def _story(error: BaseException | None) -> str:
-    """Return what an error says, and what it was raised from, once each.
+    """Return what an error says, and what it was raised from, once each, without tracebacks.
 
     Ray names what it misses, a token (``RAY_AUTH_MODE``) for instance, in either.
     """
     told: list[str] = []
     while error is not None:
-        text = " ".join(str(error).split()) or type(error).__name__
+        text = " ".join(_TRACEBACK.sub("", str(error)).split()) or type(error).__name__
         if not any(text in other for other in told):
             told.append(text)
         error = error.__cause__ or (None if error.__suppress_context__ else error.__context__)

@@ -169,13 +169,17 @@ def test_the_cause_that_ray_gives_is_named(monkeypatch: pytest.MonkeyPatch, addr
         def init(self, **_: object) -> None:
             raise self.error from self.cause
 
-    token = RayError("RAY_AUTH_MODE=token,\n  but no token was found")
+    token = RayError(
+        'Last: Traceback (most recent call last):\n  File "x.py", line 1, in f\n    g(\n    ^^\n'
+        "AuthenticationError: RAY_AUTH_MODE=token,\n  but no token was found"
+    )
     for error, cause in ((token, None), (RuntimeError(""), token), (ConnectionError("x"), token)):
         ray = Ray(error, cause)
         monkeypatch.setattr("mplearn.corpus.cluster.require", lambda *_, ray=ray: ray)
         with pytest.raises(CorpusError, match="RAY_AUTH_MODE=token, but no token was found") as e:
             RayTasks(address)
         assert ("at 'head:6379'" if address else "does not start here") in str(e.value)
+        assert "Traceback" not in str(e.value) and "x.py" not in str(e.value)
 
 
 def _writer_of(into: Path) -> int:
