@@ -12,7 +12,7 @@ from mplearn.errors import MPLearnError
 
 from . import messages
 from .happenings import happening
-from .messages import Header, Poses, as_text
+from .messages import Header, Poses, as_text, literal
 from .performing import perform
 from .teaching import COMMANDS
 from .watching import Watch, watch
@@ -176,7 +176,7 @@ class Hub:
             else:
                 raise MPLearnError(f"nobody knows how to {what[:40]!r}")
         except MPLearnError as error:
-            reply = {"kind": "reply", "ref": asked.get("ref"), "ok": False, "text": str(error)}
+            reply = {"kind": "reply", "ref": asked.get("ref"), "ok": False, "text": literal(error)}
             client.tell(as_text(reply))
 
     # ---- processes
@@ -247,7 +247,7 @@ class Hub:
         """Take note that the source cannot be opened: at the beginning that is the end."""
         if "stream" not in self._latest and not self.failed.done():
             self.failed.set_result(text)
-        self._happened(happening("source", text, 0.0))
+        self._happened(happening("source", literal(text), 0.0))
 
     def _has_begun(self) -> None:
         if not self.begun.done():

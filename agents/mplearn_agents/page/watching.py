@@ -67,7 +67,7 @@ def watch(settings: Watch, connection: Connection) -> None:
     try:
         Watcher(settings, connection, outbox).run()
     except MPLearnError as error:
-        outbox.post({"kind": "failed", "text": literal(error)})
+        outbox.post({"kind": "failed", "text": str(error)})
     finally:
         outbox.close()
 

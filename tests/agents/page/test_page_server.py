@@ -243,7 +243,7 @@ def test_with_a_token_only_who_knows_it_looks_on():
     [
         (["--port", "99999"], "65535"),
         (["--host", "203.0.113.7", "--port", "0"], "cannot listen"),
-        (["recording:/no/such/file.bvh", "--port", "0"], "file.bvh"),
+        (["recording:/no/such/file{1}.bvh", "--port", "0"], "file{1}.bvh"),
     ],
 )
 def test_what_cannot_be_is_refused_in_a_line(options, why, capsys):
