@@ -21,6 +21,9 @@ class EdgeTable:
     def __init__(self) -> None:
         self._rows = np.zeros((16, 5), dtype=np.int64)
         self._row_of: dict[tuple[int, int], int] = {}
+        self._into: dict[int, int] = {}  # counts by target
+        self._from: dict[int, tuple[int, int]] = {}  # counts, and targets, by source
+        self._n_taken = 0
 
     def __len__(self) -> int:
         """Number of edges."""
@@ -66,6 +69,18 @@ class EdgeTable:
         row = self._row_of.get((source, target))
         return 0 if row is None else int(self._rows[row, _COUNT])
 
+    def tally(self, context: tuple[int, ...], target: int) -> tuple[int, int, int]:
+        """How often a target, any target, and how many of them followed a source, or whatever.
+
+        Args:
+            context: The source; empty for all sources together.
+            target: Where the edge ends.
+        """
+        if not context:
+            return self._into.get(target, 0), self._n_taken, len(self._into)
+        (source,) = context
+        return self.count(source, target), *self._from.get(source, (0, 0))
+
     def time_s(self, source: int, target: int | None = None) -> tuple[float, float]:
         """Mean and standard deviation of an edge's duration [s]; NaN where it was never taken.
 
@@ -106,6 +121,8 @@ class EdgeTable:
         """Return an independent copy."""
         twin = EdgeTable()
         twin._rows, twin._row_of = self._rows.copy(), dict(self._row_of)
+        twin._into, twin._from = dict(self._into), dict(self._from)
+        twin._n_taken = self._n_taken
         return twin
 
     def without(self, gone: BoolArray) -> EdgeTable:
@@ -124,7 +141,11 @@ class EdgeTable:
         return table
 
     def _add(self, edge: tuple[int, int], amounts: IntArray) -> None:
-        row = self._row_of.get(edge)
+        row, n = self._row_of.get(edge), int(amounts[0])
+        n_taken, n_targets = self._from.get(edge[0], (0, 0))
+        self._from[edge[0]] = n_taken + n, n_targets + (row is None)
+        self._into[edge[1]] = self._into.get(edge[1], 0) + n
+        self._n_taken += n
         if row is None:
             row = len(self._row_of)
             if row == len(self._rows):

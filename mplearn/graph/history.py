@@ -32,6 +32,11 @@ class HistoryTable:
         """Return what followed a context, and how often; empty where it was never seen."""
         return self._followers.get(context, {})
 
+    def tally(self, context: tuple[int, ...], next_id: int) -> tuple[int, int, int]:
+        """How often a primitive, any primitive, and how many of them followed a context."""
+        followers = self.followers(context)
+        return followers.get(next_id, 0), sum(followers.values()), len(followers)
+
     def observe(self, history: Sequence[int], next_id: int) -> None:
         """Count ``next_id`` after every context that ``history`` (oldest first) ends with."""
         for length in range(2, min(self.order, len(history)) + 1):

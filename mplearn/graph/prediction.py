@@ -70,6 +70,9 @@ class Counts(Followers, Protocol):
     def ids(self) -> tuple[int, ...]:
         """The nodes."""
 
+    def tally(self, context: tuple[int, ...], next_id: int) -> tuple[int, int, int]:
+        """How often a primitive, any primitive, and how many of them followed a context."""
+
     def edge_rows(self) -> IntArray:
         """Return the edges, shape (E, 5): source, target, count, total [ms], squares [ms^2]."""
 
@@ -128,10 +131,19 @@ def surprise(counts: Counts, sequence: History) -> FloatArray:
     NaN too where nothing is known of what came before x_t: that is no order.
     """
     scores = np.full(max(len(sequence) - 1, 0), np.nan)
-    known = {context: i for i, context in enumerate(counts.ids)}
     for t, next_id in enumerate(sequence[1:], start=1):
         context = usable_context(sequence[:t], counts.order)
         if next_id is not None and context:
-            p = backed_off(counts, context, counts.concentration)
-            scores[t - 1] = -math.log(p[known[next_id]])
+            scores[t - 1] = -math.log(_backed_off_to(next_id, counts, context))
     return scores
+
+
+def _backed_off_to(next_id: int, counts: Counts, context: tuple[int, ...]) -> float:
+    """Return what `backed_off` says of one node, whatever else there is."""
+    p = 1.0 / len(counts)
+    for length in range(len(context) + 1):
+        n, n_all, n_kinds = counts.tally(context[len(context) - length :], next_id)
+        if n_all:
+            weight = counts.concentration * n_kinds
+            p = (n + weight * p) / (n_all + weight)
+    return p

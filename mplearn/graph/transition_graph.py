@@ -556,6 +556,11 @@ class TransitionGraph:
                 row[self._index[next_id]] = n
         return row
 
+    def tally(self, context: tuple[int, ...], next_id: int) -> tuple[int, int, int]:
+        """How often a primitive, any primitive, and how many of them followed a context."""
+        table = self._edges if len(context) < 2 else self._histories
+        return table.tally(context, next_id)
+
     def _rename(self, new_id: dict[int, int]) -> None:
         self._before_change()
         self._edges = self._edges.renamed(new_id)
