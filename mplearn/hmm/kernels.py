@@ -109,11 +109,13 @@ def log_likelihood(
     alpha = np.full(n_states, -np.inf)
     alpha[0] = densities[0, 0]
     for t in range(1, n_frames):
-        for n in range(min(t, n_states - 1), 0, -1):
+        least = max(n_states - n_frames + t, 0) if complete else 0  # from below no end is reached
+        for n in range(min(t, n_states - 1), max(least - 1, 0), -1):
             alpha[n] = densities[n, t] + log_add(
                 alpha[n] + log_stay[n], alpha[n - 1] + log_next[n - 1]
             )
-        alpha[0] += log_stay[0] + densities[0, t]
+        if least == 0:
+            alpha[0] += log_stay[0] + densities[0, t]
     if complete:
         return float(alpha[n_states - 1])
     total = -np.inf

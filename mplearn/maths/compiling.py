@@ -28,6 +28,7 @@ import numba
 import numpy as np
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
+from numba.core.extending import _Intrinsic
 from numba.extending import overload
 from numba.np import arrayobj
 
@@ -163,6 +164,8 @@ def _add(value: Any, found: Any, seen: set[int]) -> None:
     if isinstance(value, Dispatcher):
         found.update(repr(sorted(value.targetoptions.items())).encode())
         value = value.py_func
+    if isinstance(value, _Intrinsic):
+        value = value._defn
     if isinstance(value, FunctionType):
         if id(value) not in seen:
             seen.add(id(value))

@@ -219,19 +219,22 @@ def _join_leaves(parts: Sequence[_Part], both: Collection[int]) -> None:
     for leaf in sharing.leaves:
         if leaf.person in both:
             sharing.look_again(leaf)
+    come: dict[Key, tuple[_Part, Leaf]] = {}
     for part in parts[1:]:
         for leaf in part.sharing.leaves:
-            key = part.new_key[leaf.key]
-            if key not in known:
-                known.add(key)
-                shape = None if key[0] in both else part.sharing.table[leaf.slot]
-                new = sharing.new_leaf(*key, shape)
-                new.id, new.primitive = leaf.id + part.ids, leaf.primitive + part.ids
-                new.founded = leaf.founded + part.ids if leaf.founded != ROOT else ROOT
-    for person in both:
-        for local in sharing.trees[person].leaves:
-            if (person, local) not in known:
-                sharing.new_leaf(person, local)
+            come.setdefault(part.new_key[leaf.key], (part, leaf))
+    come = {key: of for key, of in come.items() if key not in known}
+    shapes = [
+        None if key[0] in both else part.sharing.table[leaf.slot]
+        for key, (part, leaf) in come.items()
+    ]
+    leaves = sharing.new_leaves(list(zip(come, shapes, strict=True)))
+    for new, (part, leaf) in zip(leaves, come.values(), strict=True):
+        new.id, new.primitive = leaf.id + part.ids, leaf.primitive + part.ids
+        new.founded = leaf.founded + part.ids if leaf.founded != ROOT else ROOT
+    own = [(person, local) for person in both for local in sharing.trees[person].leaves]
+    found = known | come.keys()
+    sharing.new_leaves([(key, None) for key in own if key not in found])
 
 
 def _regrouped(

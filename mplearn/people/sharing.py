@@ -10,7 +10,7 @@ import numpy as np
 from ..recording import BoolArray, FloatArray, IntArray
 from ..tree import ROOT, Change, Merge, MirrorMap, Node, Placement, PrimitiveTree, Split, TreeConfig
 from .config import PeopleConfig
-from .constraints import Constraints
+from .constraints import Constraints, Key
 from .identities import executions_held, identities, recognised_as, split_into
 from .leaf import Leaf
 from .matching import Known, solve, tension
@@ -74,15 +74,12 @@ class Sharing:
         for person, tree in trees.items():
             self.n_seen = tree.n_seen
             self.numbers[person] = {n: n for node in tree.nodes for n in node.members}
-            for node in tree.nodes:
-                if node.id == ROOT:
-                    continue
-                self.parents[node.id] = node.parent or ROOT
-                if node.is_leaf:
-                    leaf = self.new_leaf(person, node.id)
-                    leaf.id = leaf.primitive = leaf.founded = node.id
-                else:
-                    self.above[node.id] = node
+            nodes = [node for node in tree.nodes if node.id != ROOT]
+            self.parents |= {node.id: node.parent or ROOT for node in nodes}
+            self.above |= {node.id: node for node in nodes if not node.is_leaf}
+            own = [((person, node.id), None) for node in nodes if node.is_leaf]
+            for leaf in self.new_leaves(own):
+                leaf.id = leaf.primitive = leaf.founded = leaf.local
         if self.leaves:
             self.regroup()
 
@@ -181,9 +178,17 @@ class Sharing:
 
     def new_leaf(self, person: int, local: int, shape: Shape | None = None) -> Leaf:
         """Take a leaf of a person's tree, of no primitive yet, whose shape may be known."""
-        slot = self.table.add(self.seen(person, local) if shape is None else shape)
-        self.leaves.append(Leaf(person, local, ROOT, ROOT, ROOT, slot))
-        return self.leaves[-1]
+        return self.new_leaves([((person, local), shape)])[0]
+
+    def new_leaves(self, known: Sequence[tuple[Key, Shape | None]]) -> list[Leaf]:
+        """Take many leaves at once, which is quicker: person and leaf, and its shape; see above."""
+        shapes = [self.seen(*key) if shape is None else shape for key, shape in known]
+        slots = self.table.add_all(shapes)
+        new = [
+            Leaf(*key, ROOT, ROOT, ROOT, slot) for (key, _), slot in zip(known, slots, strict=True)
+        ]
+        self.leaves += new
+        return new
 
     def look_again(self, leaf: Leaf) -> None:
         """Take note of a leaf's new exemplars."""

@@ -18,6 +18,7 @@ import numpy as np
 from ..errors import InvalidValueError
 from ..hmm.kernels import log_likelihood
 from ..maths.compiling import njit
+from ..maths.lanes import LANES, squares_tile
 from ..plugins import join_installed
 from ..recording import FloatArray, IntArray
 from .config import TreeConfig
@@ -241,32 +242,42 @@ def _of_many(others: Exemplar, row: int) -> _Chain:
 def _score(columns: FloatArray, model: _Chain, weights: FloatArray) -> float:
     """Return log P(points | model), of points (D, P).
 
-    As of a `LeftRightHMM`, but in another order: four channels at a time, which halves what is read
-    and written, and norms and missing values apart from the rest.
+    As of a `LeftRightHMM`, but in another order: norms and missing values apart from the rest, and
+    in each state only the points at which the chain can be there, for it ends in its last.
     """
-    n_channels, n_points = columns.shape
-    densities = np.empty((len(model.means), n_points))
-    whole = n_channels - n_channels % 4
+    densities = _densities(columns, model)
+    n_states, n_points = densities.shape
     for n, row in enumerate(densities):
-        mean, scale = model.means[n], model.scales[n]
-        row[:] = model.log_norms[n]
-        for d in range(0, whole, 4):
-            a, b, c, e = columns[d], columns[d + 1], columns[d + 2], columns[d + 3]
-            p, q, r, s = mean[d], mean[d + 1], mean[d + 2], mean[d + 3]
-            i, j, k, m = scale[d], scale[d + 1], scale[d + 2], scale[d + 3]
-            for t in range(n_points):
-                u, v, w, x = a[t] - p, b[t] - q, c[t] - r, e[t] - s
-                row[t] = row[t] + i * u * u + j * v * v + k * w * w + m * x * x
-        for d in range(whole, n_channels):
-            column, p, i = columns[d], mean[d], scale[d]
-            for t in range(n_points):
-                u = column[t] - p
-                row[t] += i * u * u
-        for t in range(n_points):
+        for t in range(n, n_points - n_states + n + 1):
             if row[t] != row[t]:
-                row[t] = _seen_density(columns[:, t], mean, model.variances[n], model.log_norms[n])
+                row[t] = _seen_density(
+                    columns[:, t], model.means[n], model.variances[n], model.log_norms[n]
+                )
             row[t] *= weights[t]
     return log_likelihood(densities, model.log_stay, model.log_next, True)
+
+
+@njit(cache=True)
+def _densities(columns: FloatArray, model: _Chain) -> FloatArray:
+    """Return log-densities, shape (N, P), at least where the chain can be."""
+    n_channels, n_points = columns.shape
+    means, scales, norms = model.means, model.scales, model.log_norms
+    n_states = len(means)
+    densities = np.empty((n_states, n_points))
+    if n_states < LANES or n_points < LANES:
+        for n, row in enumerate(densities):
+            row[:] = norms[n]
+            for d in range(n_channels):
+                for t in range(n_points):
+                    u = columns[d, t] - means[n, d]
+                    row[t] += scales[n, d] * u * u
+        return densities
+    for state in range(0, n_states, LANES):
+        row_at = min(state, n_states - LANES)
+        end = min(row_at + LANES + n_points - n_states, n_points)
+        for t in range(row_at, end, LANES):
+            squares_tile(columns, means, scales, norms, row_at, min(t, n_points - LANES), densities)
+    return densities
 
 
 @njit(cache=True)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...maths.compiling import njit
+from ...maths.lanes import LANES, row_squares
 from ...recording import FloatArray, IntArray
 from ...tree import MirrorMap
 from .shape import Shape, ShapeState, mirrored, squares
@@ -38,20 +39,27 @@ class ShapeTable:
         return slot
 
     def add_all(self, shapes: Sequence[Shape]) -> list[int]:
-        """Take many shapes; return their slots. Where there were none before, that is quicker."""
-        if self._used or not shapes:
-            return [self.add(shape) for shape in shapes]
+        """Take many shapes at once, which is quicker; return their slots."""
+        if not shapes:
+            return []
         while len(self._free) < len(shapes):
             self._grow(shapes[0])
         slots = [self._free.pop() for _ in shapes]
         for slot, shape in zip(slots, shapes, strict=True):
             self._note(slot, shape)
-        n = self._used
-        movements, images = self._movements[:n], self._images[:n]
-        self._direct[:n, :n] = _among(movements)
+        new = np.array(slots, np.int64)
+        others = np.setdiff1d(np.arange(self._used), new)
+        within, beyond, back = np.ix_(new, new), np.ix_(new, others), np.ix_(others, new)
+        mine, theirs = self._movements[new], self._movements[others]
+        self._direct[within] = _among(mine)
+        self._direct[beyond] = across = _across(mine, theirs)
+        self._direct[back] = across.T
         if self.mirror is not None:
-            across = _across(movements, images)
-            self._mirrored[:n, :n] = 0.5 * (across + across.T)
+            images = self._images[new]
+            across = _across(mine, images)
+            self._mirrored[within] = 0.5 * (across + across.T)
+            across = 0.5 * (_across(images, theirs) + _across(mine, self._images[others]))
+            self._mirrored[beyond], self._mirrored[back] = across, across.T
         return slots
 
     def put(self, slot: int, shape: Shape) -> None:
@@ -148,37 +156,51 @@ def stacked(shapes: Sequence[Shape]) -> ShapeTable:
     return table
 
 
+_BLOCK = 32  # rows that the processor's cache holds twice
+
+
 @njit(cache=True)
 def _among(rows: FloatArray) -> FloatArray:
     """Return the squared distances of all rows from each other as `_row` does, shape (n, n)."""
-    out = np.zeros((len(rows), len(rows)))
-    for i in range(1, len(rows)):
-        out[i, :i] = out[:i, i] = _row(rows[:i], rows[i])
+    n = len(rows)
+    out = np.zeros((n, n))
+    for start in range(0, n, _BLOCK):
+        for first in range(0, start + 1, _BLOCK):
+            for i in range(start, min(start + _BLOCK, n)):
+                end = min(first + _BLOCK, i)
+                if end > first:
+                    out[i, first:end] = out[first:end, i] = _row(rows[first:end], rows[i])
     return out
 
 
 @njit(cache=True)
 def _across(rows: FloatArray, others: FloatArray) -> FloatArray:
-    """Return the squared distance of each row from each of others as `_row` does, (n, n)."""
+    """Return the squared distance of each row from each of others as `_row` does, (n, m)."""
     out = np.empty((len(rows), len(others)))
-    for j in range(len(others)):
-        out[:, j] = _row(rows, others[j])
+    for start in range(0, len(rows), _BLOCK):
+        end = min(start + _BLOCK, len(rows))
+        for j in range(len(others)):
+            out[start:end, j] = _row(rows[start:end], others[j])
     return out
 
 
 @njit(cache=True)
 def _row(rows: FloatArray, one: FloatArray) -> FloatArray:
     """Return the squared distances from one to each row, shape (n, K) and (K,) to (n,)."""
-    out = np.empty(len(rows))
-    whole = len(one) - len(one) % 4
-    for i in range(len(rows)):
-        a = b = c = d = 0.0  # four sums: the processor adds them at once
-        for k in range(0, whole, 4):
-            a += (rows[i, k] - one[k]) ** 2
-            b += (rows[i, k + 1] - one[k + 1]) ** 2
-            c += (rows[i, k + 2] - one[k + 2]) ** 2
-            d += (rows[i, k + 3] - one[k + 3]) ** 2
-        for k in range(whole, len(one)):
-            a += (rows[i, k] - one[k]) ** 2
-        out[i] = (a + b) + (c + d)
+    n = len(rows)
+    out, sums = np.empty(n), np.zeros((LANES, LANES))
+    whole = len(one) - len(one) % LANES
+    for start in range(0, n, LANES):
+        first = max(min(start, n - LANES), 0)
+        if n < LANES:
+            sums[:] = 0.0
+            for i in range(n):
+                for k in range(whole):
+                    sums[i, k % LANES] += (rows[i, k] - one[k]) ** 2
+        else:
+            row_squares(rows, first, one, sums)
+        for i in range(min(LANES, n)):
+            for k in range(whole, len(one)):
+                sums[i, 0] += (rows[first + i, k] - one[k]) ** 2
+            out[first + i] = (sums[i, 0] + sums[i, 1]) + (sums[i, 2] + sums[i, 3])
     return out
