@@ -14,7 +14,14 @@ import numpy as np
 from ..recording import BoolArray, FloatArray, IntArray
 from .exemplars.normalisation import normalised
 from .exemplars.spread import moments
-from .nodes.clustering import clusters_below, gap, nearest_usual, separation, two_branches
+from .nodes.clustering import (
+    clusters_below,
+    gap,
+    mean_between,
+    nearest_usual,
+    separation,
+    two_branches,
+)
 from .nodes.node import Node
 from .nodes.search import mean_nearest
 from .nodes.structure import Structure
@@ -22,6 +29,7 @@ from .placement import ROOT, Change, Match
 
 _FAR = 1e12  # farther than any two segments
 _PLAYED_BACK = 0.05  # over the scale: nobody hesitates again so exactly
+_SURELY = 1 - 1e-9  # whatever a mean is rounded to
 _UNKNOWN = 3.0  # leaves that the scale of all motion counts for beside that of those
 
 
@@ -84,7 +92,7 @@ def _clusters(
     alike = np.minimum(np.minimum(config.extent_share * sizes, limit), exactly)
 
     def found(most: FloatArray, least: int) -> list[IntArray]:
-        return clusters_below(matrix / np.clip(most, 1e-12, _FAR), 1.0, least)
+        return clusters_below(matrix / np.minimum(np.maximum(most, 1e-12), _FAR), 1.0, least)
 
     groups = found(alike, max(least, 3))
     if groups or least > 2:
@@ -226,15 +234,16 @@ def split_mixed(structure: Structure, leaf: Node, when: int) -> Change:
     config = structure.config
     if leaf.whole or leaf.frozen or len(leaf.members) < config.max_exemplars:
         return Change()
+    width = config.split_scale * structure.index.scale(but=leaf.id)
+    if leaf.diameter <= _SURELY * width:  # without tempo nothing is farther apart
+        return Change()
     matrix = structure.memory.bank.without_tempo(leaf.members, leaf.matrix)
     branches = two_branches(matrix, config.min_branch)
-    if branches is None:
-        return Change()
-    between = float(matrix[np.ix_(*branches)].mean())
     if (
-        separation(matrix, *branches) <= config.split_ratio
+        branches is None
+        or mean_between(matrix, *branches) <= width
+        or separation(matrix, *branches) <= config.split_ratio
         or gap(matrix, *branches) <= config.split_gap
-        or between <= config.split_scale * structure.index.scale(but=leaf.id)
     ):
         return Change()
     return structure.split(leaf, [[leaf.members[i] for i in branch] for branch in branches], when)

@@ -194,6 +194,7 @@ class PrimitiveTree:
         self._structure = Structure(config, self._memory)
         self._models = GroupModels(config, self._structure)
         self._time_passes = False
+        self._ready_for = -1  # segment that all was done for that can be done before
 
     # ---- looking
 
@@ -384,6 +385,9 @@ class PrimitiveTree:
         Where nobody does, `insert` does it at once.
         """
         self._time_passes = True
+        if self._ready_for != self.n_seen:
+            self._memory.prepare(self.n_seen)
+            self._ready_for = self.n_seen
         if self._memory.renewal is not None:
             matrices = self._memory.get_on(self._structure.groups)
             if matrices is not None:

@@ -68,6 +68,7 @@ class ExemplarBank:
         self._whole = np.array([0, config.normalisation.n_points])
         self._slots: dict[int, int] = {}
         self._latest: tuple[int, Exemplar | None] = -1, None
+        self._levelled: tuple[FloatArray, FloatArray] | None = None
         self._met = np.zeros(0)  # divergences of the latest from what is in each slot, NaN: unknown
         per_state, per_transition = (config.n_states, n_channels), (config.n_states,)
         self._arrays = SlotArrays(
@@ -130,6 +131,10 @@ class ExemplarBank:
         parts = columns, *gaussians, model.log_stay, model.log_next
         exemplar = Exemplar(*parts, np.array(0.0), np.array(float(duration)), np.array(np.inf))
         return exemplar._replace(own=np.array(own_score(exemplar, weights)))
+
+    def prepare(self) -> None:
+        """Have memory for an exemplar more."""
+        self._arrays.prepare()
 
     def add(self, number: int, exemplar: Exemplar) -> None:
         """Remember an exemplar."""
@@ -199,7 +204,15 @@ class ExemplarBank:
         return found
 
     def without_tempo(self, numbers: Sequence[int], matrix: FloatArray) -> FloatArray:
-        """Return the distances that exemplars have without tempo, given those with it, (k, k)."""
+        """Return the distances that exemplars have without tempo, given those with it, (k, k).
+
+        What was asked last is known; distances that change are another matrix.
+        """
+        if self._levelled is None or self._levelled[0] is not matrix:
+            self._levelled = matrix, self._without_tempo(numbers, matrix)
+        return self._levelled[1]
+
+    def _without_tempo(self, numbers: Sequence[int], matrix: FloatArray) -> FloatArray:
         durations = self._arrays.gather(self._slots_of(numbers), _DURATION)
         beyond = np.maximum.outer(durations, durations) / np.minimum.outer(durations, durations)
         rows, others = np.nonzero(np.triu(beyond / self.config.tempo > 1.0))

@@ -64,6 +64,11 @@ class SegmentMemory:
             if gone is not None:
                 self.release(gone)
 
+    def prepare(self, number: int) -> None:
+        """Do what takes long and can be done before a segment is there."""
+        self._sample.place_for(number)
+        self.bank.prepare()
+
     def recall(self, number: int, frames: Blob) -> None:
         """Take up a segment again that may be forgotten by now, held once."""
         if number not in self.frames:

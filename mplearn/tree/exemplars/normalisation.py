@@ -26,8 +26,13 @@ def weights(config: NormalisationConfig) -> FloatArray:
 
 def points_of(frames: FloatArray, config: NormalisationConfig) -> FloatArray:
     """Return the P points of a segment (T, D) that are compared, not yet centred."""
-    places = np.linspace(config.head, 1, config.n_points) * (len(frames) - 1)
-    return interpolate_linearly(frames, places)
+    return interpolate_linearly(frames, _passed(config) * (len(frames) - 1))
+
+
+@lru_cache(maxsize=32)
+def _passed(config: NormalisationConfig) -> FloatArray:
+    """Return which share of a segment has passed at each of its points, shape (P,)."""
+    return np.linspace(config.head, 1, config.n_points)
 
 
 def centred(points: FloatArray, config: NormalisationConfig) -> FloatArray:

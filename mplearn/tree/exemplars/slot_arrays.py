@@ -29,6 +29,7 @@ class SlotArrays:
         self.n_slots = 0
         self._free: list[int] = []
         self._lent: set[int] = set()  # blocks that a fork shows as well: copied before a write
+        self._ready = -1  # slot that there is memory for
 
     def fork(self) -> SlotArrays:
         """Return slots that hold the same, and go on apart; blocks are copied when one changes."""
@@ -37,14 +38,27 @@ class SlotArrays:
         twin._lent, self._lent = set(range(len(self.blocks))), set(range(len(self.blocks)))
         return twin
 
+    def prepare(self) -> None:
+        """Have memory for the slot that is taken next, which the system takes its time to give."""
+        slot = self._free[-1] if self._free else self.n_slots
+        if slot != self._ready:
+            self._make_room()
+            for stacked in self._own(slot // BLOCK):
+                if slot == self.n_slots:
+                    stacked[slot % BLOCK] = 0.0
+            self._ready = slot
+
     def take(self) -> int:
         """Return a slot that is free."""
         if self._free:
             return self._free.pop()
-        if self.n_slots == BLOCK * len(self.blocks):
-            self.blocks.append(tuple(np.zeros((BLOCK, *shape)) for shape in self.shapes))
+        self._make_room()
         self.n_slots += 1
         return self.n_slots - 1
+
+    def _make_room(self) -> None:
+        if not self._free and self.n_slots == BLOCK * len(self.blocks):
+            self.blocks.append(tuple(np.zeros((BLOCK, *shape)) for shape in self.shapes))
 
     def release(self, slot: int) -> None:
         """Make a slot free."""
@@ -74,6 +88,11 @@ class SlotArrays:
         """Return the arrays of a slot, which show what is written there later."""
         block, row = divmod(slot, BLOCK)
         return tuple(stacked[row] for stacked in self.blocks[block])
+
+    def used(self) -> Iterator[tuple[FloatArray, ...]]:
+        """Yield the arrays of all slots that were ever taken, block after block, stacked."""
+        for number, block in enumerate(self.blocks):
+            yield tuple(stacked[: self.n_slots - number * BLOCK] for stacked in block)
 
     def gather(self, slots: IntArray, which: int) -> FloatArray:
         """Return one array of some slots, copied, shape (k, ...)."""

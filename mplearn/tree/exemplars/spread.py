@@ -8,6 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
+from ...maths.compiling import njit
 from ...recording import FloatArray, IntArray
 from ...state import Array, Blob, SharedState, State, require
 from ..config import TreeConfig
@@ -62,17 +63,7 @@ class ChannelSpread:
 
     def update(self, points: FloatArray) -> None:
         """Take the points of a segment, shape (P, D); NaN counts for nothing."""
-        seen = ~np.isnan(points)
-        count = seen.sum(axis=0)
-        total = self._count + count
-        some = np.maximum(count, 1)
-        mean = np.where(seen, points, 0.0).sum(axis=0) / some
-        squares = np.where(seen, (points - mean) ** 2, 0.0).sum(axis=0)
-        step = mean - self._mean
-        share = count / np.maximum(total, 1)
-        self._squares += squares + step**2 * self._count * share
-        self._mean += np.where(count > 0, step * share, 0.0)
-        self._count = total
+        _update(points, self._count, self._mean, self._squares)
 
     def own_variances(self) -> FloatArray:
         """Return each channel's own variance, shape (D,)."""
@@ -108,6 +99,7 @@ class DistanceSample:
         self.seed = seed
         self.numbers: list[int] = []
         self._matrix = np.zeros((size, size))
+        self._next: tuple[int, int | None] = 0, 0
         self._forget()
 
     def _forget(self) -> None:
@@ -117,11 +109,16 @@ class DistanceSample:
         self._scale: tuple[TreeConfig, float] | None = None
 
     def place_for(self, n_seen: int) -> int | None:
-        """Return where in the sample the segment after ``n_seen`` others goes; None: nowhere."""
+        """Return where in the sample the segment after ``n_seen`` others goes; None: nowhere.
+
+        Whoever asks before the segment is there has it at once then.
+        """
         if len(self.numbers) < self.size:
             return len(self.numbers)
-        place = int(np.random.default_rng((self.seed, n_seen)).integers(n_seen + 1))
-        return place if place < self.size else None
+        if self._next[0] != n_seen:
+            place = int(np.random.default_rng((self.seed, n_seen)).integers(n_seen + 1))
+            self._next = n_seen, place if place < self.size else None
+        return self._next[1]
 
     def put(self, number: int, place: int, bank: ExemplarBank) -> int | None:
         """Put a segment at a place; return the number of the one that goes."""
@@ -207,6 +204,27 @@ class DistanceSample:
         self._state = state
 
 
+@njit(cache=True)
+def _update(points: FloatArray, count: FloatArray, mean: FloatArray, squares: FloatArray) -> None:
+    """Take points, shape (P, D), into counts, means and squared deviations, shape (D,) each."""
+    for d in range(len(count)):
+        n, total = 0, 0.0
+        for value in points[:, d]:
+            if value == value:
+                n += 1
+                total += value
+        if not n:
+            continue
+        new, deviations = total / n, 0.0
+        for value in points[:, d]:
+            if value == value:
+                deviations += (value - new) * (value - new)
+        step, share = new - mean[d], n / (count[d] + n)
+        squares[d] += deviations + step * step * count[d] * share
+        mean[d] += step * share
+        count[d] += n
+
+
 def moments(matrix: FloatArray) -> tuple[float, float]:
     """Return mean and standard deviation of the distances in a matrix; NaN where there are none."""
     distances = pairs(matrix)
@@ -222,4 +240,5 @@ def pairs(matrix: FloatArray) -> FloatArray:
 
 def without(matrix: FloatArray, gone: Sequence[int]) -> FloatArray:
     """Return a matrix without some of its rows and columns."""
-    return np.delete(np.delete(matrix, gone, axis=0), gone, axis=1)
+    kept = [i for i in range(len(matrix)) if i not in gone]
+    return np.asarray(matrix.take(kept, axis=0).take(kept, axis=1))

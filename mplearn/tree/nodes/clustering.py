@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...maths.compiling import njit
-from ...recording import FloatArray, IntArray
-from ..exemplars.spread import pairs
+from ...maths.sums import pairwise_sum
+from ...recording import BoolArray, FloatArray, IntArray
 
 
 @njit(cache=True)
@@ -83,51 +83,87 @@ def two_branches(matrix: FloatArray, least: int) -> tuple[IntArray, IntArray] | 
     Branches of fewer than ``least`` members that join last are outliers; each goes to the branch
     that is nearer on average. None where there are no two branches of that size.
     """
-    n = len(matrix)
-    if n < 2 * least:
+    if len(matrix) < 2 * least:
         return None
-    merges, _ = complete_linkage(np.ascontiguousarray(matrix), np.inf)
-    sizes = np.concatenate([np.ones(n), merges[:, 3]])
+    second = _in_second(np.array(matrix), least)
+    if not len(second):
+        return None
+    return np.flatnonzero(~second), np.flatnonzero(second)
+
+
+@njit(cache=True)
+def _in_second(matrix: FloatArray, least: int) -> BoolArray:
+    """Return which of `two_branches` each is in, shape (n,); of none where there are none."""
+    n = len(matrix)
+    merges, _ = complete_linkage(matrix, np.inf)
     at = 2 * n - 2
     while True:
         if at < n:
-            return None
-        left, right = (int(child) for child in merges[at - n, :2])
-        if min(sizes[left], sizes[right]) >= least:
+            return np.zeros(0, np.bool_)
+        left, right = int(merges[at - n, 0]), int(merges[at - n, 1])
+        of_left = merges[left - n, 3] if left >= n else 1.0
+        of_right = merges[right - n, 3] if right >= n else 1.0
+        if min(of_left, of_right) >= least:
             break
-        at = left if sizes[left] >= sizes[right] else right
+        at = left if of_left >= of_right else right
     groups = [_members(merges, left), _members(merges, right)]
-    inside = np.concatenate(groups)
-    for outlier in np.setdiff1d(np.arange(n), inside):
-        nearer = int(np.argmin([matrix[outlier, group].mean() for group in groups]))
+    inside = np.zeros(n, np.bool_)
+    for group in groups:
+        inside[group] = True
+    for outlier in np.flatnonzero(~inside):
+        apart = [pairwise_sum(matrix[outlier][group]) / len(group) for group in groups]
+        nearer = 0 if apart[0] <= apart[1] else 1
         groups[nearer] = np.sort(np.append(groups[nearer], outlier))
-    first, second = sorted(groups, key=lambda group: (-len(group), group[0]))
-    return first, second
+    one, other = groups
+    if len(one) != len(other):
+        second = one if len(one) < len(other) else other
+    else:
+        second = one if one[0] > other[0] else other
+    chosen = np.zeros(n, np.bool_)
+    chosen[second] = True
+    return chosen
 
 
+@njit(cache=True)
 def _members(merges: FloatArray, cluster: int) -> IntArray:
     """Return the positions of a cluster's members, in order."""
     n = len(merges) + 1
-    found = []
-    pending = [cluster]
+    found, pending = np.zeros(n, np.bool_), [cluster]
     while pending:
         at = pending.pop()
         if at < n:
-            found.append(at)
+            found[at] = True
         else:
-            pending += [int(child) for child in merges[at - n, :2]]
-    return np.array(sorted(found), dtype=np.int64)
+            pending.append(int(merges[at - n, 0]))
+            pending.append(int(merges[at - n, 1]))
+    return np.flatnonzero(found)
 
 
+@njit(cache=True)
 def separation(matrix: FloatArray, first: IntArray, second: IntArray) -> float:
     """Return the mean distance between two groups over that inside them.
 
     Copies, where a recording is seen twice, say nothing of how much executions vary.
     """
-    inside = np.concatenate([pairs(matrix[np.ix_(group, group)]) for group in (first, second)])
-    between = float(matrix[np.ix_(first, second)].mean())
-    inside = inside[inside > 1e-6 * between]
-    return between / max(float(inside.mean()), 1e-300) if len(inside) else float("inf")
+    between = mean_between(matrix, first, second)
+    inside = np.empty((len(first) ** 2 + len(second) ** 2) // 2)
+    n = 0
+    for group in (first, second):
+        for k, i in enumerate(group):
+            for j in group[k + 1 :]:
+                if matrix[i, j] > 1e-6 * between:
+                    inside[n] = matrix[i, j]
+                    n += 1
+    return between / max(pairwise_sum(inside[:n]) / n, 1e-300) if n else np.inf
+
+
+@njit(cache=True)
+def mean_between(matrix: FloatArray, first: IntArray, second: IntArray) -> float:
+    """Return the mean distance between two groups."""
+    between = np.empty((len(first), len(second)))
+    for k, i in enumerate(first):
+        between[k] = matrix[i][second]
+    return pairwise_sum(between.ravel()) / between.size
 
 
 def gap(matrix: FloatArray, first: IntArray, second: IntArray) -> float:
@@ -151,8 +187,12 @@ def nearest_usual(*matrices: FloatArray) -> float:
     return float(np.median(np.concatenate(second)))
 
 
+@njit(cache=True)
 def most_redundant(matrix: FloatArray) -> int:
     """Return which exemplar tells least: of the closest pair, the one nearer to all others."""
-    apart = matrix + np.diag(np.full(len(matrix), np.inf))
-    i, j = np.unravel_index(int(apart.argmin()), apart.shape)
-    return int(i) if matrix[i].sum() <= matrix[j].sum() else int(j)
+    one, other, least = 0, 0, np.inf
+    for i in range(len(matrix)):
+        for j in range(len(matrix)):
+            if j != i and matrix[i, j] < least:
+                one, other, least = i, j, matrix[i, j]
+    return one if pairwise_sum(matrix[one]) <= pairwise_sum(matrix[other]) else other

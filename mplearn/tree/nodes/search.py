@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from bisect import bisect_left, insort
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cache
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...maths.compiling import njit
+from ...maths.sums import pairwise_sum
 from ...recording import BoolArray, FloatArray, IntArray
 from ...state import Array, Range, State, require, require_no_cycle
 from ..config import TreeConfig
@@ -62,6 +64,8 @@ class IndexState(State):
         require_no_cycle(parents, lambda id: f"parents[{list(parents).index(id)}]")
 
 
+_NOWHERE = (ROOT,)
+_ROOM = 16  # nodes that there is room for at first; twice as many when it is full
 _YOUNG = 3  # exemplars of a leaf up to which little is known of how much executions vary
 _YOUNG_GROWTH = np.array([1.0, 1.0, 1.35, 1.1, 1.0])
 # by number of exemplars: the largest of a few distances is smaller than that of many
@@ -97,8 +101,12 @@ class NodeIndex:
         self.limit = 0.0
         self.caps: FloatArray | None = None
         self.members: list[list[int]] = []
-        self._known = np.zeros(0, _KNOWN)
+        self._ids: list[int] = []
+        self._room = np.zeros(_ROOM, _KNOWN)
+        self._known = self._room[:0]
         self._leaf_ids: tuple[int, ...] | None = None
+        self._widths: list[float] = []  # `_diameters` of the leaves, in order of size
+        self._homes: dict[int, list[int]] | None = None  # nodes by exemplar, once it is asked for
         self._waves = _slow_waves(config.normalisation.n_points)
         n_values = bank.n_channels * len(self._waves)
         n_slow = bank.n_channels * self._waves.shape[1]
@@ -144,12 +152,16 @@ class NodeIndex:
 
     def drop(self, id: int) -> None:
         """Forget a node, if it is known."""
-        k = int(np.searchsorted(self.ids, id))
-        if id in self.ids[k : k + 1]:
-            self._of_node.release(int(self._known["slot"][k]))
-            self._leaf_ids = None
-            self._known = np.delete(self._known, k)
-            del self.members[k]
+        k = bisect_left(self._ids, id)
+        if id not in self._ids[k : k + 1]:
+            return
+        self._of_node.release(int(self._known["slot"][k]))
+        self._forget(k)
+        self._leave(id, self.members[k])
+        self._leaf_ids = None
+        self._known[k:-1] = self._known[k + 1 :]
+        self._known = self._known[:-1]
+        del self._ids[k], self.members[k]
 
     def enter(
         self,
@@ -166,10 +178,13 @@ class NodeIndex:
             bank: Holds them.
             matrix: Distances among them, shape (k, k), for `nearest_others`.
         """
-        k = int(np.searchsorted(self.ids, facts[0]))
-        if facts[0] not in self.ids[k : k + 1]:
-            new = np.array([(*facts, np.inf, self._of_node.take(), 0)], _KNOWN)
-            self._known = np.insert(self._known, k, new)
+        k = bisect_left(self._ids, facts[0])
+        if facts[0] in self._ids[k : k + 1]:
+            self._forget(k)
+        else:
+            self._open(k)
+            self._known[k] = (*facts, np.inf, self._of_node.take(), 0)
+            self._ids.insert(k, facts[0])
             self.members.insert(k, [])
             self._leaf_ids = None
         known = self._known[k]
@@ -177,7 +192,11 @@ class NodeIndex:
             self._leaf_ids = None
         known["parent"], known["is_leaf"], known["diameter"] = facts[1:]
         if self.members[k] != members:
+            self._leave(facts[0], self.members[k])
             self.members[k] = list(members)
+            if self._homes is not None:
+                for number in members:
+                    insort(self._homes.setdefault(number, []), facts[0])
             known["size"] = len(members)
             known["extent"] = _mean_extents(bank, [members])[0]
             others = np.full(self.config.max_exemplars, np.nan)
@@ -185,6 +204,47 @@ class NodeIndex:
                 others[: len(matrix)] = nearest_others(matrix, self.config.n_nearest)
             mean = bank.mean_profile(members)
             self._of_node.write(int(known["slot"]), (mean, others, self._slow(mean)))
+        if known["is_leaf"]:
+            insort(self._widths, self._width(k))
+
+    def _open(self, k: int) -> None:
+        """Make room for a node at a place."""
+        n = len(self._known)
+        if n == len(self._room):
+            self._room = np.concatenate([self._room, np.zeros(n, _KNOWN)])
+        self._known = self._room[: n + 1]
+        self._known[k + 1 :] = self._known[k:-1]
+
+    def _forget(self, k: int) -> None:
+        """Take the width of a node, if it is a leaf, out of those that are known."""
+        if self._known["is_leaf"][k]:
+            del self._widths[bisect_left(self._widths, self._width(k))]
+
+    def _width(self, k: int) -> float:
+        """Return the diameter of the node at a place as `_diameters` has it."""
+        return float(self._diameters(self._known[k : k + 1])[0])
+
+    def _leave(self, id: int, members: Sequence[int]) -> None:
+        """Take note that exemplars are no longer in a node."""
+        homes = self._homes
+        if homes is None:
+            return
+        for number in members:
+            homes[number].remove(id)
+            if not homes[number]:
+                del homes[number]
+
+    def homes(self, numbers: Collection[int]) -> list[int]:
+        """Return the id of the node that each exemplar is in, the youngest of several.
+
+        It is `ROOT` for what is in none.
+        """
+        if self._homes is None:
+            self._homes = {}
+            for id, members in zip(self._ids, self.members, strict=True):
+                for number in members:
+                    self._homes.setdefault(number, []).append(id)
+        return [self._homes.get(number, _NOWHERE)[-1] for number in numbers]
 
     def remeasured(self, nodes: Mapping[int, Node], bank: ExemplarBank) -> None:
         """Take note of new distances in nodes, by id, and of the new models of their exemplars."""
@@ -198,45 +258,51 @@ class NodeIndex:
                 others = nearest_others(some, self.config.n_nearest)
                 self._of_node.write_some(known["slot"][places], 1, others)
         known["extent"] = _mean_extents(bank, self.members)
+        self._widths = sorted(self._diameters(known)[self.leaves].tolist())
 
     def scale(self, but: int | None = None) -> float:
         """Return the median diameter of the leaves, but for one: how much executions vary.
 
         It is 0 where there is no leaf.
         """
-        chosen = self.leaves & (self.ids != but) if but is not None else self.leaves
-        diameters = self._diameters()[chosen]
-        n = len(diameters)
+        k = len(self._ids) if but is None else bisect_left(self._ids, but)
+        widths, n = self._widths, len(self._widths)
+        gone = n
+        if but in self._ids[k : k + 1] and self._known["is_leaf"][k]:
+            gone, n = bisect_left(widths, self._width(k)), n - 1
         if not n:
             return 0.0
-        middle = (n - 1) // 2, n // 2
-        diameters = np.partition(diameters, middle)
-        return float(diameters[middle[0]] + diameters[middle[1]]) / 2
+        low, high = ((m if m < gone else m + 1) for m in ((n - 1) // 2, n // 2))
+        return (widths[low] + widths[high]) / 2
 
-    def _diameters(self) -> FloatArray:
-        """Return the diameters of the nodes, those of young ones as they will be, shape (n,)."""
-        diameters = np.asarray(self._known["diameter"])
+    def _diameters(self, known: NDArray[np.void]) -> FloatArray:
+        """Return the diameters of some nodes, those of young ones as they will be, shape (k,)."""
+        diameters = np.asarray(known["diameter"])
         if not self.config.young_reach:
             return diameters
-        sizes = np.minimum(self._known["size"], len(_YOUNG_GROWTH) - 1)
+        sizes = np.minimum(known["size"], len(_YOUNG_GROWTH) - 1)
         return np.asarray(diameters * _YOUNG_GROWTH[sizes])
 
     def radii(self) -> FloatArray:
         """Return the radius of each node: eq. 6, capped by the scale that the leaves share."""
-        config = self.config
-        radii = config.reach * self._diameters()
+        return self._radii(np.arange(len(self._ids)))
+
+    def _radii(self, places: IntArray) -> FloatArray:
+        """Return the radii of the nodes at some places."""
+        config, known = self.config, self._known[places]
+        radii = config.reach * self._diameters(known)
         if np.isfinite(config.reach_cap):
             radii = np.minimum(radii, min(config.reach_cap * self.scale(), self.limit))
             if np.isfinite(self.limit):
-                young = self._known["size"] <= _YOUNG
+                young = known["size"] <= _YOUNG
                 least = np.where(young, config.young_reach, config.least_reach)
                 radii = np.minimum(np.maximum(radii, least * self.limit), self.limit)
-        radii = np.minimum(radii, config.extent_share * self._known["extent"])
-        return np.asarray(radii if self.caps is None else np.minimum(radii, self.caps))
+        radii = np.minimum(radii, config.extent_share * known["extent"])
+        return np.asarray(radii if self.caps is None else np.minimum(radii, self.caps[places]))
 
     def radius(self, id: int) -> float:
         """Return the radius of one node."""
-        return float(self.radii()[int(np.searchsorted(self.ids, id))])
+        return float(self._radii(np.array([bisect_left(self._ids, id)]))[0])
 
     def search(self, exemplar: Exemplar, bank: ExemplarBank) -> list[Match]:
         """Return the nodes that a segment was compared with, best first.
@@ -247,7 +313,7 @@ class NodeIndex:
 
     def look(self, exemplar: Exemplar, bank: ExemplarBank) -> Sight:
         """Search, and return all that was seen."""
-        if not len(self.ids):
+        if not self._ids:
             return Sight([], np.zeros(0))
         if self.config.n_candidates:
             return self._compare(exemplar, bank, self._candidates(exemplar, bank))
@@ -270,14 +336,19 @@ class NodeIndex:
         """
         if not self.config.n_candidates:
             return np.flatnonzero(self.leaves)
-        if len(self.ids) <= self.config.n_candidates:
-            return np.arange(len(self.ids))
-        profile, slots, n = bank.profile(exemplar), self._known["slot"], self.config.n_candidates
+        if len(self._ids) <= self.config.n_candidates:
+            return np.arange(len(self._ids))
+        profile, n = bank.profile(exemplar), self.config.n_candidates
         slow = self._slow(profile)
-        nearness, at_least = np.full(len(slots), np.inf), np.empty(len(slots))
-        for (_, _, parts), rows, here in self._of_node.parted(slots):
-            at_least[here] = _all_squared_offsets(parts, rows, slow)
-        best, first = np.full(n, np.inf), np.argpartition(at_least, n)[:n]
+        by_slot = np.concatenate(
+            [_all_squared_offsets(parts, slow) for _, _, parts in self._of_node.used()]
+        )
+        at_least = by_slot[self._known["slot"]]
+        nearness, best, first = (
+            np.full(len(at_least), np.inf),
+            np.full(n, np.inf),
+            _least(at_least, n),
+        )
         self._measure(nearness, first, profile, best)
         most = best[-1] + _ROUNDING * (best[-1] + slow @ slow)
         near = at_least <= most
@@ -300,7 +371,7 @@ class NodeIndex:
     def _compare(self, exemplar: Exemplar, bank: ExemplarBank, places: IntArray) -> Sight:
         row = bank.distances(exemplar, [m for k in places.tolist() for m in self.members[k]])
         known = self._known[places]
-        radii = np.minimum(self.radii()[places], self.config.extent_share * exemplar.extent)
+        radii = np.minimum(self._radii(places), self.config.extent_share * exemplar.extent)
         means = _group_means(row, known["size"].copy(), self.config.n_nearest)
         seen = zip(known["id"].tolist(), means.tolist(), radii.tolist(), strict=True)
         matches = [
@@ -329,7 +400,9 @@ class NodeIndex:
     def fork(self) -> NodeIndex:
         """Return an index that knows the same, and goes on apart; see `ExemplarBank.fork`."""
         twin = copy(self)
-        twin._known, twin.members = self._known.copy(), list(self.members)
+        twin._room = twin._known = self._known.copy()
+        twin._ids, twin._widths, twin._homes = list(self._ids), list(self._widths), None
+        twin.members = list(self.members)
         twin._of_node = self._of_node.fork()
         return twin
 
@@ -368,10 +441,21 @@ def nearest_others(matrix: FloatArray, n_nearest: int) -> FloatArray:
 
     Of one group, or of several that are as large: (..., k, k) -> (..., k).
     """
-    apart = np.array(matrix, dtype=np.float64)
-    k = apart.shape[-1]
-    apart[..., np.arange(k), np.arange(k)] = np.inf
-    return mean_nearest(apart, min(n_nearest, k - 1))
+    k = matrix.shape[-1]
+    found = _nearest_others(np.array(matrix, dtype=np.float64).reshape(-1, k, k), n_nearest)
+    return np.asarray(found.reshape(matrix.shape[:-1]))
+
+
+@njit(cache=True)
+def _nearest_others(matrices: FloatArray, n_nearest: int) -> FloatArray:
+    """Return `nearest_others` of groups that are as large, (g, k, k) -> (g, k)."""
+    found = np.empty(matrices.shape[:2])
+    for g, matrix in enumerate(matrices):
+        for i, row in enumerate(matrix):
+            row[i] = np.inf
+            nearest = np.sort(row)[: min(n_nearest, len(row) - 1)]
+            found[g, i] = pairwise_sum(nearest) / len(nearest)
+    return found
 
 
 @njit(cache=True)
@@ -405,16 +489,34 @@ def _slow_waves(n_points: int) -> FloatArray:
     return np.asarray(waves / np.sqrt((waves**2).sum(axis=0)))
 
 
-@njit(cache=True)
-def _all_squared_offsets(means: FloatArray, rows: IntArray, profile: FloatArray) -> FloatArray:
-    """Return the squared distance of some means (n, F) to a profile (F,), shape (k,)."""
-    out = np.empty(len(rows))
-    for k, row in enumerate(rows):
-        mean, total = means[row], 0.0
-        for f in range(len(profile)):
-            total += (mean[f] - profile[f]) ** 2
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def _all_squared_offsets(means: FloatArray, profile: FloatArray) -> FloatArray:
+    """Return the squared distance of means (n, F) to a profile (F,), shape (n,).
+
+    It is right but for rounding: sums are taken in any order, which is much faster.
+    """
+    out = np.empty(len(means))
+    for k in range(means.shape[0]):
+        total = 0.0
+        for f in range(means.shape[1]):
+            offset = means[k, f] - profile[f]
+            total += offset * offset
         out[k] = total
     return out
+
+
+@njit(cache=True)
+def _least(values: FloatArray, n: int) -> IntArray:
+    """Return where the n least of more values are, the least first."""
+    least, places = np.full(n, np.inf), np.zeros(n, np.int64)
+    for k, value in enumerate(values):
+        if value < least[-1]:
+            at = n - 1
+            while at > 0 and least[at - 1] > value:
+                least[at], places[at] = least[at - 1], places[at - 1]
+                at -= 1
+            least[at], places[at] = value, k
+    return places
 
 
 _PART = 64  # values after which it is asked whether the sum is too large already

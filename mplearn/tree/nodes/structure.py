@@ -74,11 +74,7 @@ class Structure:
 
         `ROOT` where it knows one in none.
         """
-        homes, wanted = dict.fromkeys(numbers, ROOT), set(numbers)
-        for id, members in zip(self.index.ids.tolist(), self.index.members, strict=True):
-            if not wanted.isdisjoint(members):
-                homes.update((number, id) for number in wanted.intersection(members))
-        return np.array([homes[number] for number in numbers], np.int64)
+        return np.array(self.index.homes(numbers), np.int64)
 
     def remeasured(self, matrices: Mapping[int, FloatArray]) -> None:
         """Take over distances in the nodes that were measured again."""
