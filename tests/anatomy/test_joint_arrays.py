@@ -103,6 +103,17 @@ def test_an_archive_with_batch_confidence_and_rate(
     assert take.markers == pytest.approx(points)
 
 
+def test_the_only_array_of_joints_of_an_archive(
+    tmp_path: Path, landmarks: dict[str, np.ndarray]
+) -> None:
+    points = joints("COCO", landmarks)
+    np.savez(tmp_path / "a.npz", reconstruction=points, losses=np.ones(len(points)), fps=25.0)
+    assert open_recording(tmp_path / "a.npz").markers == pytest.approx(points)
+    np.savez(tmp_path / "b.npz", one=points, two=points, fps=25.0)
+    with pytest.raises(RecordingError, match="arrays one, two"):
+        open_recording(tmp_path / "b.npz")
+
+
 @pytest.mark.parametrize(
     "shape", [(5, 9, 3), (5, 17, 2), (5, 321), (0, 17, 3), (17, 3), (40, 50, 17, 3)]
 )

@@ -267,6 +267,23 @@ def test_words_that_tell_a_side_or_a_part_stay() -> None:
     for word in ("left", "L", "hand", "Head"):
         header = [f"{word}_{k:02d}m_{a}" for k in range(20) for a in "xyz"]
         assert all(name.startswith(f"{word}_") for name in meaning_of(header).markers)
+    parts = [
+        "shoulder",
+        "upper_arm",
+        "elbow",
+        "forearm",
+        "wrist",
+        "hand",
+        "hip",
+        "thigh",
+        "knee",
+        "shank",
+        "ankle",
+        "toe",
+    ]
+    for side in ("left", "L"):  # of one side of a body
+        header = [f"{side}_{part}_{a}" for part in parts for a in "xyz"]
+        assert all(name.startswith(f"{side}_") for name in meaning_of(header).markers)
 
 
 def test_orientations_beside_places_leave_them_markers(tmp_path: Path, standing: Recording) -> None:

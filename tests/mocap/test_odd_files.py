@@ -213,6 +213,7 @@ TABLES: dict[str, Change] = {
     "coordinates": lambda s: re.sub(r"_([xyz])\b", r".coord.\1", s),
     "axes in the middle": lambda s: re.sub(r"_([xyz])\b", r"_\1_coord", s),
     "axes in brackets": lambda s: re.sub(r"_([xyz])\b", r".pos[\1]", s),
+    "heads of bones": lambda s: re.sub(r"_([xyz])\b", r".head_\1", s),
     "axes of translations": lambda s: re.sub(r"_([xyz])\b", r"_T\1", s),
     "velocities too": velocities,
     "quaternions too": quaternions,

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
-from ..placing.part_names import Place, place_of
+from ..placing.part_names import place_of
 from ..placing.size import named_unit
 
 # fmt: off
@@ -63,6 +63,7 @@ _DECORATION = frozenset((
     "global", "pose",
 ))
 _WHOLE = "body"  # as in FreeMoCap's tables, where others have hands and face: it tells where, too
+_PARTS = 4  # of a body; so many are those of all of it
 _MANY = 12  # markers: what so many names share is not where they sit
 # fmt: on
 _CONFIDENCE = re.compile(
@@ -337,17 +338,23 @@ def _undecorated(names: list[str]) -> list[str]:
         matches = [match for name in names if (match := re.fullmatch(pattern, name))]
         words = {match[word].lower() for match in matches} if word else set()
         short = [match[rest] for match in matches]
-        shared = not word or (len(words) == 1 and _may_go(words.pop(), len(names)))
+        shared = not word or (len(words) == 1 and _may_go(words.pop(), short))
         differ = len(names) >= 3 and len(short) == len(set(short)) == len(names)
         if shared and differ and not all(name.isdigit() for name in short):  # T_1 is a vertebra
             names = short
     return names
 
 
-def _may_go(word: str, n_names: int) -> bool:
-    """Whether a word that so many names share tells neither a part of a body nor a side."""
-    tells = word == _WHOLE or place_of(word) != Place("", "")
-    return word in _DECORATION or (n_names >= _MANY and not tells)
+def _may_go(word: str, rest: list[str]) -> bool:
+    """Whether a word that all names share tells nothing that what is left of them does not.
+
+    A part of a body or a side stays; but all bones may have a head, ``Hips.head, LeftArm.head``.
+    """
+    parts = [place_of(name).part for name in rest]
+    told = len(set(parts) - {""}) >= _PARTS and 2 * parts.count("") < len(parts)
+    place = place_of(word)
+    tells = word == _WHOLE or place.side or (place.part and not told)
+    return bool(word in _DECORATION or (len(rest) >= _MANY and not tells))
 
 
 def _is_turn(name: str, beside: set[str]) -> bool:

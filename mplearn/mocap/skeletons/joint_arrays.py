@@ -176,7 +176,7 @@ class JointArrayReader(Reader):
         except RecordingError:
             return False
         poses = archive.first_of((*POSES, *ROOTS))
-        return poses is None and archive.first_of(_NAMES) is not None
+        return poses is None and _name_of_joints(archive) is not None
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read the joints; see `Reader.read`."""
@@ -186,7 +186,7 @@ class JointArrayReader(Reader):
             points = finite(path, "the array", read_npy(path))
         else:
             archive = NPZFile(path)
-            name = archive.first_of(_NAMES)
+            name = _name_of_joints(archive)
             if name is None:
                 raise bad_file(path, f"arrays {', '.join(archive.names[:8])}", "one of joints")
             points, said_hz = archive.numbers(name), archive.rate_hz()
@@ -220,6 +220,23 @@ class JointArrayReader(Reader):
         points = np.concatenate([points[:, kept] for points in people], axis=1)
         warn_of_pictures(points, names, findings)
         return placed_markers(path, points, names, rate_hz, USUAL, hints, findings)
+
+
+def _name_of_joints(archive: NPZFile) -> str | None:
+    """Return the name of the array of joints: a usual one, or that of the only one of their shape.
+
+    None for none, and for several.
+    """
+    usual = archive.first_of(_NAMES)
+    if usual is not None:
+        return usual
+    shapes = {name: archive.shape(name) for name in archive.names}
+    fitting = [
+        name
+        for name, shape in shapes.items()
+        if len(shape) in (3, 4) and shape[-1] in (3, 4) and shape[-2] in _BY_NUMBER
+    ]
+    return fitting[0] if len(fitting) == 1 else None
 
 
 def _as_people(path: Path, array: FloatArray) -> list[FloatArray]:
