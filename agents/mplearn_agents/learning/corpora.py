@@ -169,13 +169,19 @@ def _summary(corpus: Corpus, written: Iterable[Path]) -> str:
     assert learner is not None
     people = len({shard.person for shard in corpus.shards if shard.person})
     memory = max(report.memory_bytes for report in corpus.reports)
+    who = _counted(people, "person", "people") if people else "unnamed people"
     return (
-        f"{len(learner.tree.leaves)} primitives from {progress.learned} takes of "
-        f"{people or 'unnamed'} people in {progress.shards} shards, {progress.watched_s / 60:.1f} "
+        f"{_counted(len(learner.tree.leaves), 'primitive', 'primitives')} from "
+        f"{_counted(progress.learned, 'take', 'takes')} of {who} in "
+        f"{_counted(progress.shards, 'shard', 'shards')}, {progress.watched_s / 60:.1f} "
         f"minutes of motion; merging took {corpus.merging_s:.1f} s, a worker had "
         f"{memory / 2**20:.0f} MB at most; written to "
         f"{printable(' and '.join(str(path) for path in written))}"
     )
+
+
+def _counted(n: int, one: str, several: str) -> str:
+    return f"{n} {one if n == 1 else several}"
 
 
 def _say_refused(console: Console, refused: Iterable[tuple[str, str]]) -> None:
