@@ -257,7 +257,15 @@ class StoreDamagedError(StoreError):
 
 
 class StoreWriteError(StoreError):
-    """A store cannot be written: the disk is full, or the file is read-only."""
+    """A store cannot be written: the disk is full, or the file is read-only.
+
+    Example:
+        >>> try:
+        ...     raise StoreWriteError("life.db cannot be written: the disk is full")
+        ... except StoreError as error:  # whatever is wrong with a store
+        ...     print(error)
+        life.db cannot be written: the disk is full
+    """
 
 
 class StoreWarning(UserWarning):

@@ -260,11 +260,23 @@ class Recording:
 
     @property
     def markers(self) -> FloatArray:
-        """Marker positions, shape (T, M, 3) [m], a view of the frames."""
+        """Marker positions, shape (T, M, 3) [m], a view of the frames.
+
+        Example:
+            >>> take = Recording(np.zeros((100, 6)), 100.0, marker_channels(("LSHO", "RSHO")))
+            >>> take.markers.shape  # a view: what is written into it is written into the frames
+            (100, 2, 3)
+        """
         return self.frames.reshape(len(self), len(self.marker_names), 3)
 
     def sliced(self, start: int, end: int) -> Recording:
-        """Return the frames [start, end), with the labels that lie wholly inside, shifted."""
+        """Return the frames [start, end), with the labels that lie wholly inside, shifted.
+
+        Example:
+            >>> take = Recording(np.zeros((300, 1)), 100.0, ("elbow",), name="swing")
+            >>> take.sliced(100, 250).duration_s
+            1.5
+        """
         if not 0 <= start < end <= len(self):
             raise InvalidValueError(
                 f"[{start}, {end}) is not inside the recording's [0, {len(self)})"

@@ -40,6 +40,19 @@ def recognise_skeleton(recording: Recording, names: Mapping[str, str] | None = N
 
     Raises:
         BodyError: There is no body in it, or left and right cannot be told apart, with the reason.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.body import human_body
+        >>> from mplearn.recording import Skeleton, marker_channels
+        >>> tree = human_body().tree
+        >>> names, place = tree.body_names, tree.forward(tree.rest)[0]  # (J, 3) [m]
+        >>> offsets = np.vstack((place[0], place[1:] - place[tree.parent[1:]]))
+        >>> skeleton = Skeleton(names, tuple(tree.parent), offsets)
+        >>> frames = np.tile(place.ravel(), (50, 1))  # somebody stands there
+        >>> take = Recording(frames, 50.0, marker_channels(names), skeleton=skeleton)
+        >>> abs(recognise_skeleton(take).stature_m - 1.75) < 0.05
+        True
     """
     skeleton = recording.skeleton
     if skeleton is None:

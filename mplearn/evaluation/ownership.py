@@ -60,6 +60,16 @@ class OwnershipRates:
         demonstrations: For each activity that had a primitive, its segments up to the first one's
             birth.
         shown: Pairs of activity and primitive, one a segment in a primitive that shows an activity.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.evaluation.ownership import Heard
+        >>> from mplearn.recording import Segment
+        >>> from mplearn.tree import Placement
+        >>> heard = Heard(100, (Segment(0, 100),), (Placement(0, 1, True, 0.2, 0.5),))
+        >>> rates = rate_ownership([(np.repeat(["bow"], 100), heard)])
+        >>> rates.owned, rates.purity, rates.false_positive
+        (('bow',), 1.0, 1.0)
     """
 
     activities: tuple[str, ...]
@@ -128,6 +138,18 @@ def rate_ownership(
 
     Raises:
         InvalidValueError: There are not as many labels as frames.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.evaluation.ownership import Heard
+        >>> from mplearn.recording import Segment
+        >>> from mplearn.tree import Placement
+        >>> labels = np.repeat(["bow", "wave"], 100)
+        >>> segments = Segment(0, 100), Segment(100, 200)
+        >>> placements = Placement(0, 1, True, 0.2, 0.5), Placement(1, 2, True, 0.2, 0.5)
+        >>> rates = rate_ownership([(labels, Heard(200, segments, placements))])
+        >>> dict(rates.primitives), rates.inside
+        ({1: 'bow', 2: 'wave'}, 1.0)
     """
     account = _Account()
     names: set[str] = set()

@@ -124,7 +124,19 @@ class TransitionGraph:
         self._index = {i: k for k, i in enumerate(i for i in self._index if i != id)}
 
     def merge_nodes(self, keep: int, merged: int) -> None:
-        """Make two nodes one: what was counted for ``merged`` is added to ``keep``."""
+        """Make two nodes one: what was counted for ``merged`` is added to ``keep``.
+
+        Example:
+            >>> from mplearn.graph import TransitionGraph
+            >>> graph = TransitionGraph()
+            >>> for id in (1, 2, 3):
+            ...     graph.add_node(id)
+            >>> for previous, next_id in ((1, 2), (2, 1), (1, 2), (2, 3), (3, 1)):
+            ...     graph.observe(previous, next_id, 1.0)
+            >>> graph.merge_nodes(1, 3)
+            >>> graph.ids, graph.count(2, 1)
+            ((1, 2), 2)
+        """
         self._require(keep, merged)
         if keep != merged:
             self._rename({merged: keep})
@@ -133,6 +145,17 @@ class TransitionGraph:
         """Add the nodes and counts of another graph, its ids replaced where ``new_id`` names them.
 
         Counts do not depend on the order in which graphs are added.
+
+        Example:
+            >>> from mplearn.graph import TransitionGraph
+            >>> graph = TransitionGraph()
+            >>> for id in (1, 2, 3):
+            ...     graph.add_node(id)
+            >>> for previous, next_id in ((1, 2), (2, 1), (1, 2), (2, 3), (3, 1)):
+            ...     graph.observe(previous, next_id, 1.0)
+            >>> graph.add(graph.copy())  # the same again, from another part of a corpus
+            >>> graph.count(1, 2)
+            4
         """
         self._before_change()
         added = other.copy()
@@ -216,6 +239,16 @@ class TransitionGraph:
         """Return the observed transition probabilities from a primitive, shape (n,), as `ids`.
 
         Exactly 0 where a transition has never been seen; all 0 at a dead end.
+
+        Example:
+            >>> from mplearn.graph import TransitionGraph
+            >>> graph = TransitionGraph()
+            >>> for id in (1, 2, 3):
+            ...     graph.add_node(id)
+            >>> for previous, next_id in ((1, 2), (2, 1), (1, 2), (2, 3), (3, 1)):
+            ...     graph.observe(previous, next_id, 1.0)
+            >>> dict(zip(graph.ids, graph.prior(2).tolist(), strict=True))  # after 2
+            {1: 0.5, 2: 0.0, 3: 0.5}
         """
         self._require(id)
         row = self.followers((id,))
@@ -234,6 +267,16 @@ class TransitionGraph:
         Raises:
             UnknownPrimitiveError: The history names something that is not a node.
             InvalidValueError: ``smoothing`` is negative or not finite.
+
+        Example:
+            >>> from mplearn.graph import TransitionGraph
+            >>> graph = TransitionGraph()
+            >>> for id in (1, 2, 3):
+            ...     graph.add_node(id)
+            >>> for previous, next_id in ((1, 2), (2, 1), (1, 2), (2, 3), (3, 1)):
+            ...     graph.observe(previous, next_id, 1.0)
+            >>> graph.probabilities([1, 2]).round(2).tolist()  # nothing is impossible
+            [0.44, 0.19, 0.38]
         """
         mass = self.concentration if smoothing is None else smoothing
         if not (mass >= 0 and math.isfinite(mass)):
@@ -243,7 +286,18 @@ class TransitionGraph:
         return backed_off(self, context, mass)
 
     def predict(self, history: History, k: int = 3) -> tuple[Prediction, ...]:
-        """Return the ``k`` primitives most likely to come next, the most likely first."""
+        """Return the ``k`` primitives most likely to come next, the most likely first.
+
+        Example:
+            >>> from mplearn.graph import TransitionGraph
+            >>> graph = TransitionGraph()
+            >>> for id in (1, 2, 3):
+            ...     graph.add_node(id)
+            >>> for previous, next_id in ((1, 2), (2, 1), (1, 2), (2, 3), (3, 1)):
+            ...     graph.observe(previous, next_id, 1.0)
+            >>> [(each.id, round(each.probability, 2)) for each in graph.predict([1], k=2)]
+            [(2, 0.79), (1, 0.12)]
+        """
         last = usable_context(history, 1)
         p = self.probabilities(history)
         return most_likely(self.ids, p, k, lambda id: self.time_s(last, id))
@@ -254,6 +308,17 @@ class TransitionGraph:
         The score of anomalies in the order of primitives: large where one comes that seldom or
         never came there. NaN where a segment or the one before it was not recognised (None): that
         is an anomaly of the motion, not of the order.
+
+        Example:
+            >>> from mplearn.graph import TransitionGraph
+            >>> graph = TransitionGraph()
+            >>> for id in (1, 2, 3):
+            ...     graph.add_node(id)
+            >>> for previous, next_id in ((1, 2), (2, 1), (1, 2), (2, 3), (3, 1)):
+            ...     graph.observe(previous, next_id, 1.0)
+            >>> usual, odd = graph.surprises([1, 2])[-1], graph.surprises([1, 1])[-1]
+            >>> bool(odd > usual > 0)
+            True
         """
         self._require(*(id for id in sequence if id is not None))
         return surprise(self, sequence)
@@ -292,6 +357,16 @@ class TransitionGraph:
         The walk follows `prior`; at a dead end, and with probability ``restart`` anywhere, it
         goes on at a primitive drawn uniformly, which makes the answer unique on every graph
         (PageRank with damping 1 - restart).
+
+        Example:
+            >>> from mplearn.graph import TransitionGraph
+            >>> graph = TransitionGraph()
+            >>> for id in (1, 2, 3):
+            ...     graph.add_node(id)
+            >>> for previous, next_id in ((1, 2), (2, 1), (1, 2), (2, 3), (3, 1)):
+            ...     graph.observe(previous, next_id, 1.0)
+            >>> graph.stationary().round(2).tolist()  # how often each is visited in the long run
+            [0.4, 0.4, 0.2]
         """
         if not 1e-4 <= restart <= 1:
             raise InvalidValueError(f"restart must lie in [0.0001, 1], not {restart}")
@@ -324,6 +399,16 @@ class TransitionGraph:
             UnknownPrimitiveError: A primitive is not a node.
             NoPathError: There is no such path; the message says what was asked.
             InvalidValueError: A value is not allowed, or the search would be too large.
+
+        Example:
+            >>> from mplearn.graph import TransitionGraph
+            >>> graph = TransitionGraph()
+            >>> for id in (1, 2, 3):
+            ...     graph.add_node(id)
+            >>> for previous, next_id in ((1, 2), (2, 1), (1, 2), (2, 3), (3, 1)):
+            ...     graph.observe(previous, next_id, 1.0)
+            >>> graph.path(1, 3)
+            (1, 2, 3)
         """
         return self.k_paths(start, goal, 1, by=by, avoid=avoid, visit=visit, **asked)[0]
 
@@ -341,6 +426,16 @@ class TransitionGraph:
         """Return up to ``k`` different paths, best first; arguments as in `path`.
 
         Where nothing is asked but what to avoid, no primitive comes twice in a path; else it may.
+
+        Example:
+            >>> from mplearn.graph import TransitionGraph
+            >>> graph = TransitionGraph()
+            >>> for id in (1, 2, 3):
+            ...     graph.add_node(id)
+            >>> for previous, next_id in ((1, 2), (2, 1), (1, 2), (2, 3), (3, 1)):
+            ...     graph.observe(previous, next_id, 1.0)
+            >>> list(graph.k_paths(2, 1, 2))
+            [(2, 1), (2, 3, 1)]
         """
         self._require(start, goal, *avoid, *visit)
         if k < 1:
@@ -376,6 +471,17 @@ class TransitionGraph:
 
         Raises:
             NoPathError: No such walk exists; the message says how far one gets.
+
+        Example:
+            >>> from mplearn.graph import TransitionGraph
+            >>> graph = TransitionGraph()
+            >>> for id in (1, 2, 3):
+            ...     graph.add_node(id)
+            >>> for previous, next_id in ((1, 2), (2, 1), (1, 2), (2, 3), (3, 1)):
+            ...     graph.observe(previous, next_id, 1.0)
+            >>> import numpy as np
+            >>> graph.walk(1, 4, np.random.default_rng(0))
+            (1, 2, 1, 2)
         """
         if length < 1:
             raise InvalidValueError(f"length must be at least 1, not {length}")
@@ -399,6 +505,16 @@ class TransitionGraph:
         """Return the graph as a `networkx.DiGraph` of its own.
 
         Edges have ``count``, ``probability``, ``duration_s`` and ``duration_std_s`` [s].
+
+        Example:
+            >>> from mplearn.graph import TransitionGraph
+            >>> graph = TransitionGraph()
+            >>> for id in (1, 2, 3):
+            ...     graph.add_node(id)
+            >>> for previous, next_id in ((1, 2), (2, 1), (1, 2), (2, 3), (3, 1)):
+            ...     graph.observe(previous, next_id, 1.0)
+            >>> graph.to_networkx().edges[1, 2]["count"]
+            2
         """
         import networkx as nx
 
@@ -453,6 +569,16 @@ class TransitionGraph:
 
         Args:
             group_of: Group of each primitive; one that is not named stays a node of its own.
+
+        Example:
+            >>> from mplearn.graph import TransitionGraph
+            >>> graph = TransitionGraph()
+            >>> for id in (1, 2, 3):
+            ...     graph.add_node(id)
+            >>> for previous, next_id in ((1, 2), (2, 1), (1, 2), (2, 3), (3, 1)):
+            ...     graph.observe(previous, next_id, 1.0)
+            >>> graph.grouped({1: 10, 2: 10, 3: 11}).count(10, 11)
+            1
         """
         above = TransitionGraph(
             order=self.order,

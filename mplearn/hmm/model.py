@@ -124,6 +124,15 @@ class LeftRightHMM(GaussianStates):
         """Return the means of the states, each held for its expected duration, shape (T, D).
 
         The last state has no duration of its own: it is held as long as the others on average.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn.hmm import fit
+            >>> swing = np.sin(np.linspace(0, np.pi, 40))[:, None]
+            >>> model = fit([swing], n_states=4, variance_floor=1e-3)
+            >>> motion = model.mean_motion()
+            >>> motion.shape[1], bool(0.7 < motion.max() < 1.0)
+            (1, True)
         """
         return self.means[self.mean_path()]
 
@@ -144,6 +153,14 @@ class LeftRightHMM(GaussianStates):
 
         Returns:
             The log-likelihood; -inf where a complete motion has fewer frames than states.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn.hmm import fit
+            >>> swing = np.sin(np.linspace(0, np.pi, 40))[:, None]
+            >>> model = fit([swing], n_states=4, variance_floor=1e-3)
+            >>> model.score(swing) > model.score(swing[::-1] - 0.2)
+            True
         """
         frames = as_frames(frames, self.n_channels)
         weights = as_weights(weights, len(frames))
@@ -170,6 +187,14 @@ class LeftRightHMM(GaussianStates):
 
         Raises:
             ModelError: A complete sequence has fewer frames than the model has states.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn.hmm import fit
+            >>> swing = np.sin(np.linspace(0, np.pi, 40))[:, None]
+            >>> model = fit([swing], n_states=4, variance_floor=1e-3)
+            >>> model.posteriors(swing).sum(axis=1).round(6).tolist()[:3]
+            [1.0, 1.0, 1.0]
         """
         densities = self._densities(frames, weights)
         self._check_length(densities, complete)

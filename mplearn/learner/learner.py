@@ -142,6 +142,11 @@ class MotionLearner:
         Raises:
             FrameError: The frame has the wrong width, is not finite, or its time does not fit;
                 nothing has changed then.
+
+        Example:
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), rate_hz=50.0))
+            >>> learner.learn_one(np.array([0.3]), time_s=0.0)  # nothing was decided yet
+            []
         """
         frame = self._checks.frame(frame)
         if time_s is not None:
@@ -176,6 +181,19 @@ class MotionLearner:
                 rate.
             BodyError: Its markers belong to no known set.
             InvalidValueError: ``at_once`` is not positive.
+
+        Example:
+            >>> import numpy as np
+            >>> t = np.arange(400) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> take = Recording(swing, 100.0, ("elbow",), name="swings")
+            >>> learner = MotionLearner(LearnerConfig(take.channels, segmenter="zero-velocity"))
+            >>> for number, events in enumerate(learner.learn_recording(take)):  # a frame at a time
+            ...     for event in events:
+            ...         if isinstance(event, SegmentClosed) and event.segment.cause == "dip":
+            ...             print(f"frame {number}: a dip in frame {event.segment.end}")
+            frame 56: a dip in frame 50
+            frame 256: a dip in frame 250
         """
         if at_once < 1:
             raise InvalidValueError(f"at_once must be positive, not {at_once}")
@@ -233,7 +251,18 @@ class MotionLearner:
         self._checks.recording(recording)
 
     def end_stream(self) -> list[Event]:
-        """Close what is open: what comes next is another stream, perhaps of another person."""
+        """Close what is open: what comes next is another stream, perhaps of another person.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> [event.segment.cause for event in learner.end_stream()]  # a rest
+            ['end']
+        """
         events: list[Event] = []
         if self.observer is not None:
             events = self._take(self.observer.finish())
@@ -247,13 +276,36 @@ class MotionLearner:
     # ---- learning by hand
 
     def split(self, id: int, groups: Sequence[Sequence[int]] | None = None) -> Change:
-        """Split a primitive as a person sees fit; see `PeopleTree.split`."""
+        """Split a primitive as a person sees fit; see `PeopleTree.split`.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> change = learner.split(1, groups=[(0, 1, 2), (3, 4, 5)])
+            >>> len(change.splits[0].into), len(learner.snapshot())
+            (2, 3)
+        """
         return self._edited(self.tree.split(id, groups))
 
     def merge(self, first: int, second: int) -> Change:
         """Merge two primitives as a person sees fit; see `PeopleTree.merge`.
 
         Learners are merged by `mplearn.merge_learners`.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> change = learner.merge(1, 2)  # up and down are one, somebody says
+            >>> change.merges[0].kept, learner.snapshot().names
+            (1, ('P1',))
         """
         return self._edited(self.tree.merge(first, second))
 
@@ -262,7 +314,19 @@ class MotionLearner:
         return self._edited(self.tree.reparent(id, parent))
 
     def remove(self, id: int, *, forget: bool = False) -> Change:
-        """Take a primitive out; see `PeopleTree.remove`."""
+        """Take a primitive out; see `PeopleTree.remove`.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> change = learner.remove(2)
+            >>> learner.snapshot().names
+            ('P1',)
+        """
         return self._edited(self.tree.remove(id, forget=forget))
 
     def freeze(self, id: int) -> Change:
@@ -273,6 +337,18 @@ class MotionLearner:
 
         Raises:
             UnknownPrimitiveError: There is no such primitive.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> change = learner.freeze(1)
+            >>> events = learner.learn_many(swing)  # more of the same
+            >>> [primitive.n_exemplars for primitive in learner.snapshot()]  # it stays
+            [6, 12]
         """
         change = self.tree.freeze(id)
         self._snapshots.freeze(self.tree, id)
@@ -289,7 +365,21 @@ class MotionLearner:
         return change
 
     def pause(self) -> None:
-        """Stop learning: motions are recognised from now on, and change nothing."""
+        """Stop learning: motions are recognised from now on, and change nothing.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> learner.pause()
+            >>> n_learned = learner.tree.n_seen
+            >>> events = learner.learn_many(swing)
+            >>> learner.paused, learner.tree.n_seen == n_learned
+            (True, True)
+        """
         self._paused, self._looking = True, None
 
     def resume(self) -> None:
@@ -353,6 +443,16 @@ class MotionLearner:
 
         Raises:
             InvalidValueError: ``k`` is not positive.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> [expected.id for expected in learner.predict_next(k=1)]  # the last was down
+            [1]
         """
         return self.chain.foresee(k)
 
@@ -363,6 +463,18 @@ class MotionLearner:
             shown_once: Whether the library holds motions, too, that are no primitives as yet, such
                 as were shown once: each as one that has a single exemplar, to be performed. Nothing
                 is ever recognised as such.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> library = learner.snapshot()
+            >>> events = learner.learn_many(-swing)  # goes on; the library stays as it is
+            >>> len(library), len(library) < len(learner.snapshot())
+            (2, True)
         """
         library = self._snapshots.take(self.tree, self.graph)
         return (
@@ -449,6 +561,18 @@ class MotionLearner:
 
         Raises:
             StateError: The file cannot be written.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> path = learner.save("swings.learner")
+            >>> later = MotionLearner.load(path)
+            >>> [len(each.learn_many(swing)) for each in (learner, later)]  # bit for bit the same
+            [42, 42]
         """
         FILES.write(Path(path), to_plain(self.state(), whole=True))
         return Path(path)

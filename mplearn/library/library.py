@@ -168,6 +168,18 @@ class PrimitiveLibrary:
         Raises:
             InvalidValueError: The library was made without a recogniser, or the segment has other
                 channels.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> library = learner.snapshot()
+            >>> found = library.recognise(swing[200:250])  # up
+            >>> library[found.primitive].name, found.ratio <= 1.0
+            ('P1', True)
         """
         recogniser = self._recogniser
         frames = np.asarray(frames, dtype=np.float64)
@@ -182,6 +194,19 @@ class PrimitiveLibrary:
 
         Raises:
             InvalidValueError: As `recognise`.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> library = learner.snapshot()
+            >>> up = swing[200:250]
+            >>> usual, odd = library.score_motion(up), library.score_motion(5 * up)
+            >>> odd.score > usual.score, odd.p_value <= usual.p_value
+            (True, True)
         """
         return self.score_recognised(self.recognise(frames))
 
@@ -205,6 +230,19 @@ class PrimitiveLibrary:
         Returns:
             A score for each but the first, see `TransitionGraph.surprises` and `p_values`;
             NaN where it or the one before it was not recognised.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> library = learner.snapshot()
+            >>> orders = (["P1", "P2"], ["P1", "P1"])  # nobody went up twice
+            >>> usual, odd = (library.score_order(order)[-1] for order in orders)
+            >>> odd.score > usual.score
+            True
         """
         known = self._known(sequence)
         scores, shares = self.graph.surprises(known), self.graph.p_values(known)
@@ -216,6 +254,18 @@ class PrimitiveLibrary:
         Args:
             history: The latest primitives, oldest first; None where one was not recognised.
             k: How many to return at most.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> library = learner.snapshot()
+            >>> coming = library.predict_next(["P1"], k=1)[0]
+            >>> library[coming.id].name, coming.probability > 0.5, round(coming.duration_s, 1)
+            ('P2', True, 0.5)
         """
         return self.graph.predict(self._known(history), k)
 
@@ -259,7 +309,19 @@ class PrimitiveLibrary:
         visit: Collection[Key] = (),
         **asked: Unpack[Asked],
     ) -> tuple[int, ...]:
-        """Return the best path, see `TransitionGraph.path`."""
+        """Return the best path, see `TransitionGraph.path`.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> library = learner.snapshot()
+            >>> library.path("P1", "P2")
+            (1, 2)
+        """
         return self.k_paths(start, goal, 1, by=by, avoid=avoid, visit=visit, **asked)[0]
 
     def k_paths(
@@ -285,7 +347,19 @@ class PrimitiveLibrary:
         )
 
     def walk(self, start: Key | None, length: int, rng: np.random.Generator) -> tuple[int, ...]:
-        """Draw a walk of exactly ``length`` primitives, see `TransitionGraph.walk`."""
+        """Draw a walk of exactly ``length`` primitives, see `TransitionGraph.walk`.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> library = learner.snapshot()
+            >>> library.walk("P1", 4, np.random.default_rng(1))
+            (1, 2, 1, 2)
+        """
         return self.graph.walk(None if start is None else self[start].id, length, rng)
 
     @cached_property
@@ -321,6 +395,18 @@ class PrimitiveLibrary:
             start: Posture to start from, at rest, shape (D,).
             cutoff_hz: Cut-off of the low-pass filter [1/s]; None is the style's own.
             rng: Source of randomness, needed by "averaged" only.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> library = learner.snapshot()
+            >>> motion = library.generate(["P1", "P2"], style="smooth")
+            >>> motion.path, bool(0.8 < motion.frames.max() < 1.1)
+            ((1, 2), True)
         """
         motion = generate(
             [self[key] for key in path],
@@ -341,6 +427,17 @@ class PrimitiveLibrary:
 
         Raises:
             InvalidValueError: The name is empty, not printable, or another primitive's.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> library = learner.snapshot()
+            >>> library.rename("P1", "up").names, library.names  # the old one stays as it was
+            (('up', 'P2'), ('P1', 'P2'))
         """
         chosen = self[key]
         if not (isinstance(name, str) and name.strip() and name.isprintable()):
@@ -356,6 +453,19 @@ class PrimitiveLibrary:
 
         Raises:
             LibraryError: The file cannot be written.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> library = learner.snapshot()
+            >>> path = library.save("swings.mplearn")
+            >>> from mplearn import PrimitiveLibrary
+            >>> PrimitiveLibrary.load(path).names
+            ('P1', 'P2')
         """
         FILES.write(Path(path), to_plain(self.state(), whole=True))
         return Path(path)

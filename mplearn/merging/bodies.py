@@ -27,6 +27,19 @@ def merge_bodies(
         second: Gets others.
         known: Number in the first of people of the second, as far as that was told.
         apart: People of the first who are nobody else of the second, as was told.
+
+    Example:
+        >>> import numpy as np
+        >>> from mplearn.body.observer.known_bodies import IdentityConfig
+        >>> upper_arm, thigh = 0.30, 0.42  # [m]
+        >>> first, second = (KnownBodies(np.full(2, 0.01), IdentityConfig()) for _ in range(2))
+        >>> first.n_people = second.n_people = 1
+        >>> for _ in range(20):
+        ...     first.learn(0, np.array([upper_arm, thigh]))
+        ...     second.learn(0, np.array([0.9 * upper_arm, 0.9 * thigh]))  # a smaller person
+        >>> merged, numbers = merge_bodies(first, second, {}, ())
+        >>> merged.n_people, numbers
+        (2, {0: 1})
     """
     mine, theirs, config = first.state(), second.state(), first.config
     numbers = dict(known)

@@ -96,10 +96,27 @@ class Segmenter(ABC):
 
         Raises:
             InvalidValueError: An argument is out of range.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn.segmentation import make_segmenter
+            >>> segmenter = make_segmenter("zero-velocity", 1, 100.0)
+            >>> for frame in np.linspace(0.0, 1.0, 80)[:, None]:
+            ...     cuts = segmenter.update(frame)
+            >>> segmenter.scaffold(ending=0.05)  # a known motion is under way, and far from its end
         """
 
     def segment(self, frames: FloatArray) -> list[Segment]:
-        """Segment a whole recording, shape (T, D), as the on-line loop does, and flush."""
+        """Segment a whole recording, shape (T, D), as the on-line loop does, and flush.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn.segmentation import make_segmenter
+            >>> lifts = np.sin(np.pi * np.arange(400) / 100.0)[:, None]  # turns each second
+            >>> cuts = make_segmenter("zero-velocity", 1, 100.0).segment(lifts)
+            >>> cuts[0].start, cuts[-1].end
+            (0, 400)
+        """
         closed: list[Segment] = []
         for frame in frames:
             closed.extend(self.update(frame))

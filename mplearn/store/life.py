@@ -263,6 +263,18 @@ class LifelongLearner(Closing):
 
         Raises:
             MPLearnError: It cannot be done; nothing has changed then.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> from mplearn.store import Rename
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> learner = MotionLearner(LearnerConfig(("elbow",), segmenter="zero-velocity"))
+            >>> events = learner.learn_many(swing)
+            >>> life = LifelongLearner(learner)
+            >>> life.execute(Rename(1, "up"), by="Anna").number, life.snapshot().names
+            (1, ('up', 'P2'))
         """
         when = time.time() if when is None else float(when)
         if not np.isfinite(when):
@@ -332,7 +344,19 @@ class LifelongLearner(Closing):
         return self._journal.entries(since)
 
     def history(self, primitive: int) -> tuple[Happening, ...]:
-        """Return what happened to a primitive, the oldest first."""
+        """Return what happened to a primitive, the oldest first.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> t = np.arange(1200) / 100.0
+            >>> swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None]  # up and down
+            >>> config = LearnerConfig(("elbow",), segmenter="zero-velocity")
+            >>> life = LifelongLearner(MotionLearner(config))
+            >>> events = life.learn_many(swing)
+            >>> [happening.what for happening in life.history(1)]
+            ['born', 'confirmed']
+        """
         return self._journal.history(primitive)
 
     def snapshot(self, *, shown_once: bool = False) -> PrimitiveLibrary:

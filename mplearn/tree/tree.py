@@ -235,7 +235,18 @@ class PrimitiveTree:
         return nodes[id]
 
     def radius(self, id: int) -> float:
-        """Return the radius of a node below the root, on the scale of the rules."""
+        """Return the radius of a node below the root, on the scale of the rules.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn.tree import PrimitiveTree, TreeConfig
+            >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+            >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+            >>> placed = [tree.insert(k * lift) for k in (1.0, -1.0, 1.01, -1.01, 0.99, 0.98)]
+            >>> nearest = tree.insert(lift)
+            >>> nearest.distance <= tree.radius(nearest.node_id)
+            True
+        """
         self.node(id)
         index = self._structure.index
         if id not in index.ids:
@@ -245,7 +256,17 @@ class PrimitiveTree:
         return index.radius(id)
 
     def exemplars(self, id: int) -> tuple[FloatArray, ...]:
-        """Return the kept segments of a node as they came, shape (L, D) each."""
+        """Return the kept segments of a node as they came, shape (L, D) each.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn.tree import PrimitiveTree, TreeConfig
+            >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+            >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+            >>> placed = [tree.insert(k * lift) for k in (1.0, -1.0, 1.01, -1.01, 0.99, 0.98)]
+            >>> [each.shape[1] for each in tree.exemplars(tree.leaves[0])]
+            [2, 2, 2, 2]
+        """
         return tuple(self._memory.frames[number] for number in self.node(id).members)
 
     def model(self, id: int) -> LeftRightHMM:
@@ -257,6 +278,15 @@ class PrimitiveTree:
 
         Raises:
             UnknownPrimitiveError: There is none of this id.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn.tree import PrimitiveTree, TreeConfig
+            >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+            >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+            >>> placed = [tree.insert(k * lift) for k in (1.0, -1.0, 1.01, -1.01, 0.99, 0.98)]
+            >>> tree.model(tree.leaves[0]).n_states
+            8
         """
         model = self.motion_model(id)
         return model if isinstance(model, LeftRightHMM) else model.left_right()
@@ -438,6 +468,16 @@ class PrimitiveTree:
         Raises:
             UnknownPrimitiveError: There is no such primitive.
             InvalidValueError: The groups are wrong, or there are too few exemplars.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn.tree import PrimitiveTree, TreeConfig
+            >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+            >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+            >>> placed = [tree.insert(k * lift) for k in (1.0, -1.0, 1.01, -1.01, 0.99, 0.98)]
+            >>> change = tree.split(tree.leaves[0], [(0, 1), (2, 3)])
+            >>> len(tree.leaves), len(change.splits[0].into)
+            (3, 2)
         """
         leaf = leaf_of(self._structure, id)
         numbers = chosen_groups(leaf, groups)
@@ -486,6 +526,17 @@ class PrimitiveTree:
 
         Raises:
             UnknownPrimitiveError: There is no such primitive.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn.tree import PrimitiveTree, TreeConfig
+            >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+            >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+            >>> placed = [tree.insert(k * lift) for k in (1.0, -1.0, 1.01, -1.01, 0.99, 0.98)]
+            >>> change = tree.freeze(tree.leaves[0])
+            >>> placed = tree.insert(1.02 * lift)
+            >>> placed.node_id == tree.leaves[0], len(tree.exemplars(tree.leaves[0]))
+            (True, 4)
         """
         primitive_of(self._structure, id).frozen = frozen
         return Change()

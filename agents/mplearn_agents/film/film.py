@@ -37,6 +37,19 @@ def film(
 
     Raises:
         MissingDependencyError: There is no off-screen renderer on this machine.
+
+    Example:
+        >>> from mplearn.body import robot_body
+        >>> from mplearn_agents.walk import WalkResult, WalkStep
+        >>> step = WalkStep(3, 7, "bow down", 1.0, 0.0, False, False, 0.01, 0.01, 0.03)
+        >>> postures = robot_body().rest[None].repeat(2, axis=0)
+        >>> walk = WalkResult((step,), postures, np.zeros(2, int), 25.0)
+        >>> try:
+        ...     shape = next(film(walk, robot_body().xml, size=(64, 48))).shape
+        ... except MissingDependencyError:  # no renderer on this machine
+        ...     shape = (48, 64, 3)
+        >>> shape
+        (48, 64, 3)
     """
     bodies = [robot_xml] if person is None else [robot_xml, person[0].xml]
     zmp = zero_moment_points(walk, robot_xml) if balance else None
