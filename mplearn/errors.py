@@ -307,8 +307,8 @@ class MissingDependencyError(MPLearnError, ImportError):
     Example:
         >>> from mplearn.extras import require
         >>> try:
-        ...     require("no_such_package", "exchange")
+        ...     require("no_such_package", "tables")
         ... except MissingDependencyError as error:
         ...     print(error)
-        this needs the package 'no_such_package': pip install 'mplearn[exchange]'
+        this needs the package 'no_such_package': pip install 'mplearn[tables]'
     """

@@ -192,6 +192,8 @@ class Recording:
         >>> take = Recording(np.zeros((200, 3)), 100.0, marker_channels(["head"]), name="still")
         >>> len(take), take.channels, take.is_markers
         (200, ('head.x', 'head.y', 'head.z'), True)
+        >>> take
+        Recording('still', 200 frames of 3 channels at 100 Hz)
     """
 
     frames: FloatArray
@@ -229,6 +231,11 @@ class Recording:
         object.__setattr__(self, "rate_hz", rate)
         object.__setattr__(self, "channels", tuple(self.channels))
         object.__setattr__(self, "labels", tuple(self.labels))
+
+    def __repr__(self) -> str:
+        """Return how many frames of how many channels there are."""
+        what = f"{len(self)} frames of {len(self.channels)} channels at {self.rate_hz:g} Hz"
+        return f"Recording({self.name!r}, {what})"
 
     def __len__(self) -> int:
         """Number of frames."""

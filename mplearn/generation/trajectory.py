@@ -66,6 +66,11 @@ class Trajectory:
         object.__setattr__(self, "starts", starts)
         object.__setattr__(self, "channels", tuple(self.channels))
 
+    def __repr__(self) -> str:
+        """Return its path and how many frames of how many channels there are."""
+        what = f"{len(self)} frames of {len(self.channels)} channels at {self.rate_hz:g} Hz"
+        return f"Trajectory(path={self.path}, {what})"
+
     def __len__(self) -> int:
         """Number of frames T."""
         return len(self.frames)

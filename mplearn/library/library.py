@@ -113,6 +113,12 @@ class PrimitiveLibrary:
                 graph.add_node(id)
         object.__setattr__(self, "graph", graph.snapshot())
 
+    def __repr__(self) -> str:
+        """Return how many primitives there are, and the names of the first."""
+        names = ", ".join(self.names[:8]) + (", ..." if len(self) > 8 else "")
+        what = f"{len(self.channels)} channels at {self.rate_hz:g} Hz"
+        return f"PrimitiveLibrary({len(self)} primitives: {names}; {what})"
+
     def __deepcopy__(self, memo: dict[int, Any]) -> PrimitiveLibrary:
         """Share it: nothing of it changes."""
         return self

@@ -41,6 +41,8 @@ class Primitive:
         >>> primitive = Primitive.from_exemplars(1, model, [swing], 50.0, name="swing")
         >>> primitive.name, primitive.mean_duration_s
         ('swing', 1.0)
+        >>> primitive
+        Primitive(1, 'swing', mean_duration_s=1.00, n_exemplars=1)
     """
 
     id: int
@@ -51,6 +53,11 @@ class Primitive:
     kept: tuple[CompactMotion, ...] = field(default=(), repr=False)
     name: str = ""
     parent: int | None = None
+
+    def __repr__(self) -> str:
+        """Return its id, name, length and number of demonstrations."""
+        what = f"mean_duration_s={self.mean_duration_s:.2f}, n_exemplars={self.n_exemplars}"
+        return f"Primitive({self.id}, {self.name!r}, {what})"
 
     def __post_init__(self) -> None:
         if not 0 < self.mean_duration_s <= _LONGEST_S:

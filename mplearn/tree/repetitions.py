@@ -26,8 +26,8 @@ class Repetition(NamedTuple):
         >>> from mplearn.tree import PrimitiveTree, TreeConfig
         >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
         >>> placed = tree.insert(np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5]))
-        >>> waiting = tree.most_repeated()
-        >>> waiting.n_waiting, waiting.times
+        >>> found = tree.most_repeated()
+        >>> found.n_unplaced, found.times
         (1, 1)
     """
 

@@ -6,6 +6,7 @@ import importlib
 import importlib.util
 import re
 import shlex
+import tomllib
 from functools import cache
 from pathlib import Path
 
@@ -111,6 +112,14 @@ def test_the_example_of_a_command_can_be_given(name: str) -> None:
         words = shlex.split(line.split(" > ")[0], comments=True)
         if words[:1] == ["mplearn"]:
             parser().parse_args(words[1:])
+
+
+def test_the_readme_names_all_extras_and_no_page_names_another() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = set(project["optional-dependencies"])
+    named = {page: set(re.findall(r"mplearn\[(\w+)\]", text)) for page, text in TEXTS.items()}
+    assert named["README.md"] == extras
+    assert set().union(*named.values()) == extras
 
 
 def blocks() -> list[tuple[str, str]]:
