@@ -35,11 +35,23 @@ _MOTION = re.compile(r"(?:^|(?<=\}))[ \t]*MOTION[ \t]*$", re.IGNORECASE | re.MUL
 
 
 class BVHReader(Reader):
-    """Reads BVH files: y up, z forward, centimetres unless the person or a hint tells otherwise.
+    r"""Reads BVH files: y up, z forward, centimetres unless the person or a hint tells otherwise.
 
     A joint's position channels replace its offset, unless those of most joints are next to nothing:
     then they are how far it is off its offset. Unlike most formats this one has a rate without
     a name: seconds a frame.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from mplearn.mocap import Hints
+        >>> root = "HIERARCHY\nROOT hip\n{\nOFFSET 0 0 0\nCHANNELS 2 Zrotation Xrotation\n"
+        >>> end = "End Site\n{\nOFFSET 0 -40 0\n}\n}\n"
+        >>> motion = "MOTION\nFrames: 2\nFrame Time: 0.02\n0 0\n90 0\n"
+        >>> _ = Path("leg.bvh").write_text(root + end + motion)
+        >>> hints = Hints(unit_m=0.01, up_axis="y")
+        >>> take = BVHReader().read(Path("leg.bvh"), hints, positions=False)
+        >>> take.rate_hz, take.channels, take.frames.round(2).tolist()
+        (50.0, ('hip.rx', 'hip.ry'), [[0.0, 0.0], [1.57, 0.0]])
     """
 
     format = "BVH"
