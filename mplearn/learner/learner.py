@@ -783,7 +783,8 @@ class MotionLearner:
         """Return which provisional primitives a segment confirmed, and which are forgotten."""
         came = Counter([placement.node_id, *(to for _, to in placement.moved)])
         events: list[Event] = []
-        for id in sorted((came.keys() - set(placement.born)) & set(self.tree.leaves)):
+        leaves = self.tree.leaves
+        for id in sorted(id for id in came.keys() - set(placement.born) if id in leaves):
             shown = self.tree.n_placed(id)
             if shown - came[id] < self.config.tree.confirmed <= shown:
                 events.append(PrimitiveConfirmed(segment, id, shown))
