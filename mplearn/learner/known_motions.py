@@ -66,6 +66,8 @@ class KnownMotions:
         """Begin again: the motion is another one, or what is known has been changed by hand."""
         self._tracker: MotionTracker | None = None
         self._begun = False
+        self._waiting: list[tuple[int, list[int]]] = []  # leaves without a model as yet
+        self._found: list[_Known] = []
         self._looks = 0
         self._least = np.zeros(0)
 
@@ -83,17 +85,35 @@ class KnownMotions:
         if not self._begun or tree is not self._tree or tree.bank.floor is not self._floor:
             self.forget()
             self._begin(tree, frames[0])
-        tracker = self._tracker
-        if tracker is None:
+        if (len(frames) - 1) // self.every + 1 < _SEEN:
+            self.get_on()
             return UNKNOWN
+        self._model(tree, len(self._waiting))
+        if not self._found:
+            return UNKNOWN
+        if self._tracker is None:
+            rows = np.array([each.row for each in self._found])
+            self._tracker = MotionTracker(self._stack, rows)
+            self._least = np.array([each.least for each in self._found])
+        tracker = self._tracker
         for frame in frames[:: self.every][self._looks :]:
             tracker.update(frame)
             self._looks += 1
-        if self._looks < _SEEN:
-            return UNKNOWN
         above = tracker.log_likelihoods / self._looks - self._least
         best = int(above.argmax())
         return float(tracker.endings[best]) if above[best] >= 0 else UNKNOWN
+
+    def get_on(self) -> None:
+        """Do a frame's part of what must be ready at the first look that says anything."""
+        tree = self._tree
+        if self._waiting and tree is not None and tree.bank.floor is self._floor:
+            self._model(tree, -(-_FOLLOWED // (self.every * (_SEEN - 1))))
+
+    def _model(self, tree: PrimitiveTree, most: int) -> None:
+        """Make the models of some of the motions that wait for theirs."""
+        for leaf, members in self._waiting[:most]:
+            self._found.append(self._known(tree, leaf, members))
+        del self._waiting[:most]
 
     def _begin(self, tree: PrimitiveTree, start: FloatArray) -> None:
         """Choose the known motions that one may be that starts so, shape (V,)."""
@@ -108,10 +128,7 @@ class KnownMotions:
         for leaf in chosen:  # those stay
             if leaf in self._models:
                 self._models[leaf] = self._models.pop(leaf)
-        found = [self._known(tree, leaves[k], _first(members[k])) for k in known]
-        if found:
-            self._tracker = MotionTracker(self._stack, np.array([each.row for each in found]))
-            self._least = np.array([each.least for each in found])
+        self._waiting = [(leaves[k], _first(members[k])) for k in known]
 
     def _nearest(self, tree: PrimitiveTree, known: list[int], start: FloatArray) -> list[int]:
         """Return the places of the leaves that start nearest, among those of `known`."""

@@ -727,7 +727,9 @@ class MotionLearner:
         if begins:
             self._under_way.forget()
             self._segmenter.scaffold()
-        elif self._under_way.looks_at(len(self._buffer)) and self.person in self.tree.people:
+        elif not self._under_way.looks_at(len(self._buffer)):
+            self._under_way.get_on()
+        elif self.person in self.tree.people:
             ending = self._under_way.ending(self.tree.of(self.person), self._buffer.held)
             if self.config.scaffolding == "inside":
                 ending = UNKNOWN - INSIDE * max(UNKNOWN - ending, 0.0)
