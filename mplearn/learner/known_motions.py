@@ -40,6 +40,20 @@ class _Known(NamedTuple):
     least: float
 
 
+class _Starts(NamedTuple):
+    """How known motions start.
+
+    Attributes:
+        leaves: Their ids.
+        members: Numbers of the exemplars of each; other ones are another list.
+        means: Mean start of the first of those, shape (n, V).
+    """
+
+    leaves: list[int]
+    members: list[list[int]]
+    means: FloatArray
+
+
 class KnownMotions:
     """Compares a motion under way with the known ones of whoever moves.
 
@@ -59,7 +73,7 @@ class KnownMotions:
         self._tree: PrimitiveTree | None = None
         self._floor: FloatArray | None = None  # of the models' variances
         self._models: dict[int, _Known] = {}  # by leaf, the last asked for at the end
-        self._starts: dict[int, tuple[list[int], FloatArray]] = {}  # exemplars, how they start
+        self._starts = _Starts([], [], np.zeros((0, n_channels)))
         self.forget()
 
     def forget(self) -> None:
@@ -119,7 +133,8 @@ class KnownMotions:
         """Choose the known motions that one may be that starts so, shape (V,)."""
         self._begun = True
         if tree is not self._tree or tree.bank.floor is not self._floor:
-            self._tree, self._floor, self._models, self._starts = tree, tree.bank.floor, {}, {}
+            self._tree, self._floor, self._models = tree, tree.bank.floor, {}
+            self._starts = _Starts([], [], np.zeros((0, len(start))))
         leaves, members = tree.leaves, tree.members
         known = [k for k, group in enumerate(members) if len(group) >= _MADE_OF[-1]]
         if len(known) > _FOLLOWED:
@@ -132,16 +147,21 @@ class KnownMotions:
 
     def _nearest(self, tree: PrimitiveTree, known: list[int], start: FloatArray) -> list[int]:
         """Return the places of the leaves that start nearest, among those of `known`."""
-        leaves, members, before = tree.leaves, tree.members, self._starts
-        self._starts = {}
-        for k in known:
-            leaf, (then, mean) = leaves[k], before.get(leaves[k], ([], start))
-            if then is not members[k]:
-                first = [frames[0] for frames in tree.exemplars(leaf)[: _MADE_OF[0]]]
-                mean = np.mean(first, axis=0)
-            self._starts[leaf] = members[k], mean
-        starts = np.array([mean for _, mean in self._starts.values()])
-        offsets = (starts - start) ** 2 / tree.bank.floor
+        all_leaves, all_members = tree.leaves, tree.members
+        leaves, members = [all_leaves[k] for k in known], [all_members[k] for k in known]
+        before = self._starts
+        if before.leaves != leaves:
+            places = {leaf: i for i, leaf in enumerate(before.leaves)}
+            of = [places.get(leaf, -1) for leaf in leaves]
+            held = [before.members[i] if i >= 0 else [] for i in of]
+            kept = before.means[of] if before.leaves else np.zeros((len(of), len(start)))
+            before = _Starts(leaves, held, kept)
+        for i, (then, now) in enumerate(zip(before.members, members, strict=True)):
+            if then is not now:
+                first = [frames[0] for frames in tree.exemplars(leaves[i])[: _MADE_OF[0]]]
+                before.means[i] = np.mean(first, axis=0)
+        self._starts = before._replace(members=members)
+        offsets = (before.means - start) ** 2 / tree.bank.floor
         order = np.argsort(offsets.sum(axis=1), kind="stable")[:_FOLLOWED]
         return [known[k] for k in sorted(order.tolist())]
 
