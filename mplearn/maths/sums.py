@@ -19,7 +19,7 @@ def pairwise_sum(values: FloatArray) -> float:
     Example:
         >>> import numpy as np
         >>> values = np.linspace(0.0, 1.0, 1000) ** 3
-        >>> pairwise_sum(values) == values.sum()
+        >>> bool(pairwise_sum(values) == values.sum())
         True
     """
     n = len(values)
