@@ -1,9 +1,146 @@
-"""Sums in compiled loops that are numpy's to the bit, wherever what is decided by them was kept."""
+"""Sums in compiled loops: numpy's to the bit, and a loop's to the bit but in vector registers.
+
+numba alone keeps one value in a register where order matters.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.core.errors import TypingError
+from numba.extending import intrinsic
+
 from ..recording import FloatArray
 from .compiling import njit
+
+LANES = 4  # doubles in a vector, and rows at once, so that sums do not wait for each other
+_emit: Any = cgutils
+_DOUBLE = ir.DoubleType()
+_VECTOR = ir.VectorType(_DOUBLE, LANES)
+_FIRST = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+
+
+def _squares_tile(
+    _context: Any, columns: Any, means: Any, scales: Any, given: Any, row: Any, at: Any, out: Any
+) -> tuple[Any, Callable[..., Any]]:
+    """Write `LANES` rows and points of sums of scaled squares, added channel after channel.
+
+    It is called as ``squares_tile(columns, means, scales, given, row, at, out)``.
+
+    ``out[n, t] = given[n] + sum over d of scales[n, d] * (columns[d, t] - means[n, d]) ** 2``, to
+    the bit as a loop over d has it, for n from ``row`` on and t from ``at`` on. All arrays lie side
+    by side in memory; nothing is checked.
+
+    Args:
+        columns: Shape (D, T).
+        means: Shape (N, D).
+        scales: Shape (N, D).
+        given: Shape (N,).
+        row: First row, at most N - `LANES`.
+        at: First point, at most T - `LANES`.
+        out: Shape (N, T).
+    """
+    arrays = columns, means, scales, given, out
+    if any(not isinstance(each, types.Array) or each.layout != "C" for each in arrays):
+        raise TypingError(f"arrays must be contiguous, not {arrays}")
+    return types.void(columns, means, scales, given, types.intp, types.intp, out), _tile
+
+
+squares_tile: Any = intrinsic(_squares_tile)
+
+
+def _row_squares(
+    _context: Any, rows: Any, row: Any, one: Any, out: Any
+) -> tuple[Any, Callable[..., Any]]:
+    """Sum the squared offsets of `LANES` rows from one; each lane sums every `LANES`-th value.
+
+    It is called as ``row_squares(rows, row, one, out)``: ``out[i, j]`` becomes the sum over k of
+    ``(rows[row + i, LANES * k + j] - one[LANES * k + j]) ** 2``, as a loop over k has it to the
+    bit, as far as `LANES` values are left. All arrays lie side by side in memory.
+
+    Args:
+        rows: Shape (N, K).
+        row: First row, at most N - `LANES`.
+        one: Shape (K,).
+        out: Shape (`LANES`, `LANES`).
+    """
+    arrays = rows, one, out
+    if any(not isinstance(each, types.Array) or each.layout != "C" for each in arrays):
+        raise TypingError(f"arrays must be contiguous, not {arrays}")
+    return types.void(rows, types.intp, one, out), _squares
+
+
+def _squares(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    """Emit the code of `row_squares`."""
+
+    def array(k: int) -> Any:
+        return context.make_array(signature.args[k])(context, builder, args[k])
+
+    def vector_at(place: Any) -> Any:
+        return builder.bitcast(place, _VECTOR.as_pointer())
+
+    rows, one, out, row = array(0), array(2), array(3), args[1]
+    (width,) = _emit.unpack_tuple(builder, one.shape)
+    starts = [builder.mul(builder.add(row, row.type(k)), width) for k in range(LANES)]
+    sums = [_emit.alloca_once_value(builder, _VECTOR([0.0] * LANES)) for _ in starts]
+    with _emit.for_range(builder, builder.udiv(width, row.type(LANES))) as loop:
+        at = builder.mul(loop.index, row.type(LANES))
+        theirs = builder.load(vector_at(builder.gep(one.data, [at])), align=8)
+        for start, total in zip(starts, sums, strict=True):
+            place = builder.gep(rows.data, [builder.add(start, at)])
+            offset = builder.fsub(builder.load(vector_at(place), align=8), theirs)
+            term = builder.fmul(offset, offset)
+            builder.store(builder.fadd(builder.load(total), term), total)
+    for k, total in enumerate(sums):
+        place = builder.gep(out.data, [row.type(LANES * k)])
+        builder.store(builder.load(total), vector_at(place), align=8)
+    return context.get_dummy_value()
+
+
+row_squares: Any = intrinsic(_row_squares)
+
+
+def _tile(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    """Emit the code of `squares_tile`."""
+
+    def array(k: int) -> Any:
+        return context.make_array(signature.args[k])(context, builder, args[k])
+
+    def spread(place: Any) -> Any:
+        value = builder.insert_element(_UNDEFINED, builder.load(place), ir.IntType(32)(0))
+        return builder.shuffle_vector(value, _UNDEFINED, _FIRST)
+
+    def vector_at(place: Any) -> Any:
+        return builder.bitcast(place, _VECTOR.as_pointer())
+
+    columns, means, scales, given, out = (array(k) for k in (0, 1, 2, 3, 6))
+    row, at = args[4], args[5]
+    n_channels, n_points = _emit.unpack_tuple(builder, columns.shape)
+    rows = [builder.add(row, row.type(k)) for k in range(LANES)]
+    starts = [builder.mul(each, n_channels) for each in rows]
+    sums = [
+        _emit.alloca_once_value(builder, spread(builder.gep(given.data, [each]))) for each in rows
+    ]
+    with _emit.for_range(builder, n_channels) as loop:
+        place = builder.add(builder.mul(loop.index, n_points), at)
+        points = builder.load(vector_at(builder.gep(columns.data, [place])), align=8)
+        for start, total in zip(starts, sums, strict=True):
+            value = builder.add(start, loop.index)
+            offset = builder.fsub(points, spread(builder.gep(means.data, [value])))
+            scaled = builder.fmul(spread(builder.gep(scales.data, [value])), offset)
+            term = builder.fmul(scaled, offset)
+            builder.store(builder.fadd(builder.load(total), term), total)
+    for each, total in zip(rows, sums, strict=True):
+        place = builder.add(builder.mul(each, n_points), at)
+        builder.store(builder.load(total), vector_at(builder.gep(out.data, [place])), align=8)
+    return context.get_dummy_value()
+
+
+_UNDEFINED = ir.Constant(_VECTOR, ir.Undefined)
+
 
 _AT_ONCE = 8
 _PART = 128  # values that are summed in one loop; more are halved

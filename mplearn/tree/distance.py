@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import InvalidValueError
 from ..hmm.kernels import log_likelihood
 from ..maths.compiling import njit
-from ..maths.lanes import LANES, squares_tile
+from ..maths.sums import LANES, squares_tile
 from ..plugins import join_installed
 from ..recording import FloatArray, IntArray
 from .config import TreeConfig

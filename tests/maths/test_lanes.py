@@ -5,7 +5,7 @@ import pytest
 from numba.core.errors import TypingError
 
 from mplearn.maths.compiling import njit
-from mplearn.maths.lanes import LANES, row_squares, squares_tile
+from mplearn.maths.sums import LANES, row_squares, squares_tile
 
 
 @njit()

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...maths.compiling import njit
-from ...maths.lanes import LANES, row_squares
+from ...maths.sums import LANES, row_squares
 from ...recording import FloatArray, IntArray
 from ...tree import MirrorMap
 from .shape import Shape, ShapeState, mirrored, squares
