@@ -7,16 +7,19 @@ together ([Khadiv2016] adapts time as well as place), as far as a leg reaches.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
-from mplearn.maths.compiling import kernel
+from mplearn.maths.compiling import inner_kernel, kernel
 from mplearn.maths.plane import turn_in_plane
 from mplearn.recording import FloatArray
 from mplearn_envs.mechanics.support import hull_margin, hull_of
 
+BESIDE, IN_FRONT, BEHIND = (cast("int", np.int64(way)) for way in range(3))
 LONGEST_S = 0.5  # of a step that catches
+_SOONEST_S = 0.1  # in which a foot in the air lands
+_SLACK_M = 0.02  # so near past the other foot is past it, too
 _TRY_S = 0.02
 _INSET_M = 0.008  # the zero-moment point stays so far inside a sole
 _BEYOND_M = 0.015  # the foot lands a little beyond the DCM
@@ -35,6 +38,10 @@ class Reach(NamedTuple):
         wide: Largest distance aside [m].
         fastest: Mean speed of a foot on its way [m/s].
         soonest: Shortest time of a step [s].
+        clear: How far ahead or back a foot is past the other one [m].
+        apart: How far aside it is past it [m].
+        across: How far beyond the other one a foot can land that crosses it there [m]; at 0 none
+            does.
     """
 
     ahead: float
@@ -43,6 +50,9 @@ class Reach(NamedTuple):
     wide: float
     fastest: float
     soonest: float
+    clear: float = 0.26
+    apart: float = 0.13
+    across: float = 0.0
 
 
 class Step(NamedTuple):
@@ -53,12 +63,14 @@ class Step(NamedTuple):
         time_s: How long it takes [s].
         place: Where it lands: x, y [m] and yaw [rad], shape (3,).
         missing_m: How far the DCM will be outside the soles then [m].
+        way: `BESIDE`, or on which way it crosses the other foot's: `IN_FRONT`, `BEHIND`.
     """
 
     side: int
     time_s: float
     place: FloatArray
     missing_m: float
+    way: int
 
 
 @kernel
@@ -123,6 +135,7 @@ def landing_place(
     rate: float,
     time_s: float,
     reach: Reach,
+    way: int = BESIDE,
 ) -> tuple[FloatArray, float]:
     """Return where a foot shall land, and how far the DCM will be outside the soles then [m].
 
@@ -136,6 +149,7 @@ def landing_place(
         rate: Of the pendulum [1/s].
         time_s: Until it lands [s].
         reach: Where it can.
+        way: On which way it goes there.
     """
     sole = outline(corners[1 - side], stands, _INSET_M)
     zmp_x, zmp_y = nearest_inside(hull_of(sole), dcm[0], dcm[1])
@@ -144,8 +158,16 @@ def landing_place(
     away = 1.0 if side == 0 else -1.0
     x, y = turn_in_plane(then_x - stands[0], then_y - stands[1], -stands[2])
     farther = 1.0 + _BEYOND_M / (np.hypot(x, y) + 1e-9)
-    x = min(max(farther * x - corners[side, :, 0].mean(), -reach.behind), reach.ahead)
-    y = min(max(away * farther * y, reach.narrow), reach.wide)
+    x, y = farther * x - corners[side, :, 0].mean(), away * farther * y
+    if way == BESIDE:
+        x = min(max(x, -reach.behind), reach.ahead)
+        y = min(max(y, reach.narrow), reach.wide)
+    else:
+        y = min(max(y, -reach.across), reach.narrow)
+        if way == IN_FRONT:
+            x = min(max(x, reach.clear), reach.ahead)
+        else:
+            x = min(max(x, -reach.behind), -reach.clear)
     dx, dy = turn_in_plane(x, away * y, stands[2])
     place = np.array([stands[0] + dx, stands[1] + dy, stands[2]])
     both = hull_of(np.concatenate((sole, outline(corners[side], place, _INSET_M))))
@@ -153,10 +175,72 @@ def landing_place(
 
 
 @kernel
+def way_round(
+    stands: FloatArray, here: FloatArray, place: FloatArray, reach: Reach
+) -> tuple[float, float, float]:
+    """Return where a foot goes first so that it does not hit the other one, and how far it has.
+
+    Args:
+        stands: Where the other foot stands: x, y [m] and yaw [rad], shape (3,).
+        here: Where the foot is, shape (2,) at least.
+        place: Where it shall be.
+        reach: How far away it is past the other foot.
+
+    Returns:
+        x, y of the corner that it goes round first, or of its place, and the length of its way [m].
+    """
+    ax, ay = turn_in_plane(here[0] - stands[0], here[1] - stands[1], -stands[2])
+    bx, by = turn_in_plane(place[0] - stands[0], place[1] - stands[1], -stands[2])
+    far = np.hypot(bx - ax, by - ay)
+    half_x, half_y = reach.clear - _SLACK_M, reach.apart - _SLACK_M
+    if not _hits(ax, ay, bx, by, half_x, half_y) or (abs(ax) < half_x and abs(ay) < half_y):
+        return place[0], place[1], far
+    corner_x = np.array([reach.clear, reach.clear, -reach.clear, -reach.clear])
+    corner_y = np.array([reach.apart, -reach.apart, -reach.apart, reach.apart])
+    best, first = np.inf, 0
+    for k in range(4):
+        if _hits(ax, ay, corner_x[k], corner_y[k], half_x, half_y):
+            continue
+        start = np.hypot(corner_x[k] - ax, corner_y[k] - ay)
+        for turn in (-1, 0, 1):
+            j = (k + turn) % 4
+            if _hits(corner_x[j], corner_y[j], bx, by, half_x, half_y):
+                continue
+            length = start + np.hypot(corner_x[j] - corner_x[k], corner_y[j] - corner_y[k])
+            length += np.hypot(bx - corner_x[j], by - corner_y[j])
+            if length < best:
+                best, first = length, k
+    dx, dy = turn_in_plane(corner_x[first], corner_y[first], stands[2])
+    return stands[0] + dx, stands[1] + dy, best
+
+
+@inner_kernel
+def _hits(ax: float, ay: float, bx: float, by: float, half_x: float, half_y: float) -> bool:
+    """Return whether the way from one point to another leads through a box around the origin."""
+    first, last = 0.0, 1.0
+    for a, d, half in ((ax, bx - ax, half_x), (ay, by - ay, half_y)):
+        if abs(d) < 1e-9:
+            if abs(a) >= half:
+                return False
+        else:
+            s, t = (-half - a) / d, (half - a) / d
+            first, last = max(first, min(s, t)), min(last, max(s, t))
+    return first < last
+
+
+@kernel
 def choose_step(
-    corners: FloatArray, feet: FloatArray, dcm: FloatArray, rate: float, reach: Reach, only: int
+    corners: FloatArray,
+    feet: FloatArray,
+    dcm: FloatArray,
+    rate: float,
+    reach: Reach,
+    only: int,
+    since_s: float = 0.0,
 ) -> Step:
     """Return the step that catches the DCM best: inside the soles, without hurry, near and soon.
+
+    Feet cross only where the other one cannot step, for its foot stands alone.
 
     Args:
         corners: Of both soles in their feet's frames, shape (2, 4, 3) [m].
@@ -165,20 +249,27 @@ def choose_step(
         rate: Of the pendulum [1/s].
         reach: Where a foot can land, and how soon.
         only: The one foot that can step; -1 for either.
+        since_s: For how long that foot has been on its way [s].
     """
     best = np.inf
-    found = Step(max(only, 0), LONGEST_S, feet[max(only, 0)].copy(), np.inf)
+    found = Step(max(only, 0), LONGEST_S, feet[max(only, 0)].copy(), np.inf, BESIDE)
+    soonest = max(reach.soonest - since_s, _SOONEST_S)
+    lag = max(_LAG_S - since_s, 0.0)
+    n_ways = 3 if only >= 0 and reach.across > 0.0 else 1
     for side in range(2):
         if only == 1 - side:
             continue
-        for k in range(int((LONGEST_S - reach.soonest) / _TRY_S) + 1):
-            time_s = reach.soonest + k * _TRY_S
-            place, missing = landing_place(corners, feet[1 - side], side, dcm, rate, time_s, reach)
-            far = np.hypot(place[0] - feet[side, 0], place[1] - feet[side, 1])
-            hurry = max(0.0, far / (time_s - _LAG_S) / reach.fastest - 1.0)
-            price = _PRICES[0] * missing + _PRICES[1] * hurry
-            price += _PRICES[2] * far + _PRICES[3] * time_s
-            if price < best:
-                best = price
-                found = Step(side, time_s, place, missing)
+        for way in range(n_ways):
+            for k in range(int((LONGEST_S - since_s - soonest) / _TRY_S) + 1):
+                time_s = soonest + k * _TRY_S
+                place, missing = landing_place(
+                    corners, feet[1 - side], side, dcm, rate, time_s, reach, way
+                )
+                far = way_round(feet[1 - side], feet[side], place, reach)[2]
+                hurry = max(0.0, far / (time_s - lag) / reach.fastest - 1.0)
+                price = _PRICES[0] * missing + _PRICES[1] * hurry
+                price += _PRICES[2] * far + _PRICES[3] * time_s
+                if price < best:
+                    best = price
+                    found = Step(side, time_s, place, missing, way)
     return found

@@ -19,7 +19,15 @@ from mplearn_envs.mechanics.reference import ReferenceRobot
 from mplearn_envs.mechanics.support import hull_margin
 
 from .body_state import LEFT, NEITHER, RIGHT, BodyState, sole_middle
-from .capture import Reach, choose_step, landing_place, nearest_inside, support_hull
+from .capture import (
+    BESIDE,
+    Reach,
+    choose_step,
+    landing_place,
+    nearest_inside,
+    support_hull,
+    way_round,
+)
 
 STANDS, SHIFTS, SWINGS = 0, 1, 2
 TOUCHES_M = 0.002  # so low a sole has landed
@@ -36,6 +44,7 @@ _LATE_S = 0.15  # a foot that has not landed so late is taken to stand
 _INWARDS = 0.25  # where the DCM is to be when a step back lands, from the standing foot
 _DOWN_M = 0.004  # a foot aims so far into the floor
 _LEAST_S = 0.03
+_TURNS_S = 0.04  # in which a foot takes another direction
 _TURN_M = 0.2  # a foot that is turned by 1 rad is as astray as one off by this
 
 
@@ -48,6 +57,7 @@ class StepLaw(NamedTuple):
         reach: Where feet can land, and how soon.
         apart: The left foot in the right one's frame, standing: x, y [m] and yaw [rad], shape (3,).
         lift_m: How high a foot is raised [m].
+        decides_s: For how long after a foot was raised it may yet take another way [s].
     """
 
     period_s: float
@@ -55,6 +65,7 @@ class StepLaw(NamedTuple):
     reach: Reach
     apart: FloatArray
     lift_m: float
+    decides_s: float
 
 
 class StepState(NamedTuple):
@@ -62,8 +73,8 @@ class StepState(NamedTuple):
 
     Attributes:
         phase: What is going on (`STANDS`, `SHIFTS`: the weight goes to one foot, `SWINGS`); which
-            foot steps, 0 left, 1 right; whether it steps back and not to catch; and how many steps
-            were taken; shape (4,).
+            foot steps, 0 left, 1 right; whether it steps back and not to catch; how many steps were
+            taken; and on which way the foot goes (`BESIDE`); shape (5,).
         time: Time in this phase, how long the step lasts, and for how long the weight has rested,
             shape (3,) [s].
         place: Where the foot lands: x, y [m] and yaw [rad], shape (3,).
@@ -84,7 +95,7 @@ class StepState(NamedTuple):
 
 def new_step_state() -> StepState:
     """Return what is remembered at first: nothing."""
-    return StepState(*(np.zeros(n) for n in (4, 3, 3, 2, 4, 4, 4)))
+    return StepState(*(np.zeros(n) for n in (5, 3, 3, 2, 4, 4, 4)))
 
 
 @kernel
@@ -117,8 +128,9 @@ def begin_stepping(
         part[:] = 0.0
     stepping.goal[:] = now.dcm
     if up >= 0:
-        step = choose_step(robot.corners, now.feet, now.dcm, now.rate, law.reach, up)
+        step = choose_step(robot.corners, now.feet, now.dcm, now.rate, law.reach, up, 0.0)
         _lift(robot, stepping, now, up, step.time_s, step.place)
+        stepping.phase[4] = step.way
 
 
 @kernel
@@ -158,14 +170,15 @@ def plan_step(
         hull = support_hull(robot.corners, now.feet, NEITHER, 0.0)
         landed = stepping.phase[3] == 0.0 or stepping.phase[0] == SHIFTS or stepping.time[0] > 0.02
         if landed and hull_margin(hull, now.dcm[0], now.dcm[1]) < _LEAVES_M:
-            step = choose_step(robot.corners, now.feet, now.dcm, now.rate, law.reach, NEITHER)
+            step = choose_step(robot.corners, now.feet, now.dcm, now.rate, law.reach, NEITHER, 0.0)
             _lift(robot, stepping, now, step.side, step.time_s, step.place)
+            stepping.phase[4] = step.way
     if stepping.phase[0] == SHIFTS:
         side = int(stepping.phase[1])
         over = support_hull(robot.corners, now.feet, side, _LIFTS_M)
         if hull_margin(over, now.dcm[0], now.dcm[1]) > 0.0:
             _lift(robot, stepping, now, side, _BACK_S, _beside(law, now.feet, side))
-            stepping.phase[2] = 1.0  # back
+            stepping.phase[2], stepping.phase[4] = 1.0, BESIDE  # back
     if stepping.phase[0] == SWINGS:
         return _on_one_foot(law, robot, stepping, now)
     return _on_both_feet(law, robot, stepping, now)
@@ -203,9 +216,22 @@ def _on_one_foot(
     if stepping.phase[2] == 1.0 and hull_margin(sole, now.dcm[0], now.dcm[1]) < -_LOST_M:
         stepping.phase[2] = 0.0
     if stepping.phase[2] == 0.0:
-        if left > _FIXED_S:
+        if stepping.time[0] < law.decides_s:
+            step = choose_step(
+                robot.corners, now.feet, now.dcm, now.rate, law.reach, side, stepping.time[0]
+            )
+            stepping.time[1] = stepping.time[0] + step.time_s
+            stepping.phase[4], stepping.place[:] = step.way, step.place
+        elif left > _FIXED_S:
             place, _ = landing_place(
-                robot.corners, now.feet[1 - side], side, now.dcm, now.rate, left, law.reach
+                robot.corners,
+                now.feet[1 - side],
+                side,
+                now.dcm,
+                now.rate,
+                left,
+                law.reach,
+                int(stepping.phase[4]),
             )
             stepping.place[:] = place
         x, y = now.dcm
@@ -220,7 +246,7 @@ def _on_one_foot(
         wanted_y = (1.0 - _INWARDS) * here_y + _INWARDS * there_y
         x = (wanted_x - growth * now.dcm[0]) / (1.0 - growth)
         y = (wanted_y - growth * now.dcm[1]) / (1.0 - growth)
-    _swing(law, robot, stepping, now.floor)
+    _swing(law, robot, stepping, now.floor, now.feet[1 - side])
     return nearest_inside(sole, x, y)
 
 
@@ -282,16 +308,25 @@ def _beside(law: StepLaw, feet: FloatArray, side: int) -> FloatArray:
 
 
 @inlined
-def _swing(law: StepLaw, robot: ReferenceRobot, stepping: StepState, floor: float) -> None:
-    """Move the foot that steps on its way: up, and down to its place."""
+def _swing(
+    law: StepLaw, robot: ReferenceRobot, stepping: StepState, floor: float, stands: FloatArray
+) -> None:
+    """Move the foot that steps on its way: up, round the other foot, and down to its place."""
     h = law.period_s
     left = max(stepping.time[1] - stepping.time[0], _FIXED_S)
     at, rate, change = stepping.foot, stepping.foot_rate, stepping.foot_change
+    via_x, via_y, far = way_round(stands, at, stepping.place, law.reach)
     for i in range(2):
-        change[i] = _towards(at[i], rate[i], stepping.place[i], max(left - 0.02, _LEAST_S))
+        via = via_x if i == 0 else via_y
+        if via_x == stepping.place[0] and via_y == stepping.place[1]:
+            change[i] = _towards(at[i], rate[i], via, max(left - 0.02, _LEAST_S))
+        else:
+            near = np.hypot(via_x - at[0], via_y - at[1]) + 1e-9
+            speed = min(far / max(left - 0.02, _LEAST_S), 1.5 * law.reach.fastest)
+            change[i] = (speed * (via - at[i]) / near - rate[i]) / _TURNS_S
     half = 0.45 * stepping.time[1]
-    rises = stepping.time[0] < half
     height = floor + robot.stance.foot_position[int(stepping.phase[1]), 2]
+    rises = stepping.time[0] < half and at[2] < height + law.lift_m  # a raised foot comes down
     height += law.lift_m if rises else -_DOWN_M
     until = max(half - stepping.time[0] if rises else left, _FIXED_S)
     change[2] = _towards(at[2], rate[2], height, until)

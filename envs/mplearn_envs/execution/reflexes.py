@@ -50,9 +50,11 @@ _REACHED = 1e-3  # [m, rad]
 LONGEST_S = 8.0  # after the end of a plan for which the robot may still be on its way back
 RESTS_S = 0.3
 _BLEND_S = 0.5
+_PAST_M = 0.02  # between soles that pass each other
 _DROP_M = 0.35  # who steps may be so much lower
 _TUNED: dict[str, Any] = {  # on pushes at the chest of the humanoid
-    "reach": Reach(0.5, 0.4, 0.16, 0.62, 1.9, 0.24),
+    "reach": Reach(0.5, 0.4, 0.16, 0.62, 1.9, 0.24, across=0.3),
+    "decides_s": 0.1,
     "gain": 4.0,
     "lift_m": 0.035,
     "friction": 0.6,
@@ -159,13 +161,15 @@ class Reflexes:
             j = robot.joint_names.index(knee)
             limits[j, 0] = max(limits[j, 0], 0.5 * robot.guard_knee_rad)
         ground = self.reference.ground
+        long, wide = np.ptp(self.reference.corners[..., :2], axis=1).max(axis=0) + _PAST_M
         period_s = float(self._model.opt.timestep)
         self.law = StepLaw(
             period_s,
             _TUNED["gain"],
-            _TUNED["reach"],
+            _TUNED["reach"]._replace(clear=float(long), apart=float(wide)),
             np.append(ground[0, :2] - ground[1, :2], 0.0),
             _TUNED["lift_m"],
+            _TUNED["decides_s"],
         )
         self.body = BodyLaw(
             period_s,

@@ -1,15 +1,21 @@
 """Where to step: closed forms and brute force."""
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from mplearn_envs.control.capture import (
+    BEHIND,
+    BESIDE,
+    IN_FRONT,
     Reach,
     choose_step,
     landing_place,
     nearest_inside,
     support_hull,
+    way_round,
 )
 from mplearn_envs.mechanics import reference_robot
 from mplearn_envs.mechanics.support import convex_hull, support_margin
@@ -80,3 +86,68 @@ def test_step_goes_where_the_push_goes_and_legs_do_not_cross(corners, angle):
 def test_only_one_foot_may_step(corners):
     for side in (0, 1):
         assert choose_step(corners, FEET, np.array([0.2, 0.0]), RATE, REACH, side).side == side
+
+
+CROSSING = REACH._replace(across=0.3)
+
+
+def walled(a, b, half):
+    """Whether a way between points leads through a box around the origin: by many points."""
+    x = np.linspace(0.0, 1.0, 4001)[:, None]
+    return bool((np.abs(a * (1 - x) + b * x) < half - 1e-9).all(axis=1).any())
+
+
+def test_way_round_the_other_foot_is_the_shortest_and_hits_nothing():
+    """Against all ways over up to three corners."""
+    rng = np.random.default_rng(3)
+    stands = np.array([0.3, -0.2, 0.7])
+    c, s = np.cos(0.7), np.sin(0.7)
+    turn = np.array([[c, -s], [s, c]])
+    half = np.array([CROSSING.clear, CROSSING.apart]) - 0.02
+    corners = [np.array([i * CROSSING.clear, j * CROSSING.apart]) for i in (1, -1) for j in (1, -1)]
+    n_round = 0
+    while n_round < 40:
+        a, b = rng.uniform(-0.6, 0.6, (2, 2))
+        if (np.abs(a) < half + 1e-3).all() or (np.abs(b) < half + 1e-3).all():
+            continue
+        lengths = [
+            sum(np.linalg.norm(q - p) for p, q in itertools.pairwise((a, *way, b)))
+            for n in range(4)
+            for way in itertools.permutations(corners, n)
+            if not any(walled(p, q, half) for p, q in itertools.pairwise((a, *way, b)))
+        ]
+        here, place = turn @ a + stands[:2], turn @ b + stands[:2]
+        x, y, far = way_round(stands, here, np.append(place, 0.0), CROSSING)
+        assert far == pytest.approx(min(lengths), abs=1e-9)
+        first = turn.T @ (np.array([x, y]) - stands[:2])
+        assert not walled(a, first, half)
+        straight = far == pytest.approx(np.linalg.norm(b - a))
+        assert straight == np.allclose(first, b)
+        n_round += not straight
+
+
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize("angle", [30.0, 60.0, 90.0, 120.0, 150.0])
+def test_who_stands_on_one_foot_and_falls_beyond_it_crosses_it(corners, side, angle):
+    beyond = -1.0 if side == 0 else 1.0  # the side of the foot that stands
+    a = np.radians(angle)
+    dcm = FEET[1 - side, :2] + 0.17 * np.array([np.cos(a), beyond * np.sin(a)])
+    feet = FEET.copy()
+    feet[side, 0] += 0.1 if angle <= 90 else -0.1
+    step = choose_step(corners, feet, dcm, RATE, CROSSING, side)
+    across = beyond * (step.place[1] - FEET[1 - side, 1])
+    if angle in (60.0, 90.0, 120.0):
+        assert step.way == (IN_FRONT if angle <= 90 else BEHIND)
+        assert 0.0 < across <= CROSSING.across + 1e-12
+    if step.way != BESIDE:  # it does not land upon the other foot
+        assert abs(step.place[0]) >= CROSSING.clear - 1e-12
+    without = choose_step(corners, feet, dcm, RATE, REACH, side)
+    assert without.way == BESIDE and step.missing_m <= without.missing_m
+    either = choose_step(corners, feet, dcm, RATE, CROSSING, -1)
+    assert either.way == BESIDE
+
+
+def test_a_foot_on_its_way_is_sooner_there(corners):
+    dcm = np.array([0.2, 0.0])
+    on_its_way = choose_step(corners, FEET, dcm, RATE, REACH, 0, 0.1)
+    assert on_its_way.time_s < choose_step(corners, FEET, dcm, RATE, REACH, 0, 0.0).time_s
