@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from standing_library import KICK, RATE_HZ, sweep
 
 from mplearn.errors import InvalidValueError
 from mplearn_envs.execution.bodies import Body
@@ -56,6 +57,21 @@ def test_push_of_36_ns_is_survived_in_eight_directions(robot, planner, simulatio
     assert np.linalg.norm(feet[0, :2] - feet[1, :2] - [0.0, 0.18]) < 0.04
     after = simulation.perform(planner.hold(report.end, 1.0))
     assert not after.fallen and after.n_steps == 0
+
+
+@pytest.mark.parametrize("angle", [-45.0, -30.0, 0.0, 90.0])
+def test_who_is_pushed_on_one_foot_puts_the_other_one_down_or_across(
+    robot, planner, simulation, angle
+):
+    """The left foot is in the air, the right one stands: to its side only a crossing step helps."""
+    simulation.reset()
+    plan = planner.plan(rest_reference(robot), planner.motion(sweep({}, KICK, 0.8), RATE_HZ), 0.5)
+    aloft = np.flatnonzero(plan.up == 0) * (len(plan.commands) // (len(plan.q) - 1))
+    start = int(aloft[len(aloft) // 2])
+    push = _push(simulation, np.radians(angle), 36.0)
+    report = simulation.perform(plan, pushes=push._replace(steps=np.array([[start, start + 25]])))
+    assert not report.fallen and report.n_steps >= 1
+    assert not simulation.perform(planner.hold(report.end, 1.0)).fallen
 
 
 def test_small_push_needs_no_step(robot, planner, simulation):
