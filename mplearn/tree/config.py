@@ -99,10 +99,12 @@ class TreeConfig:
             while no larger cluster is below it.
         pair_extent: And below this share of how far each is from standing still, which is small
             only where they are like each other in shape; inf for no such bound.
-        sequence_share: Two that came in a sequence that came twice, so that what was before both,
-            or after both, is alike as well, are less likely alike by chance: where each is farther
-            than the scale from the node that it fits best they become a node below this share of
-            the scale; 0 for `pair_share` alone.
+        sequence_share: A sequence that came twice is hardly chance: two that wait become a node
+            below this share of the scale where each is the other's nearest, the next being 1.2
+            times as far, where the same holds for what came right before both, or right after
+            (or that is in one node already), and where each is farther than the scale from the node
+            that it fits best; 0 for `pair_share` alone.
+        sequence_extent: And below this share of how far each is from standing still.
         ignore_fragments: Whether nothing becomes a primitive that is an execution of a sure one
             together with the segment right before or after it: a motion that is cut in two where
             someone hesitated is not two motions. What only ever leads into a motion that lasts
@@ -166,7 +168,8 @@ class TreeConfig:
     min_exemplars: int = 2
     pair_share: float = newer(0.6, absent=1.0)
     pair_extent: float = newer(1.1, absent=math.inf)
-    sequence_share: float = newer(0.8, absent=0.0)
+    sequence_share: float = newer(1.2, absent=0.0)
+    sequence_extent: float = newer(0.8, absent=0.8)
     ignore_fragments: bool = newer(True, absent=False)
     confirmed: int = newer(3, absent=1)
     patience: int = newer(64, absent=64)
@@ -229,6 +232,7 @@ class TreeConfig:
             "extent_share",
             "pair_share",
             "pair_extent",
+            "sequence_extent",
             "reach",
             "reach_cap",
             "reach_limit",

@@ -28,6 +28,7 @@ from .nodes.structure import Structure
 from .placement import ROOT, Change, Match
 
 _FAR = 1e12  # farther than any two segments
+_BY_FAR = 1.2  # how many times as far the next is
 _PLAYED_BACK = 0.05  # over the scale: nobody hesitates again so exactly
 _SURELY = 1 - 1e-9  # whatever a mean is rounded to
 _UNKNOWN = 3.0  # leaves that the scale of all motion counts for beside that of those
@@ -75,8 +76,9 @@ def _clusters(
 
     Executions of one motion are nearer to each other than they are to no motion at all. Two that
     are near each other say less than three that are: pairs count only where there is no larger
-    cluster, and must be the nearer; less so where they came in a sequence that came twice, and are
-    nothing that is known. Fragments of what is known count only where they are played back.
+    cluster, and must be the nearer. Pairs may be farther apart where a sequence came twice, so that
+    each is the other's nearest, one after the other, and they are nothing that is known. Fragments
+    of what is known count only where they are played back.
 
     Args:
         structure: The tree.
@@ -97,17 +99,32 @@ def _clusters(
     groups = found(alike, max(least, 3))
     if groups or least > 2:
         return groups
-    nearer = config.pair_extent * sizes
-    most = np.minimum(np.minimum(nearer, config.pair_share * limit), exactly)
-    twice = np.minimum(np.minimum(nearer, config.sequence_share * limit), exactly)
-    loose = (most < matrix) & (matrix <= twice)
-    if loose.any():
-        loose &= _came_in_sequence(structure, members, matrix <= alike)
-        for i in np.flatnonzero(loose.any(axis=0)).tolist():
+    most = np.minimum(np.minimum(config.pair_extent * sizes, config.pair_share * limit), exactly)
+    farther = np.minimum(config.sequence_extent * sizes, config.sequence_share * limit)
+    pairs = _each_others_nearest(matrix) & (matrix <= np.minimum(farther, exactly))
+    farther_apart = pairs & (matrix > most)
+    if farther_apart.any():
+        farther_apart &= _came_in_sequence(structure, members, pairs)
+        for i in np.flatnonzero(farther_apart.any(axis=0)).tolist():
             if not _is_new(structure, members[i], limit):
-                loose[i], loose[:, i] = False, False
-        most = np.where(loose, twice, most)
+                farther_apart[i], farther_apart[:, i] = False, False
+        most = np.where(farther_apart, farther, most)
     return found(most, least)
+
+
+def _each_others_nearest(matrix: FloatArray) -> BoolArray:
+    """Return which two are nearer to each other than either is to any third, by far, (n, n)."""
+    n = len(matrix)
+    pairs = np.zeros((n, n), bool)
+    if n < 3:
+        return pairs
+    apart = matrix + np.diag(np.full(n, np.inf))
+    nearest = apart.argmin(axis=1)
+    first, second = np.partition(apart, 1, axis=1)[:, :2].T
+    clear = (nearest[nearest] == np.arange(n)) & (_BY_FAR * first < second)
+    one = np.flatnonzero(clear & clear[nearest])
+    pairs[one, nearest[one]] = True
+    return pairs
 
 
 def _came_in_sequence(structure: Structure, members: Sequence[int], alike: BoolArray) -> BoolArray:
@@ -119,7 +136,7 @@ def _came_in_sequence(structure: Structure, members: Sequence[int], alike: BoolA
     Args:
         structure: The tree.
         members: Numbers of the segments that wait, as they came.
-        alike: Which of them may be one motion, shape (n, n).
+        alike: Which two of them may be one motion, shape (n, n).
     """
     numbers = np.asarray(members, np.int64)
     places = {number: i for i, number in enumerate(members)}

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mplearn.recording import FloatArray
 from mplearn.tree import PrimitiveTree, TreeConfig
-from mplearn.tree.rules import _came_in_sequence
+from mplearn.tree.rules import _came_in_sequence, _each_others_nearest
 
 D, RATE_HZ, T = 6, 50.0, 40
 TIME = np.sin(np.outer(np.linspace(0, np.pi, T), [1, 2, 3]))
@@ -88,3 +88,17 @@ def test_which_came_in_a_sequence_is_as_said(
     )
     found = _came_in_sequence(structure, numbers, alike)  # type: ignore[arg-type]
     np.testing.assert_array_equal(found, np.array(wanted, bool).reshape(alike.shape))
+
+
+@given(n=st.integers(0, 9), seed=st.integers(0, 99))
+def test_each_others_nearest_are_as_said(n: int, seed: int) -> None:
+    matrix = np.random.default_rng(seed).uniform(1, 2, (n, n))
+    matrix = (matrix + matrix.T) * (1 - np.eye(n))
+
+    def by_far(i: int, j: int) -> bool:
+        others = [k for k in range(n) if k not in (i, j)]
+        return bool(others) and all(1.2 * matrix[i, j] < matrix[i, k] for k in others)
+
+    wanted = [[i != j and by_far(i, j) and by_far(j, i) for j in range(n)] for i in range(n)]
+    found = _each_others_nearest(matrix)
+    np.testing.assert_array_equal(found, np.array(wanted, bool).reshape(n, n))

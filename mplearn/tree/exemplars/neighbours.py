@@ -14,7 +14,7 @@ from ...recording import FloatArray
 N_STEPS = 20
 _NEAREST, _STEP = 0.06, 1.12  # over the mean distance; each step by this factor
 _EDGES = _NEAREST * _STEP ** np.arange(N_STEPS + 1)
-COPY = 0.01  # over the mean distance: a copy says nothing of how much executions vary
+_COPY = 0.05  # who comes nearer plays back, and says nothing of how much executions vary
 _KEPT = 1 - 1 / 256  # of what is known, with each segment
 _LEAST = 20.0  # neighbours that make a growth known
 _ACROSS = 2  # steps over which it is taken
@@ -42,7 +42,7 @@ class Neighbours:
 
     def update(self, distances: FloatArray) -> None:
         """Take the distances of a new segment to known ones, over the mean of all, shape (k,)."""
-        within = np.searchsorted(np.sort(distances[distances > COPY]), _EDGES)
+        within = np.searchsorted(np.sort(distances[distances > _COPY]), _EDGES)
         self.counts = _KEPT * self.counts + within
 
     def valley(self, rise: float) -> float:

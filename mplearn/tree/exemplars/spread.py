@@ -13,7 +13,8 @@ from ...recording import FloatArray, IntArray
 from ...state import Array, Blob, SharedState, State, require
 from ..config import TreeConfig
 from .bank import ExemplarBank
-from .neighbours import COPY
+
+_COPY = 0.01  # over the mean distance: who comes as near plays back; people do not
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +169,7 @@ class DistanceSample:
     def _measured_scale(self, config: TreeConfig) -> float:
         n = len(self.numbers)
         matrix, mean = self._matrix[:n, :n], self.mean()
-        apart = np.where(matrix > COPY * mean, matrix, np.inf)
+        apart = np.where(matrix > _COPY * mean, matrix, np.inf)
         nearest = apart.min(axis=1, initial=np.inf)
         nearest = nearest[np.isfinite(nearest)]
         if not len(nearest):
