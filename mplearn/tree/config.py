@@ -103,7 +103,8 @@ class TreeConfig:
             below this share of the scale where each is the other's nearest, the next being 1.2
             times as far, where the same holds for what came right before both, or right after
             (or that is in one node already), and where each is farther than the scale from the node
-            that it fits best; 0 for `pair_share` alone.
+            that it fits best; among ten that wait or are known, for among few this may be chance. 0
+            for `pair_share` alone.
         sequence_extent: And below this share of how far each is from standing still.
         ignore_fragments: Whether nothing becomes a primitive that is an execution of a sure one
             together with the segment right before or after it: a motion that is cut in two where

@@ -28,6 +28,7 @@ from .nodes.structure import Structure
 from .placement import ROOT, Change, Match
 
 _FAR = 1e12  # farther than any two segments
+_AMONG = 10  # what waits and what is known: among few anything is somebody's nearest
 _BY_FAR = 1.2  # how many times as far the next is
 _PLAYED_BACK = 0.05  # over the scale: nobody hesitates again so exactly
 _SURELY = 1 - 1e-9  # whatever a mean is rounded to
@@ -101,7 +102,9 @@ def _clusters(
         return groups
     most = np.minimum(np.minimum(config.pair_extent * sizes, config.pair_share * limit), exactly)
     farther = np.minimum(config.sequence_extent * sizes, config.sequence_share * limit)
+    among = len(members) + int(structure.index.leaves.sum())
     pairs = _each_others_nearest(matrix) & (matrix <= np.minimum(farther, exactly))
+    pairs &= among >= _AMONG
     farther_apart = pairs & (matrix > most)
     if farther_apart.any():
         farther_apart &= _came_in_sequence(structure, members, pairs)
