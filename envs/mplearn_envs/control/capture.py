@@ -180,6 +180,8 @@ def way_round(
 ) -> tuple[float, float, float]:
     """Return where a foot goes first so that it does not hit the other one, and how far it has.
 
+    One that is, or shall be, where the other one stands goes straight.
+
     Args:
         stands: Where the other foot stands: x, y [m] and yaw [rad], shape (3,).
         here: Where the foot is, shape (2,) at least.
@@ -193,7 +195,8 @@ def way_round(
     bx, by = turn_in_plane(place[0] - stands[0], place[1] - stands[1], -stands[2])
     far = np.hypot(bx - ax, by - ay)
     half_x, half_y = reach.clear - _SLACK_M, reach.apart - _SLACK_M
-    if not _hits(ax, ay, bx, by, half_x, half_y) or (abs(ax) < half_x and abs(ay) < half_y):
+    upon = (abs(ax) < half_x and abs(ay) < half_y) or (abs(bx) < half_x and abs(by) < half_y)
+    if upon or not _hits(ax, ay, bx, by, half_x, half_y):
         return place[0], place[1], far
     corner_x = np.array([reach.clear, reach.clear, -reach.clear, -reach.clear])
     corner_y = np.array([reach.apart, -reach.apart, -reach.apart, reach.apart])

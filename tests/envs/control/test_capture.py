@@ -126,6 +126,15 @@ def test_way_round_the_other_foot_is_the_shortest_and_hits_nothing():
         n_round += not straight
 
 
+@pytest.mark.parametrize("y", [0.02, 0.45])
+def test_who_lands_where_the_other_foot_is_near_goes_straight(y):
+    """Soles may be wider than feet are apart, and feet that are turned may stand nearer."""
+    here, place = np.array([0.0, 0.3]), np.array([0.0, y, 0.0])
+    x, y, far = way_round(np.zeros(3), here, place, CROSSING)
+    assert (x, y) == (place[0], place[1])
+    assert far == pytest.approx(abs(place[1] - here[1]))
+
+
 @pytest.mark.parametrize("side", [0, 1])
 @pytest.mark.parametrize("angle", [30.0, 60.0, 90.0, 120.0, 150.0])
 def test_who_stands_on_one_foot_and_falls_beyond_it_crosses_it(corners, side, angle):
