@@ -114,8 +114,24 @@ def test_the_only_array_of_joints_of_an_archive(
         open_recording(tmp_path / "b.npz")
 
 
+@pytest.mark.parametrize("n_frames", [17, 22, 25, 60])
+@pytest.mark.parametrize("axes", [(2, 0, 1), (0, 2, 1), (1, 2, 0)])
+def test_numbers_of_frames_are_not_taken_for_those_of_joints(
+    tmp_path: Path, landmarks: dict[str, np.ndarray], axes: tuple[int, ...], n_frames: int
+) -> None:
+    """(3, T, J), (T, 3, J) and (J, 3, T); 22 and 25 joints are those of other layouts."""
+    points = joints("COCO", landmarks)[:n_frames]
+    np.save(tmp_path / "a.npy", points.transpose(axes))
+    take = open_recording(tmp_path / "a.npy", hints=Hints(rate_hz=RATE_HZ))
+    assert take.markers == pytest.approx(points)
+
+
 @pytest.mark.parametrize(
-    "shape", [(5, 9, 3), (5, 17, 2), (5, 321), (0, 17, 3), (17, 3), (40, 50, 17, 3)]
+    "shape",
+    [
+        *((5, 9, 3), (5, 17, 2), (5, 321), (0, 17, 3), (17, 3), (40, 50, 17, 3)),
+        *((0, 263), (17, 3, 0), (5, 3, 9), ()),
+    ],
 )
 def test_what_is_no_array_of_joints(tmp_path: Path, shape: tuple[int, ...]) -> None:
     np.save(tmp_path / "a.npy", np.ones(shape))

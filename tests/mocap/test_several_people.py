@@ -9,6 +9,7 @@ from mocap_writers import mvnx_motion, write_mvnx
 
 from mplearn.anatomy import recognise
 from mplearn.demonstrator import demonstrate
+from mplearn.errors import RecordingWarning
 from mplearn.mocap import each_person, open_recording, open_recordings
 from mplearn.recording import Recording, Skeleton, marker_channels
 
@@ -101,6 +102,26 @@ def test_subjects_of_an_mvnx_file_stand_side_by_side(tmp_path: Path, positions: 
             assert np.array_equal(each.frames, one.frames)
             assert each.skeleton is not None and one.skeleton is not None
             assert each.skeleton.parents == one.skeleton.parents
+
+
+@pytest.mark.parametrize("end", ['<subject label="Ben"/></mvnx>', '<subject label="Ben"><segm'])
+def test_a_subject_without_frames_costs_no_other(tmp_path: Path, end: str) -> None:
+    path = write_mvnx(tmp_path / "a.mvnx")
+    one = open_recording(path)
+    path.write_text(path.read_text().replace("</mvnx>", end))
+    with pytest.warns(RecordingWarning):
+        take = open_recording(path)
+    assert np.array_equal(take.frames, one.frames)
+    assert take.report is not None and "'Ben' has no frames" in take.report.warnings[-1]
+
+
+def test_subjects_of_one_name_are_told_apart(tmp_path: Path) -> None:
+    text = write_mvnx(tmp_path / "a.mvnx").read_text()
+    subject = text[text.index("<subject") : text.index("</mvnx>")]
+    others = subject.replace("Anna", "Anna_1") + subject
+    (tmp_path / "a.mvnx").write_text(text.replace("</mvnx>", f"{others}</mvnx>"))
+    found = open_recordings(tmp_path / "a.mvnx", positions=True)
+    assert len({each.person for each in found}) == len(found) == 3
 
 
 @pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")

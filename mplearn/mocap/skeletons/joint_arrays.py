@@ -159,9 +159,10 @@ _VARY, _DIFFER, _ODD = 0.15, 0.25, 0.35
 
 
 class JointArrayReader(Reader):
-    """Reads arrays of joints, shape (T, J, 3): see the module's docstring.
+    """Reads arrays of joints: see the module's docstring.
 
-    Of several people they are (T, P, J, 3) or (P, T, J, 3), or (3, T, J, P), as networks have it.
+    Of one person they are (T, J, 3), (T, 3 J), (3, T, J), (T, 3, J) or (J, 3, T). Of several people
+    they are (T, P, J, 3) or (P, T, J, 3), or (3, T, J, P), as networks have it.
     """
 
     format = "joint array"
@@ -191,6 +192,8 @@ class JointArrayReader(Reader):
                 raise bad_file(path, f"arrays {', '.join(archive.names[:8])}", "one of joints")
             points, said_hz = archive.numbers(name), archive.rate_hz()
         usual_hz = None
+        if not points.size:
+            raise bad_file(path, "0 frames", "at least one")
         if points.ndim == 2 and points.shape[1] in RATES_HZ:
             usual_hz = RATES_HZ[points.shape[1]]
             findings.note(f"{points.shape[1]} features of motion, at {usual_hz:g} Hz as is usual")
@@ -247,8 +250,10 @@ def _as_people(path: Path, array: FloatArray) -> list[FloatArray]:
     if channels_first and array.shape[0] == 3 and array.shape[2] in _BY_NUMBER:
         points = np.moveaxis(array, 0, -1)  # (T, J, 3), or (T, J, P, 3)
         points = points.swapaxes(1, 2) if array.ndim == 4 else points
-    elif array.ndim == 3 and array.shape[1] == 3 and array.shape[0] in _BY_NUMBER:
-        points = array.transpose(2, 0, 1)  # (J, 3, T), as networks have it
+    elif array.ndim == 3 and array.shape[1] == 3:  # (J, 3, T), as networks have it, or (T, 3, J)
+        ways = [array.transpose(2, 0, 1), array.transpose(0, 2, 1)]
+        ways = [way for way in ways if way.shape[1] in _BY_NUMBER]
+        points = min(ways, key=lambda way: min(_unlike(way).values()), default=array)
     if points.ndim == 4 and points.shape[2] in _BY_NUMBER:
         of_each = points if len(points) <= points.shape[1] else points.swapaxes(0, 1)
         told_apart = len(of_each) < of_each.shape[1] and len(of_each) <= _MOST_PEOPLE
@@ -265,25 +270,28 @@ def _as_people(path: Path, array: FloatArray) -> list[FloatArray]:
             f"(frames, joints, 3), of {', '.join(map(str, sorted(_BY_NUMBER)))} joints, or "
             "(frames, people, joints, 3); a table (CSV) can name others",
         )
-    if not len(people[0]):
-        raise bad_file(path, "0 frames", "at least one")
     return [points[..., :3].copy() for points in people]  # the fourth says how sure a joint is
 
 
 def _layout(path: Path, points: FloatArray) -> str:
     """Return which joints these are, by the bones that they would have."""
-    candidates = _BY_NUMBER[points.shape[1]]
-    some = points[:: -(-len(points) // _LOOK)]
-    unlike = {name: _unlikeness(some, LAYOUTS[name].split()) for name in candidates}
+    unlike = _unlike(points)
     best = min(unlike, key=lambda name: unlike[name])
     if not np.isfinite(unlike[best]):
         raise bad_file(
             path,
             f"{points.shape[1]} points whose arms and legs would not be a person's in the order of "
-            f"{' or '.join(candidates)}",
+            f"{' or '.join(unlike)}",
             "joints in such an order; a table (CSV) can name others",
         )
     return best
+
+
+def _unlike(points: FloatArray) -> dict[str, float]:
+    """Return how little like a person's arms and legs are in each layout that there can be."""
+    some = points[:: -(-len(points) // _LOOK)]
+    names = _BY_NUMBER[points.shape[1]]
+    return {name: _unlikeness(some, LAYOUTS[name].split()) for name in names}
 
 
 def _unlikeness(points: FloatArray, names: list[str]) -> float:

@@ -88,6 +88,8 @@ def _side_by_side(path: Path, people: list[Recording], findings: Findings) -> Re
         )
     said = [each.person.replace(":", " ") or f"subject{k}" for k, each in enumerate(people)]
     names = [f"{name}_{k}" if said.count(name) > 1 else name for k, name in enumerate(said)]
+    if len(set(names)) < len(names):  # Anna_1 is there beside two called Anna
+        names = [f"{name}_{k}" for k, name in enumerate(said)]
     frames = np.full((max(map(len, people)), sum(len(each.channels) for each in people)), np.nan)
     at = 0
     for each in people:

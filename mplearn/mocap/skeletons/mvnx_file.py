@@ -68,17 +68,19 @@ def read_mvnx(path: Path, text: str, findings: Findings) -> list[MVNXFile]:
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
-        last = streams.last
-        if error.code not in _CUT_OFF or last is None or last.numbers < 3:
+        if error.code not in _CUT_OFF or streams.last is None or streams.numbers < 3:
             raise bad_file(path, f"damaged XML ({error})", _EXPECTED) from error
-        last.leave_out_last()
-        findings.warn(f"the file is cut off: {last.numbers} frames before that are read")
+        streams.last.leave_out_last()
+        findings.warn(f"the file is cut off: {streams.numbers} frames before that are read")
     whole = [each for each in streams.subjects if each.file.segments and each.numbers]
     if not whole:
         first = streams.subjects[0] if streams.subjects else _Stream(path)
         raise bad_file(
             path, f"{len(first.file.segments)} segments, {first.numbers} frames", _EXPECTED
         )
+    for each in streams.subjects:
+        if each not in whole:
+            findings.warn(f"the subject {each.file.subject!r} has no frames, and is left out")
     return [_measured(path, each, findings) for each in whole]
 
 
@@ -174,6 +176,11 @@ class _Streams:
     @property
     def last(self) -> _Stream | None:
         return self.subjects[-1] if self.subjects else None
+
+    @property
+    def numbers(self) -> int:
+        """Frames of the subject that has most."""
+        return max((each.numbers for each in self.subjects), default=0)
 
     def doctype(self, *_: object) -> None:
         raise bad_file(self.path, "a document type, which may declare entities", "none, as in MVNX")
