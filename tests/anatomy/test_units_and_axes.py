@@ -13,16 +13,18 @@ from known_person import Truth
 from rigs import RIGS, Rig, write_rig
 
 from mplearn.body import human_body
+from mplearn.errors import RecordingWarning
 from mplearn.mocap import open_recording
 from mplearn.mocap.skeletons.stature import unit_of_skeleton
 
+PLAIN = [rig for rig in RIGS if not rig.costume]  # who wears wings is as large as in another unit
 UNITS_M = (0.01, 1.0, 0.001, 0.0254, 0.0254 / 0.45, 0.1, 0.3048)
 
 
 @settings(
     max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
-@given(rig=st.sampled_from(RIGS), unit_m=st.sampled_from(UNITS_M), up=st.sampled_from("xyz"))
+@given(rig=st.sampled_from(PLAIN), unit_m=st.sampled_from(UNITS_M), up=st.sampled_from("xyz"))
 def test_unit_and_axis_of_any_rig(
     tmp_path: Path, truth: Truth, rig: Rig, unit_m: float, up: str
 ) -> None:
@@ -32,6 +34,18 @@ def test_unit_and_axis_of_any_rig(
     assert report is not None
     assert report.unit_m == pytest.approx(unit_m)
     assert report.up == up
+
+
+@pytest.mark.parametrize("unit_m", [0.01, 1.0, 0.001])
+@pytest.mark.parametrize("rig", [rig for rig in RIGS if rig.costume])
+def test_who_wears_a_costume_is_as_large_as_without(
+    tmp_path: Path, truth: Truth, rig: Rig, unit_m: float
+) -> None:
+    rig = replace(rig, unit_m=unit_m)
+    path = write_rig(tmp_path / "rig.bvh", truth.body, truth.postures[::8], 25.0, rig)
+    report = open_recording(path, positions=True).report
+    assert report is not None
+    assert report.unit_m == unit_m
 
 
 @pytest.mark.parametrize("stature_m", [0.9, 1.2, 1.5, 1.8, 2.1])
@@ -62,3 +76,9 @@ def test_a_hand_an_arm_and_a_cross_have_no_size_of_a_person() -> None:
     cross = np.array([[[0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10]]], dtype=float)
     assert unit_of_skeleton(cross, [-1, 0, 0, 0], 0.01) is None
     assert unit_of_skeleton(np.full((2, 4, 3), np.nan), [-1, 0, 0, 0], 0.01) is None
+
+
+def test_a_size_that_nobody_has_is_told(tmp_path: Path, truth: Truth) -> None:
+    path = write_rig(tmp_path / "rig.bvh", truth.body, truth.postures[::8], 25.0, Rig(unit_m=4e-5))
+    with pytest.warns(RecordingWarning, match="nobody is as large"):
+        open_recording(path, positions=True)

@@ -178,6 +178,8 @@ def _settled_unit(
         )
     elif rival:
         findings.warn(f"{taken}, as is usual{rival}: {option('unit_m')} settles it")
+    elif sized is not None and not found.fits:
+        findings.warn(f"{taken}, though nobody is as large: {option('unit_m')} settles it")
     elif not space.says_unit and found.fits:
         findings.note(f"{taken}: it fits a person")
     return found.unit_m
