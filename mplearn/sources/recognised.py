@@ -13,7 +13,7 @@ from ..errors import MPLearnError
 from ..mocap.findings import Findings
 from ..mocap.markers.names import chosen_names
 from ..mocap.placing.handedness import OTHER_HAND, right_handed
-from ..mocap.placing.level import leveled, turn_to_level
+from ..mocap.placing.level import leveled, told_of_lean, turn_to_level
 from ..mocap.placing.space import Space, placed
 from ..recording import BoolArray, FloatArray, IntArray, Recording, marker_channels
 from .registry import Wanted
@@ -360,6 +360,8 @@ class RecognisedSource(Source):
             if hints.level:
                 tilt = turn_to_level(path, recording)
                 recording, turn = leveled(recording, tilt), tilt @ turn
+            else:
+                recording = told_of_lean(recording)
             told = recording.report or told
             report = [f"warning: {text}" for text in told.warnings] + list(told.notes)
         if self._wanted.observe == "positions":

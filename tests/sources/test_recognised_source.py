@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from played import Given, blocks, frames_of, texts_of
+from scipy.spatial.transform import Rotation
 
 from mplearn.mocap import Hints
 from mplearn.recording import Recording, marker_channels
@@ -44,6 +45,22 @@ def test_left_handed_axes_are_turned_round_where_that_is_said(
         areas.append(np.cross(one, other)[..., 2])
     np.testing.assert_allclose(*areas, atol=1e-9)
     assert any("left-handed" in text for text in texts_of(items, "body"))
+
+
+def test_who_leans_by_a_tilted_camera_is_told_and_set_upright_where_that_is_said(
+    session: Recording,
+) -> None:
+    tilt = Rotation.from_euler("x", 25.0, degrees=True)
+    tilted = (session.markers[:300] @ tilt.as_matrix().T).reshape(300, -1)
+    given = blocks(Stream(session.channels, 100.0, unit_m=1.0, up="z"), tilted)
+    plain = seen(given, observe="positions")
+    assert any("leans by" in text for text in texts_of(plain, "body"))
+    items = seen(given, observe="positions", hints=Hints(level=True))
+    assert not any("leans by" in text for text in texts_of(items, "body"))
+    found, wanted = (x.reshape(300, -1, 3) for x in (frames_of(items), session.frames[:300]))
+    known = ~np.isnan(wanted).any(axis=2)
+    off = Rotation.align_vectors(found[known], wanted[known])[0]
+    assert np.degrees(off.magnitude()) < 5.0  # people stand so straight
 
 
 def test_a_subjects_prefix_falls_away(session: Recording) -> None:
