@@ -102,8 +102,9 @@ def likeliest_unit(
         return Unit(declared_m, True, False)
     candidates = {*_COMMON, *_OTHERS, declared_m}
     fits = [unit for unit in candidates if low <= unit / adult_m <= high]
-    if not fits:
-        return Unit(declared_m, False, False)
+    if not fits:  # as with wings, or a staff: the unit in which it is the least odd
+        best = min((declared_m, *_COMMON), key=lambda unit: abs(np.log(unit / adult_m)))
+        return Unit(declared_m if says_so else best, False, False)
     unlikely = {unit: _unlikely(unit, adult_m, declared_m) for unit in fits}
     best, *others = sorted(fits, key=lambda unit: unlikely[unit])
     doubt = _BETWEEN_RARE if unlikely[best] >= _RARE else _IN_DOUBT

@@ -15,7 +15,7 @@ from ..placing.size import Unit, likeliest_unit
 from ..reader import Hints
 
 _USUAL_M = 1.6  # between the joints of a person that are farthest apart: crown to toe, or hands
-_PEOPLE = (0.45, 1.6)  # against that: from a child who sits to a giant who reaches up, or wings
+_PEOPLE = (0.45, 1.44)  # against that: from a child who sits to a giant who reaches up
 _LOOK = 100  # frames
 _RIGID = 0.1  # of its length, by which a bone may vary
 _HEIGHT_M = (0.05, 3.0)  # of the pelvis, lying to leaping
