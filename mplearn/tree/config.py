@@ -108,8 +108,7 @@ class TreeConfig:
         sequence_extent: And below this share of how far each is from standing still.
         ignore_fragments: Whether nothing becomes a primitive that is an execution of a sure one
             together with the segment right before or after it: a motion that is cut in two where
-            someone hesitated is not two motions. What only ever leads into a motion that lasts
-            three times as long, or longer, is no primitive then, either.
+            someone hesitated is not two motions.
         confirmed: Members from which on a primitive is sure; with fewer it is provisional.
         patience: A provisional primitive that nothing has joined after so many further segments is
             forgotten; after four times as many as there are primitives, if that is more.

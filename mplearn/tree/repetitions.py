@@ -16,7 +16,7 @@ class Repetition(NamedTuple):
     """The motion that came most often among those that are no primitive.
 
     Attributes:
-        n_unplaced: Segments that belong to no primitive.
+        n_unplaced: Segments that wait to become part of a primitive; no fragments of known ones.
         times: How often it came; 1 where no two are alike.
         apart: Largest distance between its executions, or to the nearest other motion where it came
             once, over what a primitive may have; inf where nothing else was seen.

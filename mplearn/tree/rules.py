@@ -25,7 +25,7 @@ from .nodes.clustering import (
 from .nodes.node import Node
 from .nodes.search import mean_nearest
 from .nodes.structure import Structure
-from .placement import ROOT, Change, Match
+from .placement import ROOT, Change, Match, Split
 
 _FAR = 1e12  # farther than any two segments
 _AMONG = 10  # what waits and what is known: among few anything is somebody's nearest
@@ -38,12 +38,15 @@ _UNKNOWN = 3.0  # leaves that the scale of all motion counts for beside that of 
 def form_primitives(structure: Structure, node: Node, when: int) -> Change:
     """Form a leaf of each cluster in a node that grew; what else waits in the root may join it.
 
+    A leaf in which others are formed, as the rules are printed, is split: it is a leaf no more.
+
     Args:
         structure: The tree.
         node: The root; as printed, any node.
         when: Segments seen.
     """
     config = structure.config
+    was_leaf = node.id != ROOT and node.is_leaf
     change = Change()
     while True:
         loose = [i for i, n in enumerate(node.members) if node.id == ROOT or n not in node.settled]
@@ -51,7 +54,7 @@ def form_primitives(structure: Structure, node: Node, when: int) -> Change:
         limit = cutoff(structure, node)
         groups = _clusters(structure, [node.members[i] for i in loose], matrix, limit)
         if not groups:
-            return change
+            break
         places = [loose[i] for i in groups[0]]
         members = [node.members[i] for i in places]
         same = None if config.local else _leaf_of(structure, members, limit)
@@ -68,6 +71,10 @@ def form_primitives(structure: Structure, node: Node, when: int) -> Change:
             radius = structure.index.radius(child.id)
             inside = [n for n, distance in zip(others, row, strict=True) if distance <= radius]
             change = change.then(structure.take_in(child, inside))
+    if was_leaf and change.born:
+        node.history.append(("split", when))
+        change = change._replace(splits=(Split(node.id, change.born),))
+    return change
 
 
 def _clusters(

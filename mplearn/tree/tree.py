@@ -383,6 +383,7 @@ class PrimitiveTree:
         like = self._waiting_like(node)
         if node.id == ROOT or self.config.local:
             change = form_primitives(structure, node, self.n_seen)
+            recognised = recognised and (node.is_leaf or number in dict(change.moved))
         else:
             change = shed_outliers(structure, node, self.n_seen)
             recognised = recognised and (number, ROOT) not in change.moved

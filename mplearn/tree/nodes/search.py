@@ -65,7 +65,7 @@ class IndexState(State):
 
 
 _NOWHERE = (ROOT,)
-_ROOM = 16  # nodes that there is room for at first; twice as many when it is full
+_ROOM = 16  # nodes that there is room for at first; twice as many, at least, when it is full
 _YOUNG = 3  # exemplars of a leaf up to which little is known of how much executions vary
 _YOUNG_GROWTH = np.array([1.0, 1.0, 1.35, 1.1, 1.0])
 # by number of exemplars: the largest of a few distances is smaller than that of many
@@ -211,7 +211,7 @@ class NodeIndex:
         """Make room for a node at a place."""
         n = len(self._known)
         if n == len(self._room):
-            self._room = np.concatenate([self._room, np.zeros(n, _KNOWN)])
+            self._room = np.concatenate([self._room, np.zeros(max(n, _ROOM), _KNOWN)])
         self._known = self._room[: n + 1]
         self._known[k + 1 :] = self._known[k:-1]
 
