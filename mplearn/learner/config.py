@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from ..errors import InvalidValueError
 from ..people import PeopleConfig
+from ..segmentation import require_segmenter
 from ..state import from_settings, newer, to_settings
 from ..tree import TreeConfig
 
@@ -77,6 +78,7 @@ class LearnerConfig:
             raise InvalidValueError(f"rate_hz must lie in [20, 250], not {self.rate_hz}")
         if self.observe not in ("robot", "markers"):
             raise InvalidValueError(f"observe must be 'robot' or 'markers', not {self.observe!r}")
+        require_segmenter(self.segmenter)
         if self.scaffolding not in (True, False, "inside"):
             raise InvalidValueError(
                 f"scaffolding must be True, False or 'inside', not {self.scaffolding!r}"

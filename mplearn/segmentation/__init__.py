@@ -9,6 +9,7 @@ from .kohlmorgen_lemm import KohlmorgenLemmConfig as KohlmorgenLemmConfig
 from .registry import SEGMENTERS as SEGMENTERS
 from .registry import make_segmenter as make_segmenter
 from .registry import register_segmenter as register_segmenter
+from .registry import require_segmenter as require_segmenter
 from .speed import ZeroVelocityConfig as ZeroVelocityConfig
 from .turns import TurnConfig as TurnConfig
 from .zero_velocity import ZeroVelocity as ZeroVelocity

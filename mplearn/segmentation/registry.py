@@ -66,13 +66,28 @@ def make_segmenter(name: str, n_channels: int, rate_hz: float) -> Segmenter:
         >>> len(found) >= 5
         True
     """
+    require_segmenter(name)
+    return SEGMENTERS[name](n_channels, rate_hz)
+
+
+def require_segmenter(name: str) -> None:
+    """Check that there is a segmenter of a name.
+
+    Raises:
+        InvalidValueError: There is none; the message names those that there are.
+
+    Example:
+        >>> require_segmenter("zero-velocity")
+        >>> require_segmenter("by eye")
+        Traceback (most recent call last):
+        mplearn.errors.InvalidValueError: segmenter must be one of [...], not 'by eye'
+    """
     _load_entry_points()
     if name not in SEGMENTERS:
         raise InvalidValueError(
             f"segmenter must be one of {sorted(SEGMENTERS)} (register_segmenter adds one), "
             f"not {name!r}"
         )
-    return SEGMENTERS[name](n_channels, rate_hz)
 
 
 @cache

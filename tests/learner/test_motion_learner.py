@@ -234,6 +234,7 @@ def test_a_recording_at_another_rate_or_of_other_channels_is_refused(features: R
         ({"channels": ()}, "at least one channel"),
         ({"channels": ("a",), "rate_hz": 5.0}, "5.0"),
         ({"channels": ("a",), "observe": "dog"}, "dog"),
+        ({"channels": ("a",), "segmenter": "by eye"}, r"one of \['kinematic.*not 'by eye'"),
         ({"channels": ("a",), "longest_pause_s": 0.0}, "longest_pause_s"),
     ],
 )
