@@ -90,7 +90,7 @@ class LabelledSegment:
             )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Skeleton:
     """The joints that a recording of a skeleton has, as a tree.
 
@@ -171,7 +171,7 @@ class ReadReport:
     warnings: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recording:
     """A stretch of measured motion.
 
@@ -203,7 +203,7 @@ class Recording:
     person: str = ""
     labels: tuple[LabelledSegment, ...] = field(default=())
     skeleton: Skeleton | None = None
-    report: ReadReport | None = field(default=None, compare=False)
+    report: ReadReport | None = None
 
     def __post_init__(self) -> None:
         try:

@@ -74,7 +74,7 @@ class WalkStep:
     zmp_margin_m: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WalkResult:
     """A walk.
 

@@ -37,7 +37,7 @@ class Boundary:
         return max(0, self.start - other.end, other.start - self.end)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BoundaryScore:
     """Agreement of boundaries, for one stream or several.
 

@@ -32,7 +32,7 @@ _LONGER, _FARTHER = 1.7, 2.0  # than a cycle before, at most
 _EDGE_S = 0.1  # cuts this near to an end of a bout belong half to it
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bout:
     """A stretch of rhythmic motion.
 

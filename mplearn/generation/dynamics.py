@@ -15,7 +15,7 @@ _CUTOFF_HZ = 6.0  # of human motion; what is faster in an exemplar's derivatives
 _FLOOR = 0.02  # least standard deviation within a state, as a share of that over the motion
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Dynamics:
     """How a primitive moves in each of its states: Gaussians, and how long it stays.
 

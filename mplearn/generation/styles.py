@@ -20,7 +20,7 @@ from .smooth import most_likely_trajectory
 StyleName: TypeAlias = Literal["deterministic", "nearest", "averaged", "smooth"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Request:
     """What a style is asked for.
 

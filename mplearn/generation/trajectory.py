@@ -10,7 +10,7 @@ from ..errors import InvalidValueError
 from ..recording import FloatArray, IntArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trajectory:
     """A motion through one or more primitives.
 

@@ -71,7 +71,7 @@ def _check_gaussians(means: FloatArray, variances: FloatArray) -> None:
 SHORTEST_STAY = 1.05  # frames: a state is never left for certain, or staying were impossible
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LeftRightHMM(GaussianStates):
     """A left-right HMM with diagonal Gaussian emissions and no skips.
 

@@ -18,7 +18,7 @@ FIT_S = 4.0  # of a recording are followed to see how well a person fits
 SHOWN = 6  # postures
 
 
-@dataclass
+@dataclass(eq=False)
 class Inspection:
     """What was found in one recording.
 

@@ -41,7 +41,7 @@ class Foreknowledge(NamedTuple):
     transitions_s: Mapping[tuple[int | None, int], float]
 
 
-@dataclass
+@dataclass(eq=False)
 class Skill:
     """A primitive as one robot performs it.
 

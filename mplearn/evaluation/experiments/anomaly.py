@@ -26,7 +26,7 @@ _LEARNED_SHARE = 0.75
 _UNUSED_SHARE = 0.4  # of a session: before its movements begin to be used up
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Motion:
     """A motion that was found in a stream.
 

@@ -37,7 +37,7 @@ class Forecast(NamedTuple):
     brier: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Foretold:
     """What was said of each motion but the first, in arrays of `Forecast`, shape (n, 3).
 

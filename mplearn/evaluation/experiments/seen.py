@@ -15,7 +15,7 @@ from ..matching import match_segments
 from ..observing import observe
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Seen:
     """A session as a tree sees it.
 

@@ -21,7 +21,7 @@ from .product_chain import ProductChain
 MOST_COMBINATIONS = 1024  # up to here the E-step is exact
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FactorialHMM:
     """Left-right chains whose means add up to what is seen, with one variance for each channel.
 

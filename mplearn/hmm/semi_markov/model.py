@@ -25,7 +25,7 @@ from . import kernels as kernels
 LEAST_SPREAD = 0.7  # frames: below it a normal distribution over whole frames has other moments
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SemiMarkovHMM(GaussianStates):
     """A left-right model whose states last a normally distributed number of frames.
 

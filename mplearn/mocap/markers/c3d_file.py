@@ -29,7 +29,7 @@ _POSE = 17  # numbers of a pose
 _SQUARE = 0.02  # by which a turn is off a rotation, at most
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class C3DContent:
     """What a C3D file holds.
 

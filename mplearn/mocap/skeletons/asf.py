@@ -20,7 +20,7 @@ _INCH_M = 0.0254
 _EXPECTED = "an ASF skeleton with :units, :root, :bonedata and :hierarchy"
 
 
-@dataclass
+@dataclass(eq=False)
 class _Bone:
     """A bone as the file has it: direction at rest and axes are the world's."""
 

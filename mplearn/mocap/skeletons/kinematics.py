@@ -15,7 +15,7 @@ AXIS_MARK = ">"  # between a joint's name and the axis that a point shows
 _IDENTITY = np.eye(3)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Joint:
     """One joint of a skeleton, at the near end of the bone that carries its name.
 

@@ -25,7 +25,7 @@ _MOST_MISSING = 10  # times as many frames as there are
 _LARGEST = 1e12  # of a rate [1/s] and of times [ms]
 
 
-@dataclass
+@dataclass(eq=False)
 class MVNXFile:
     """An MVNX file.
 

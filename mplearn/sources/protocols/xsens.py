@@ -43,7 +43,7 @@ def open_xsens(address: str, wanted: Wanted) -> Source:
     return ReceivedSource(f"xsens:{receiver.address}", receiver, wanted.hints.rate_hz)
 
 
-@dataclass
+@dataclass(eq=False)
 class _Parts:
     """The datagrams of a frame that came."""
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _COLUMNS = 4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PrimitiveCurves:
     """What one panel shows.
 
