@@ -80,7 +80,7 @@ def require_segmenter(name: str) -> None:
         >>> require_segmenter("zero-velocity")
         >>> require_segmenter("by eye")
         Traceback (most recent call last):
-        mplearn.errors.InvalidValueError: segmenter must be one of [...], not 'by eye'
+        mplearn.errors.InvalidValueError: segmenter must be one of [...] (...), not 'by eye'
     """
     _load_entry_points()
     if name not in SEGMENTERS:
