@@ -169,7 +169,7 @@ class TreeConfig:
     pair_share: float = newer(0.6, absent=1.0)
     pair_extent: float = newer(1.1, absent=math.inf)
     sequence_share: float = newer(1.2, absent=0.0)
-    sequence_extent: float = newer(0.8, absent=0.8)
+    sequence_extent: float = newer(0.74, absent=0.74)
     ignore_fragments: bool = newer(True, absent=False)
     confirmed: int = newer(3, absent=1)
     patience: int = newer(64, absent=64)
