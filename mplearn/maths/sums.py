@@ -20,7 +20,19 @@ LANES = 4  # doubles in a vector, and rows at once, so that sums do not wait for
 _emit: Any = cgutils
 _DOUBLE = ir.DoubleType()
 _VECTOR = ir.VectorType(_DOUBLE, LANES)
+_UNDEFINED = ir.Constant(_VECTOR, ir.Undefined)
 _FIRST = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+
+
+def _require_contiguous(*arrays: Any) -> None:
+    """Check, while a kernel is compiled, that the values of arrays lie side by side."""
+    if any(not isinstance(each, types.Array) or each.layout != "C" for each in arrays):
+        raise TypingError(f"arrays must be contiguous, not {arrays}")
+
+
+def _vector_at(builder: Any, place: Any) -> Any:
+    """Return a place in memory as that of a vector."""
+    return builder.bitcast(place, _VECTOR.as_pointer())
 
 
 def _squares_tile(
@@ -43,9 +55,7 @@ def _squares_tile(
         at: First point, at most T - `LANES`.
         out: Shape (N, T).
     """
-    arrays = columns, means, scales, given, out
-    if any(not isinstance(each, types.Array) or each.layout != "C" for each in arrays):
-        raise TypingError(f"arrays must be contiguous, not {arrays}")
+    _require_contiguous(columns, means, scales, given, out)
     return types.void(columns, means, scales, given, types.intp, types.intp, out), _tile
 
 
@@ -67,9 +77,7 @@ def _row_squares(
         one: Shape (K,).
         out: Shape (`LANES`, `LANES`).
     """
-    arrays = rows, one, out
-    if any(not isinstance(each, types.Array) or each.layout != "C" for each in arrays):
-        raise TypingError(f"arrays must be contiguous, not {arrays}")
+    _require_contiguous(rows, one, out)
     return types.void(rows, types.intp, one, out), _squares
 
 
@@ -79,24 +87,21 @@ def _squares(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     def array(k: int) -> Any:
         return context.make_array(signature.args[k])(context, builder, args[k])
 
-    def vector_at(place: Any) -> Any:
-        return builder.bitcast(place, _VECTOR.as_pointer())
-
     rows, one, out, row = array(0), array(2), array(3), args[1]
     (width,) = _emit.unpack_tuple(builder, one.shape)
     starts = [builder.mul(builder.add(row, row.type(k)), width) for k in range(LANES)]
     sums = [_emit.alloca_once_value(builder, _VECTOR([0.0] * LANES)) for _ in starts]
     with _emit.for_range(builder, builder.udiv(width, row.type(LANES))) as loop:
         at = builder.mul(loop.index, row.type(LANES))
-        theirs = builder.load(vector_at(builder.gep(one.data, [at])), align=8)
+        theirs = builder.load(_vector_at(builder, builder.gep(one.data, [at])), align=8)
         for start, total in zip(starts, sums, strict=True):
             place = builder.gep(rows.data, [builder.add(start, at)])
-            offset = builder.fsub(builder.load(vector_at(place), align=8), theirs)
+            offset = builder.fsub(builder.load(_vector_at(builder, place), align=8), theirs)
             term = builder.fmul(offset, offset)
             builder.store(builder.fadd(builder.load(total), term), total)
     for k, total in enumerate(sums):
         place = builder.gep(out.data, [row.type(LANES * k)])
-        builder.store(builder.load(total), vector_at(place), align=8)
+        builder.store(builder.load(total), _vector_at(builder, place), align=8)
     return context.get_dummy_value()
 
 
@@ -113,9 +118,6 @@ def _tile(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         value = builder.insert_element(_UNDEFINED, builder.load(place), ir.IntType(32)(0))
         return builder.shuffle_vector(value, _UNDEFINED, _FIRST)
 
-    def vector_at(place: Any) -> Any:
-        return builder.bitcast(place, _VECTOR.as_pointer())
-
     columns, means, scales, given, out = (array(k) for k in (0, 1, 2, 3, 6))
     row, at = args[4], args[5]
     n_channels, n_points = _emit.unpack_tuple(builder, columns.shape)
@@ -126,7 +128,7 @@ def _tile(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     ]
     with _emit.for_range(builder, n_channels) as loop:
         place = builder.add(builder.mul(loop.index, n_points), at)
-        points = builder.load(vector_at(builder.gep(columns.data, [place])), align=8)
+        points = builder.load(_vector_at(builder, builder.gep(columns.data, [place])), align=8)
         for start, total in zip(starts, sums, strict=True):
             value = builder.add(start, loop.index)
             offset = builder.fsub(points, spread(builder.gep(means.data, [value])))
@@ -135,11 +137,10 @@ def _tile(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             builder.store(builder.fadd(builder.load(total), term), total)
     for each, total in zip(rows, sums, strict=True):
         place = builder.add(builder.mul(each, n_points), at)
-        builder.store(builder.load(total), vector_at(builder.gep(out.data, [place])), align=8)
+        builder.store(
+            builder.load(total), _vector_at(builder, builder.gep(out.data, [place])), align=8
+        )
     return context.get_dummy_value()
-
-
-_UNDEFINED = ir.Constant(_VECTOR, ir.Undefined)
 
 
 _AT_ONCE = 8
