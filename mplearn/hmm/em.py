@@ -192,6 +192,36 @@ def em(
     return before
 
 
+@njit(cache=True)
+def em_of_each(
+    frames: FloatArray,
+    columns: FloatArray,
+    weights: FloatArray,
+    floor: FloatArray,
+    duration_prior: float,
+    models: Parameters,
+) -> FloatArray:
+    """Fit a model to each of many sequences by itself, in one step; return their log-likelihoods.
+
+    Args:
+        frames: Shape (S, T, D).
+        columns: The same with frames along the last axis, shape (S, D, T).
+        weights: Shape (T,).
+        floor: Smallest variance of each channel, shape (D,).
+        duration_prior: Transitions of either kind added to each state's count.
+        models: Written in place, stacked: one more axis, of length S, in front.
+    """
+    offsets = np.array([0, frames.shape[1]])
+    likelihoods = np.empty(len(frames))
+    for s in range(len(frames)):
+        batch = SequenceBatch(frames[s], columns[s], weights, offsets)
+        own = Parameters(
+            models.means[s], models.variances[s], models.log_stay[s], models.log_next[s]
+        )
+        likelihoods[s] = em(batch, floor, duration_prior, True, 1, 0.0, own)
+    return likelihoods
+
+
 @njit(cache=True, inline="always")
 def _exp(x: float) -> float:
     """Return exp(x), or 0 where that is below what any sum here could notice."""

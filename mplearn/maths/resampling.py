@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..recording import FloatArray
+from .compiling import njit
 
 
 def interpolate_linearly(frames: FloatArray, places: FloatArray) -> FloatArray:
@@ -23,15 +24,22 @@ def interpolate_linearly(frames: FloatArray, places: FloatArray) -> FloatArray:
                [2. ],
                [3. ]])
     """
-    low = np.floor(places).astype(np.int64)
-    high = np.minimum(low + 1, len(frames) - 1)
-    share = (places - low)[:, None]
-    before, after = frames[low], frames[high]
-    found = before + share * (after - before)
-    missing = np.isnan(found)
-    if missing.any():
-        found = np.where(missing, np.where(share < 0.5, before, after), found)
-    return np.asarray(found)
+    return _interpolated(np.array(frames, np.float64, order="C", copy=None), places)
+
+
+@njit(cache=True)
+def _interpolated(frames: FloatArray, places: FloatArray) -> FloatArray:
+    found = np.empty((len(places), frames.shape[1]))
+    for p, place in enumerate(places):
+        low = int(np.floor(place))
+        high = min(low + 1, len(frames) - 1)
+        share = place - low
+        nearer = low if share < 0.5 else high
+        for d in range(frames.shape[1]):
+            before = frames[low, d]
+            value = before + share * (frames[high, d] - before)
+            found[p, d] = value if value == value else frames[nearer, d]
+    return found
 
 
 def stretch(frames: FloatArray, n_frames: int) -> FloatArray:

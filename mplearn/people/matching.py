@@ -170,10 +170,9 @@ def _agglomerate(
     """
     n = len(matrix)
     groups = np.arange(n)
-    totals = np.empty((2, n, n))
-    totals[0], totals[1] = matrix, image
-    sizes, means = np.ones(n), totals.copy()
-    mean, mirrored = means[0], means[1]
+    totals = np.empty((n, n, 2))  # side by side, for a join writes a column of both
+    totals[:, :, 0], totals[:, :, 1] = matrix, image
+    sizes, nearer = np.ones(n), np.empty(n)
     barred = barred.copy()
     alive = np.arange(n)
     nearest, second = np.full(n, np.inf), np.full(n, np.inf)
@@ -183,7 +182,7 @@ def _agglomerate(
     for at in range(len(pinned)):
         i, j = groups[pinned[at, 0]], groups[pinned[at, 1]]
         if i != j:
-            alive = _joined(min(i, j), max(i, j), alive, groups, totals, sizes, means, barred)
+            alive = _joined(min(i, j), max(i, j), alive, groups, totals, sizes, barred)
     far = np.sqrt(link * reach)
     first = -1
     while True:
@@ -195,10 +194,11 @@ def _agglomerate(
                 nearest[i] = second[i] = np.inf
                 for j in alive:
                     if j != i:
-                        if mean[i, j] < nearest[i]:
-                            nearest[i], second[i] = mean[i, j], nearest[i]
-                        elif mean[i, j] < second[i]:
-                            second[i] = mean[i, j]
+                        d = totals[i, j, 0] / (sizes[i] * sizes[j])
+                        if d < nearest[i]:
+                            nearest[i], second[i] = d, nearest[i]
+                        elif d < second[i]:
+                            second[i] = d
                 changed[i] |= before != (nearest[i], second[i])
         news = alive[changed[alive]]
         first = -1
@@ -207,8 +207,11 @@ def _agglomerate(
             if changed[i] or (partner >= 0 and (groups[partner] != partner or changed[partner])):
                 others, doubts[i], partners[i] = alive, np.inf, -1
             for j in others:
-                d = mean[i, j]
-                if j > i and d <= far and not barred[i, j] and mirrored[i, j] >= sided * d:
+                if j <= i or barred[i, j]:
+                    continue
+                pairs = sizes[i] * sizes[j]
+                d = totals[i, j, 0] / pairs
+                if d <= far and totals[i, j, 1] / pairs >= sided * d:
                     next_i = second[i] if d <= nearest[i] else nearest[i]
                     next_j = second[j] if d <= nearest[j] else nearest[j]
                     doubt = d * d / max(min(next_i, next_j, reach), 1e-12)
@@ -220,10 +223,13 @@ def _agglomerate(
         if first < 0:
             return groups
         other = partners[first]
-        nearer = np.minimum(mean[first], mean[other])
-        alive = _joined(first, other, alive, groups, totals, sizes, means, barred)
         for k in alive:
-            stale[k] = nearer[k] <= second[k] or mean[first, k] <= second[k]
+            one = totals[first, k, 0] / (sizes[first] * sizes[k])
+            nearer[k] = min(one, totals[other, k, 0] / (sizes[other] * sizes[k]))
+        alive = _joined(first, other, alive, groups, totals, sizes, barred)
+        for k in alive:
+            mean = totals[first, k, 0] / (sizes[first] * sizes[k])
+            stale[k] = nearer[k] <= second[k] or mean <= second[k]
         stale[first] = True
 
 
@@ -235,7 +241,6 @@ def _joined(
     groups: IntArray,
     totals: FloatArray,
     sizes: FloatArray,
-    means: FloatArray,
     barred: BoolArray,
 ) -> IntArray:
     """Let one group take up another; return what is left."""
@@ -246,12 +251,8 @@ def _joined(
             groups[k] = first
     for k in alive:
         for part in range(2):
-            totals[part, first, k] += totals[part, other, k]
-            totals[part, k, first] = totals[part, first, k]
+            totals[first, k, part] += totals[other, k, part]
+            totals[k, first, part] = totals[first, k, part]
         barred[first, k] |= barred[other, k]
         barred[k, first] = barred[first, k]
-        if k != first:
-            pairs = sizes[first] * sizes[k]
-            for part in range(2):
-                means[part, first, k] = means[part, k, first] = totals[part, first, k] / pairs
     return alive

@@ -199,7 +199,7 @@ def from_bytes(data: bytes) -> Any:
         {'n': 3, 'names': ['bow', 'wave']}
     """
     length = int.from_bytes(data[:8], "little")
-    return unpacked(from_json(data[8 : 8 + length]), data[8 + length :])
+    return unpacked(from_json(data[8 : 8 + length]), memoryview(data)[8 + length :])
 
 
 def _fetched(part: Callable[[str], bytes], key: str) -> bytes:

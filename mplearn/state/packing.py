@@ -53,7 +53,7 @@ def packed(content: Any) -> tuple[Any, bytes]:
     return pack(content), bytes(blob)
 
 
-def unpacked(body: Any, blob: bytes) -> Any:
+def unpacked(body: Any, blob: bytes | memoryview) -> Any:
     """Return the plain values and arrays that `packed` returned; equal arrays are one object.
 
     Raises:
@@ -101,7 +101,7 @@ def _refuse(constant: str) -> float:
     raise ValueError(f"{constant} is not JSON")
 
 
-def _array(blob: bytes, offset: int, narrow: str, dtype: str, shape: list[int]) -> Any:
+def _array(blob: bytes | memoryview, offset: int, narrow: str, dtype: str, shape: list[int]) -> Any:
     if narrow not in _DTYPES or dtype not in _DTYPES or offset < 0 or min(shape, default=1) < 0:
         raise ValueError(f"an array is described as {[offset, narrow, dtype, shape]}")
     count = math.prod(shape)

@@ -295,9 +295,17 @@ def _seen_density(
 
 
 @njit(cache=True)
-def own_score(exemplar: Exemplar, weights: FloatArray) -> float:
-    """Return the log-likelihood of an exemplar's points under its model, as distances take it."""
-    return _score(exemplar.columns, _of_one(exemplar), weights)
+def own_scores(exemplars: Exemplar, weights: FloatArray) -> FloatArray:
+    """Return the log-likelihood of each one's points under its model, as distances take it.
+
+    Args:
+        exemplars: Many, stacked.
+        weights: Weight of each point, shape (P,).
+    """
+    out = np.empty(len(exemplars.columns))
+    for k in range(len(out)):
+        out[k] = _score(exemplars.columns[k], _of_many(exemplars, k), weights)
+    return out
 
 
 @njit(cache=True)

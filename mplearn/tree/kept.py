@@ -65,7 +65,7 @@ class KeptTree(PrimitiveTree):
         """
         state, self._state = self._state, None
         if state is not None:
-            super().load_state(state)
+            self._resume(state)
             if self._least is not None:
                 super().require_exemplars(self._least)
 

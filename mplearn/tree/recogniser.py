@@ -203,6 +203,8 @@ def refusal(frames: FloatArray, shortest_frames: int, longest_frames: float = ma
         return f"{len(frames)} frames are too many for a motion; at most {longest_frames}"
     if len(frames) < shortest_frames:
         return f"{len(frames)} frames are too few for a motion; at least {shortest_frames}"
+    if not np.isnan(frames.sum()):  # nothing is missing
+        return ""
     missing = np.isnan(frames).mean(axis=0)
     if missing.max() > 0.5:
         worst = int(missing.argmax())

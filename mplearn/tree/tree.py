@@ -580,6 +580,10 @@ class PrimitiveTree:
         """
         state = validated(state)
         self._check_fits(state)
+        self._resume(state)
+
+    def _resume(self, state: TreeState) -> None:
+        """Resume from a state that was checked."""
         memory = SegmentMemory(self.config, np.array(self.groups, np.int64))
         memory.load(
             state.floor,

@@ -46,8 +46,41 @@ def test_a_model_is_that_of_one_step_of_em(n_missing: int) -> None:
         normalisation.mean_posture(seen.astype(float), bank.config.normalisation), seen.shape
     )
     other = ExemplarBank(replace(bank.config, extent_share=np.inf), D, bank.floor)
-    other.add(0, other._modelled(still, 90.0))
+    parts = other._modelled(still[None], np.array([90.0]))
+    other.add(0, Exemplar(*(part[0] for part in parts)))
     np.testing.assert_array_equal(exemplar.extent, other.distances(exemplar, [0])[0])
+
+
+@pytest.mark.parametrize("by_rows", [True, False])
+def test_many_modelled_at_once_are_what_each_is_by_itself(by_rows: bool) -> None:
+    rng = np.random.default_rng(11)
+    bank = ExemplarBank(TreeConfig(), D, np.linspace(0.01, 0.2, D))
+    form, n = bank.config.normalisation, 600  # more than a block of slots
+    many = np.array([points(rng, bank.config) for _ in range(n)])
+    many[::50, 3:5, 1] = np.nan
+    if not by_rows:
+        many = many.transpose(0, 2, 1).copy().transpose(0, 2, 1)
+    lengths = rng.integers(20, 200, n).astype(float)
+    for together, alone in zip(
+        normalisation.centred(many, form),
+        (normalisation.centred(x, form) for x in many),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(together, alone)
+    bank.add_modelled(range(n), many, lengths)
+    for number in range(n):
+        alone = bank.model(many[number], lengths[number])
+        for name in Exemplar._fields:
+            np.testing.assert_array_equal(getattr(bank[number], name), getattr(alone, name))
+
+
+def test_what_cannot_be_modelled_leaves_a_bank_as_it_was() -> None:
+    bank = ExemplarBank(TreeConfig(), D, np.full(D, 0.09))
+    many = np.array([points(np.random.default_rng(k), bank.config) for k in range(3)])
+    many[1, :, 2] = np.nan
+    with pytest.raises(ModelError, match=r"channels \[2\]"):
+        bank.add_modelled([0, 1, 2], many, np.full(3, 50.0))
+    assert bank.numbers() == []
 
 
 @pytest.mark.parametrize("width", [1, 3, 4, 9])

@@ -9,16 +9,17 @@ from typing import Annotated
 
 import numpy as np
 
-from ...hmm import SequenceBatch, fit
-from ...hmm.em import em
+from ...hmm import fit
+from ...hmm.em import Parameters, em_of_each
 from ...hmm.kernels import log_norms
-from ...hmm.parameters import empty_parameters
 from ...recording import FloatArray, IntArray
 from ...state import Array, State, require
 from ..config import TreeConfig
-from ..distance import Exemplar, make_distance, own_score
+from ..distance import Exemplar, make_distance, own_scores
 from . import normalisation
 from .slot_arrays import SlotArrays
+
+AT_ONCE = 128  # segments that are modelled together
 
 _PRIOR = 1.0  # transitions of either kind added to each state's count
 _STEEPNESS = 4.0  # a segment twice as long, as two motions in one are, is three times as far
@@ -65,7 +66,6 @@ class ExemplarBank:
         self.distance = make_distance(config)
         self._weights = normalisation.weights(config.normalisation)
         self._roots = np.sqrt(self._weights)
-        self._whole = np.array([0, config.normalisation.n_points])
         self._slots: dict[int, int] = {}
         self._latest: tuple[int, Exemplar | None] = -1, None
         self._levelled: tuple[FloatArray, FloatArray] | None = None
@@ -104,33 +104,47 @@ class ExemplarBank:
         Raises:
             ModelError: A channel is missing throughout.
         """
-        points = points.astype(np.float32).astype(np.float64)
-        exemplar = self._modelled(points, duration)
-        if not np.isfinite(self.config.extent_share):  # nothing asks for it
-            return exemplar
-        posture = normalisation.mean_posture(points, self.config.normalisation)
-        still = self._modelled(np.broadcast_to(posture, points.shape), duration)
-        others = Exemplar(*(part[None] for part in still))
-        apart = self.distance.divergence(exemplar, others, np.zeros(1, np.int64), self._weights)
-        return exemplar._replace(extent=self.distance.length(apart)[0])
+        return Exemplar(
+            *(part[0, ...] for part in self._models(points[None], np.array([duration])))
+        )
 
-    def _modelled(self, points: FloatArray, duration: float) -> Exemplar:
+    def _models(self, points: FloatArray, durations: FloatArray) -> Exemplar:
+        """Model many segments at once, shapes (n, P, D) and (n,), stacked; see above."""
+        points = points.astype(np.float32).astype(np.float64)
+        if not np.isfinite(self.config.extent_share):  # nothing asks for it
+            return self._modelled(points, durations)
+        n = len(points)
+        postures = normalisation.mean_postures(points, self.config.normalisation)
+        still = np.broadcast_to(postures[:, None], points.shape)
+        both = self._modelled(np.concatenate([points, still]), np.tile(durations, 2))
+        own = Exemplar(*(part[:n] for part in both))
+        for k in range(n):
+            one = Exemplar(*(part[k, ...] for part in own))
+            apart = self.distance.divergence(one, both, np.array([n + k]), self._weights)
+            own.extent[k] = self.distance.length(apart)[0]
+        return own
+
+    def _modelled(self, points: FloatArray, durations: FloatArray) -> Exemplar:
         """Model points as they are; how far they are from standing still is not known yet.
 
         As `fit` in one step does, but for its checks, which take longer than the kernels.
         """
-        points, columns, weights = np.ascontiguousarray(points), points.T.copy(), self._weights
-        batch = SequenceBatch(points, columns, weights, self._whole)
-        model = empty_parameters(self.config.n_states, self.n_channels)
-        likelihood = em(batch, self.floor, _PRIOR, True, 1, 0.0, model)
-        if not np.isfinite(likelihood + model.means[0].sum()):  # says what is wrong
-            n_states = self.config.n_states
-            fit([points], n_states, weights=[weights], n_steps=1, variance_floor=self.floor)
-        model.log_next[:-1] = np.log(-np.expm1(model.log_stay[:-1]))
-        gaussians = model.means, model.variances, log_norms(model.variances).sum(axis=1)
-        parts = columns, *gaussians, model.log_stay, model.log_next
-        exemplar = Exemplar(*parts, np.array(0.0), np.array(float(duration)), np.array(np.inf))
-        return exemplar._replace(own=np.array(own_score(exemplar, weights)))
+        n, n_states, weights = len(points), self.config.n_states, self._weights
+        points, columns = np.ascontiguousarray(points), points.transpose(0, 2, 1).copy()
+        shapes = (n, n_states, self.n_channels), (n, n_states)
+        models = Parameters(*(np.zeros(shapes[k]) for k in (0, 0, 1, 1)))
+        likelihoods = em_of_each(points, columns, weights, self.floor, _PRIOR, models)
+        for k in np.flatnonzero(~np.isfinite(likelihoods + models.means[:, 0].sum(axis=1))):
+            floor = self.floor  # says what is wrong
+            fit([points[k]], n_states, weights=[weights], n_steps=1, variance_floor=floor)
+        models.log_next[:, :-1] = np.log(-np.expm1(models.log_stay[:, :-1]))
+        variances = models.variances.reshape(-1, self.n_channels)
+        norms = log_norms(variances).sum(axis=1).reshape(n, n_states)
+        gaussians = models.means, models.variances, norms
+        chains = models.log_stay, models.log_next
+        rest = np.zeros(n), durations.astype(np.float64), np.full(n, np.inf)
+        exemplars = Exemplar(columns, *gaussians, *chains, *rest)
+        return exemplars._replace(own=own_scores(exemplars, weights))
 
     def prepare(self) -> None:
         """Have memory for an exemplar more."""
@@ -143,6 +157,20 @@ class ExemplarBank:
         self._latest = -1, None
         self._latest = number, self[number]
         self._met = np.full(self._arrays.n_slots, np.nan)
+
+    def add_modelled(
+        self, numbers: Sequence[int], points: FloatArray, durations: FloatArray
+    ) -> None:
+        """Model many segments, shapes (n, P, D) and (n,), as `model` does, and remember them.
+
+        Raises:
+            ModelError: A channel of one is missing throughout; none is remembered.
+        """
+        exemplars = self._models(points, durations)
+        slots = [self._arrays.take() for _ in numbers]
+        self._slots |= zip(numbers, slots, strict=True)
+        self._arrays.write_all(np.array(slots, np.int64), exemplars)
+        self._latest = -1, None
 
     def drop(self, number: int) -> None:
         """Forget an exemplar."""
@@ -262,10 +290,10 @@ class ExemplarBank:
             ModelError: A channel of an exemplar is missing throughout.
         """
         bank = cls(config, len(state.floor), state.floor)
-        for number, columns, duration in zip(
-            state.numbers.tolist(), state.columns, state.duration.tolist(), strict=True
-        ):
-            bank.add(number, bank.model(columns.T, duration))
+        numbers, points = state.numbers.tolist(), state.columns.transpose(0, 2, 1)
+        for k in range(0, len(numbers), AT_ONCE):
+            here = slice(k, k + AT_ONCE)
+            bank.add_modelled(numbers[here], points[here], state.duration[here])
         return bank
 
     def _slots_of(self, numbers: Sequence[int]) -> IntArray:

@@ -7,11 +7,12 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from ...errors import ModelError
 from ...recording import FloatArray, IntArray
 from ...state import Blob, within
 from ..config import TreeConfig
 from . import normalisation
-from .bank import ExemplarBank
+from .bank import AT_ONCE, ExemplarBank
 from .neighbours import Neighbours
 from .renewal import EFFORT, SAMPLE, Renewal, RenewalState
 from .spread import ChannelSpread, DistanceSample, SampleState, SpreadState
@@ -203,9 +204,24 @@ class SegmentMemory:
         self._blobs = dict(sorted(dict(held).items()))
         self.frames = {}
         self.bank = ExemplarBank(self.config, len(floor), floor)
-        for number, blob in self._blobs.items():
-            with within(f"segment {number}"):
-                self._model(number, blob.array)
+        known = [(number, blob.array) for number, blob in self._blobs.items()]
+        for k in range(0, len(known), AT_ONCE):
+            self._model_all(known[k : k + AT_ONCE])
+
+    def _model_all(self, segments: Sequence[tuple[int, FloatArray]]) -> None:
+        """Model many segments at once, which is quicker."""
+        config = self.config.normalisation
+        points = np.stack([normalisation.points_of(frames, config) for _, frames in segments])
+        lengths = np.array([len(frames) for _, frames in segments])
+        seen = normalisation.centred(points, config)
+        try:
+            self.bank.add_modelled([number for number, _ in segments], seen, lengths)
+        except ModelError:
+            for number, frames in segments:
+                with within(f"segment {number}"):  # says which
+                    self._model(number, frames)
+            raise
+        self.frames |= segments
 
     def _model(self, number: int, frames: FloatArray) -> None:
         seen = normalisation.normalised(frames, self.config.normalisation)

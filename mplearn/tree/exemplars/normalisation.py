@@ -36,8 +36,10 @@ def _passed(config: NormalisationConfig) -> FloatArray:
 
 
 def centred(points: FloatArray, config: NormalisationConfig) -> FloatArray:
-    """Return the points (P, D) less a share of their weighted mean."""
-    return np.asarray(points - config.centring * mean_posture(points, config))
+    """Return the points of a segment (P, D), or of many (n, P, D), less a share of their mean."""
+    if points.ndim == 2:
+        return np.asarray(points - config.centring * mean_posture(points, config))
+    return np.asarray(points - config.centring * mean_postures(points, config)[:, None])
 
 
 def mean_posture(points: FloatArray, config: NormalisationConfig) -> FloatArray:
@@ -49,6 +51,15 @@ def mean_posture(points: FloatArray, config: NormalisationConfig) -> FloatArray:
     else:
         weight, total = _all_weights(config, points.shape[1], points.flags.c_contiguous)
     return np.asarray((weight * points).sum(axis=0) / np.maximum(total, 1e-12))
+
+
+def mean_postures(points: FloatArray, config: NormalisationConfig) -> FloatArray:
+    """Return that of many segments, (n, P, D) to (n, D), each as `mean_posture` has it."""
+    weight, total = _all_weights(config, points.shape[2], points[:1].flags.c_contiguous)
+    postures = (weight * points).sum(axis=1) / np.maximum(total, 1e-12)
+    for k in np.flatnonzero(np.isnan(postures).any(axis=1)).tolist():  # points are missing
+        postures[k] = mean_posture(points[k], config)
+    return np.asarray(postures)
 
 
 @lru_cache(maxsize=32)

@@ -70,6 +70,14 @@ class SlotArrays:
         for stacked, value in zip(self._own(block), values, strict=True):
             stacked[row] = value
 
+    def write_all(self, slots: IntArray, values: Sequence[FloatArray]) -> None:
+        """Write the arrays of many slots, stacked."""
+        block, row = np.divmod(slots, BLOCK)
+        for number in np.unique(block).tolist():
+            here = np.flatnonzero(block == number)
+            for stacked, value in zip(self._own(number), values, strict=True):
+                stacked[row[here]] = value[here]
+
     def write_some(self, slots: IntArray, which: int, values: FloatArray) -> None:
         """Write the first m values of one array, of one axis, of some slots, shape (k, m)."""
         block, row = np.divmod(slots, BLOCK)
