@@ -132,7 +132,7 @@ def surprise(counts: Counts, sequence: History) -> FloatArray:
     """
     scores = np.full(max(len(sequence) - 1, 0), np.nan)
     for t, next_id in enumerate(sequence[1:], start=1):
-        context = usable_context(sequence[:t], counts.order)
+        context = usable_context(sequence[max(t - counts.order, 0) : t], counts.order)
         if next_id is not None and context:
             scores[t - 1] = -math.log(_backed_off_to(next_id, counts, context))
     return scores

@@ -333,10 +333,14 @@ class TransitionGraph:
         """
         scores = self.surprises(sequence)
         shares = np.full(len(scores), np.nan)
-        for t in np.flatnonzero(~np.isnan(scores)).tolist():
-            usual = self._surprises_after(len(usable_context(sequence[: t + 1], self.order)))
-            reached = np.searchsorted(usual, scores[t] * (1 - 1e-12), side="left")
-            shares[t] = (1 + len(usual) - reached) / (1 + len(usual))
+        at, scored = np.arange(len(scores)), ~np.isnan(scores)
+        unknown = np.array([id is None for id in sequence[: len(scores)]], dtype=np.bool_)
+        gap = np.maximum.accumulate(np.where(unknown, at, -1))
+        lengths = np.minimum(at - gap, self.order)  # of what is known right before
+        for length in np.unique(lengths[scored]).tolist():
+            usual, here = self._surprises_after(length), scored & (lengths == length)
+            reached = np.searchsorted(usual, scores[here] * (1 - 1e-12), side="left")
+            shares[here] = (1 + len(usual) - reached) / (1 + len(usual))
         return shares
 
     def time_s(self, last: tuple[int, ...], next_id: int) -> tuple[float, float]:
