@@ -22,6 +22,9 @@ SHORTEST_PAIR = 0.18  # of the longest way: fingers and eyes are shorter pairs t
 MOST_NODES = 16  # of a limb that are looked at
 NAMED = 2.0  # what a name is worth, in the logarithm of odds
 UPRIGHT = 2.0  # what it is worth that arms are above legs
+NECK, AS_LIKELY = 0.5, 0.25  # how high a neck is, how far beside it ways may begin: of the trunk
+PAIRED, SIDEWAYS = 1.0, 0.8  # what it costs a head to come in two, side by side: cosine
+EVEN = 0.25  # of the way between two sides that each of them is off their middle, at least
 
 
 @dataclass(frozen=True)
@@ -193,11 +196,12 @@ def _head(tree: JointTree, arms: _Ways, spine: tuple[int, ...]) -> tuple[int, ..
     """Return the nodes on the way from the arms' root that is neither limb nor spine to the top.
 
     Of several, hair and what is carried among them, it is the way that names call a head's, else
-    the one that leads farthest along the trunk; where no trunk is known, the longest.
+    the highest of those that begin like a neck; where no trunk is known, the longest.
     """
     root, ways = arms
     taken = {*ways[0], *spine}
     along = tree.points[:, root] - tree.points[:, spine[0]] if len(spine) > 1 else None
+    across = tree.points[:, ways[1][0]] - tree.points[:, ways[1][1]]
     # where the neck hangs one joint below the arms' root, the way starts there
     for start in (root, *spine[-2:-1]):
         branches = [
@@ -211,9 +215,13 @@ def _head(tree: JointTree, arms: _Ways, spine: tuple[int, ...]) -> tuple[int, ..
         lengths = {way: length for way, length in lengths.items() if length > 0.02 * tree.extent}
         if not lengths:
             continue
-        if along is None:
+        if along is None or len(lengths) == 1:
             return max(lengths, key=lambda way: lengths[way])
-        return max(lengths, key=lambda way: _rise(tree, start, way[-1], along))
+        odd = {way: _unlike_head(tree, start, way, along, across) for way in lengths}
+        like = [way for way in lengths if odd[way] <= min(odd.values()) + AS_LIKELY]
+        ends = [tree.points[:, way[-1]] - tree.points[:, start] for way in like]
+        rises = [float(np.median(_along(end, along))) for end in ends]
+        return like[int(np.argmax(rises))]
     return ()
 
 
@@ -228,7 +236,52 @@ def _length(tree: JointTree, way: tuple[int, ...]) -> float:
     return sum(tree.length(a, b) for a, b in pairwise(way))
 
 
-def _rise(tree: JointTree, start: int, end: int, along: FloatArray) -> float:
-    """Return how far along the trunk, vectors (T, 3), a node usually is from another [m]."""
-    way = tree.points[:, end] - tree.points[:, start]
-    return float(np.median((way * along).sum(axis=1) / np.linalg.norm(along, axis=1)))
+def _unlike_head(
+    tree: JointTree, start: int, way: tuple[int, ...], along: FloatArray, across: FloatArray
+) -> float:
+    """Return how little like a neck and a head a way is: wings, ears and packs are less so.
+
+    Args:
+        tree: The skeleton.
+        start: The node where the way leaves the trunk.
+        way: Its nodes.
+        along: The trunk from below, shape (T, 3).
+        across: From one side of the body to the other, shape (T, 3).
+    """
+    size = np.linalg.norm(along, axis=1)
+    neck = []
+    for node in way:
+        end = tree.points[:, node] - tree.points[:, start]
+        rise = _along(end, along)
+        off = np.sqrt(np.maximum((end * end).sum(axis=1) - rise**2, 0.0))
+        neck.append(float(np.median(off / size)))
+        if np.median(rise / size) > NECK:
+            break
+    nodes = (start, *way)
+    pairs = [
+        (node, other)
+        for before, node in pairwise(nodes)
+        for other in tree.edges[before]
+        if other not in nodes and _on_both_sides(tree, before, node, other, across)
+    ]
+    return max(neck) + (PAIRED if pairs else 0.0)
+
+
+def _along(ways: FloatArray, along: FloatArray) -> FloatArray:
+    """Return how far vectors lead along others, shapes (T, 3) to (T,)."""
+    far: FloatArray = (ways * along).sum(axis=1) / np.linalg.norm(along, axis=1)
+    return far
+
+
+def _on_both_sides(tree: JointTree, root: int, one: int, other: int, across: FloatArray) -> bool:
+    """Whether two branches that part at a node are alike, one on each side of the body."""
+    reach, ways = tree.paired(root, one, other)
+    if not reach:
+        return False
+    ends = [tree.points[:, node] - tree.points[:, root] for node in ways[-1]]
+    apart = ends[0] - ends[1]
+    lengths = np.linalg.norm(apart, axis=1)
+    one_far, other_far = (float(np.median(_along(end, across))) for end in ends)
+    even = min(one_far, -other_far) if one_far > 0 else min(-one_far, other_far)
+    sideways = np.median(np.abs(_along(apart, across)) / np.maximum(lengths, 1e-9))
+    return bool(sideways > SIDEWAYS and even > EVEN * float(np.median(lengths)))

@@ -56,6 +56,24 @@ def test_a_person_in_any_dialect_is_the_same_person(tmp_path, truth, rig, record
     assert body.stature_m == pytest.approx(truth.body.height_m, rel=0.05)
 
 
+@pytest.mark.parametrize("axes", [True, False], ids=["turned", "points"])
+@pytest.mark.parametrize("costume", ["staff", "high", "ears", "flag"])
+def test_what_rises_above_an_unnamed_head_is_no_head(tmp_path, truth, costume, axes):
+    """No name tells the head from what is carried; wings, ears and poles are not like one."""
+    path = write_rig(
+        tmp_path / "rig.bvh",
+        truth.body,
+        truth.postures[::3],
+        25.0,
+        Rig(names="numbers", costume=(costume,)),
+    )
+    hints = Hints(joint_axes=axes, unit_m=0.01, up_axis="y")
+    body = recognise(open_recording(path, positions=True, hints=hints))
+    used = {name for _, names in body.parts for name in names}
+    assert not [name for name in used if name.startswith(costume)]
+    assert body.stature_m == pytest.approx(truth.body.height_m, rel=0.02)
+
+
 def test_left_and_right_are_told_by_facing_not_by_names(tmp_path, truth):
     """The numbers of `numbers` say nothing; sides are those of the person."""
     body = recognise(opened(tmp_path, truth, Rig(names="numbers", reverse=True)))
