@@ -18,6 +18,8 @@ from ..recording import FloatArray
 
 Unit: TypeAlias = Literal["person", "take"]
 
+_Executions: TypeAlias = Sequence[RecognisedSegment]  # of one primitive in one take
+
 _NUMBER = re.compile(r"([0-9]+)")
 
 
@@ -86,20 +88,26 @@ def _measured(
     name: str,
     table: SegmentTable,
     unit: Unit,
-    value: Callable[[Mapping[str, list[RecognisedSegment]], str], float],
+    value: Callable[[Sequence[_Executions]], float],
 ) -> Measure:
+    """Return what ``value`` says of each unit's executions of each primitive, take by take."""
     units, primitives = grouped(table, unit), names_of(table)
-    values = [[value(takes, primitive) for primitive in primitives] for takes in units.values()]
-    shape = (len(units), len(primitives))
-    return Measure(
-        name, tuple(units), primitives, np.array(values, dtype=np.float64).reshape(shape)
-    )
+    values = np.empty((len(units), len(primitives)))
+    for u, takes in enumerate(units.values()):
+        performed: defaultdict[str, list[_Executions]] = defaultdict(list)
+        for rows in takes.values():
+            for primitive, executions in _by_name(rows).items():
+                performed[primitive].append(executions)
+        values[u] = [value(performed.get(primitive, ())) for primitive in primitives]
+    return Measure(name, tuple(units), primitives, values)
 
 
-def _executions(
-    takes: Mapping[str, list[RecognisedSegment]], primitive: str
-) -> list[RecognisedSegment]:
-    return [row for rows in takes.values() for row in rows if row.name == primitive]
+def _by_name(rows: Sequence[RecognisedSegment]) -> dict[str, _Executions]:
+    found: defaultdict[str, list[RecognisedSegment]] = defaultdict(list)
+    for row in rows:
+        if row.name:
+            found[row.name].append(row)
+    return dict(found)
 
 
 def repetitions(table: SegmentTable, unit: Unit = "person") -> Measure:
@@ -111,7 +119,7 @@ def repetitions(table: SegmentTable, unit: Unit = "person") -> Measure:
         >>> repetitions(SegmentTable(rows)).of("anna", "bow")
         3.0
     """
-    return _measured("repetitions", table, unit, lambda takes, p: len(_executions(takes, p)))
+    return _measured("repetitions", table, unit, lambda takes: sum(map(len, takes)))
 
 
 def durations(table: SegmentTable, unit: Unit = "person") -> Measure:
@@ -123,8 +131,8 @@ def durations(table: SegmentTable, unit: Unit = "person") -> Measure:
         0.5
     """
 
-    def value(takes: Mapping[str, list[RecognisedSegment]], primitive: str) -> float:
-        return _mean([row.duration_s for row in _executions(takes, primitive)])
+    def value(takes: Sequence[_Executions]) -> float:
+        return _mean([row.duration_s for rows in takes for row in rows])
 
     return _measured("duration [s]", table, unit, value)
 
@@ -143,12 +151,8 @@ def tempo(table: SegmentTable, unit: Unit = "person") -> Measure:
         30.0
     """
 
-    def value(takes: Mapping[str, list[RecognisedSegment]], primitive: str) -> float:
-        gaps = [
-            b.start_s - a.start_s
-            for rows in takes.values()
-            for a, b in pairwise([row for row in rows if row.name == primitive])
-        ]
+    def value(takes: Sequence[_Executions]) -> float:
+        gaps = [b.start_s - a.start_s for rows in takes for a, b in pairwise(rows)]
         return 60.0 / float(np.median(gaps)) if gaps else np.nan
 
     return _measured("tempo [1/min]", table, unit, value)
@@ -166,8 +170,8 @@ def variability(table: SegmentTable, unit: Unit = "person") -> Measure:
         0.14
     """
 
-    def value(takes: Mapping[str, list[RecognisedSegment]], primitive: str) -> float:
-        lengths = [row.duration_s for row in _executions(takes, primitive)]
+    def value(takes: Sequence[_Executions]) -> float:
+        lengths = [row.duration_s for rows in takes for row in rows]
         return float(np.std(lengths, ddof=1) / np.mean(lengths)) if len(lengths) > 1 else np.nan
 
     return _measured("variability of duration", table, unit, value)
@@ -182,8 +186,8 @@ def spread(table: SegmentTable, unit: Unit = "person") -> Measure:
         0.1
     """
 
-    def value(takes: Mapping[str, list[RecognisedSegment]], primitive: str) -> float:
-        return _mean([row.distance for row in _executions(takes, primitive)])
+    def value(takes: Sequence[_Executions]) -> float:
+        return _mean([row.distance for rows in takes for row in rows])
 
     return _measured("distance [nats a frame]", table, unit, value)
 
