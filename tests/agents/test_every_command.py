@@ -53,6 +53,14 @@ def test_the_help_has_an_example_that_parses(command, capsys):
     assert args.run is command_modules()[command].run
 
 
+def test_the_example_of_evaluate_names_what_there_is(capsys):
+    words = shlex.split(command_modules()["evaluate"].EXAMPLE)[1:]
+    args = build_parser().parse_args(words)
+    code, out, _ = said(capsys, "evaluate", args.data, "--list")
+    assert code == 0 and args.only
+    assert set(args.only) <= {line.split(":")[0] for line in out.splitlines()}
+
+
 def test_what_a_library_cannot_do_is_said_before_anything_is_read(tmp_path, capsys):
     path = tmp_path / "acts.mplearn"
     library = LibrarySource(None).now()

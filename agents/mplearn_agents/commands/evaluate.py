@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mplearn.evaluation import Table
 
 HELP = "Measure segmentation, learning and performing, on synthetic sessions or on recordings."
-EXAMPLE = "mplearn evaluate synthetic --only segmentation"
+EXAMPLE = "mplearn evaluate paper-session --only learning prediction"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
