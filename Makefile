@@ -10,6 +10,7 @@ OUT    ?= out
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 export MUJOCO_GL ?= egl
 export MPLEARN_DATA ?= $(abspath $(DATA))
+unexport PYTHONDONTWRITEBYTECODE  # tests start the command often: its modules are compiled once
 
 demo: $(VENV)/.demo                 ## learn from the demonstrator, perform a walk, write out/demo/report.html
 	$(BIN)/mplearn demo --out $(OUT)/demo

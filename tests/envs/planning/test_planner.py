@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from planners import planner
 from standing_library import ARMS, BOW, RATE_HZ, SQUAT, sweep
 
 from mplearn.errors import FrameError, InvalidValueError
@@ -20,7 +21,6 @@ from mplearn_envs.robot import humanoid
 HUMANOID = humanoid()
 REFERENCE = reference_robot(HUMANOID)
 TRACKED = tracked_columns(HUMANOID)
-PLANNER = Planner(HUMANOID)
 REST = rest_reference(HUMANOID)
 
 
@@ -36,7 +36,7 @@ def there_and_back(posture, seconds):
     ids=["both arms", "bow 45 deg", "squat 18 cm", "bow and nod", "squat and arm"],
 )
 def test_the_robot_stays_upright_balanced_and_on_track(posture, speed):
-    plan = PLANNER.plan(REST, there_and_back(posture, 1.0), speed)
+    plan = planner().plan(REST, there_and_back(posture, 1.0), speed)
     simulation = Simulation(HUMANOID)
     simulation.reset()
     performance = simulation.perform(plan)
@@ -48,7 +48,7 @@ def test_the_robot_stays_upright_balanced_and_on_track(posture, speed):
 
 def test_the_robot_stays_upright_with_a_wrong_model():
     """Masses, gains and friction differ from what was planned with."""
-    plan = PLANNER.plan(REST, there_and_back(BOW, 1.0), 0.5)
+    plan = planner().plan(REST, there_and_back(BOW, 1.0), 0.5)
     rng = np.random.default_rng(0)
     for friction in (0.6, 1.0):
         simulation = Simulation(HUMANOID)
@@ -79,7 +79,7 @@ def test_no_command_ever_leaves_the_limits(first, last, seconds, speed):
     ends = np.array([first, last]) * 1.4 - 0.2  # beyond the limits, too
     x = np.linspace(0, 1, max(2, round(100 * seconds)))[:, None]
     frames = low + (ends[0] * (1 - x) + ends[1] * x) * (high - low)
-    plan = PLANNER.plan(REST, Motion(frames, 100.0), speed)
+    plan = planner().plan(REST, Motion(frames, 100.0), speed)
     limits = HUMANOID.position_limits
     assert (plan.commands >= limits[:, 0]).all() and (plan.commands <= limits[:, 1]).all()
     velocity = np.abs(np.diff(plan.q[:, 7:], axis=0)) / plan.knot_s
@@ -91,7 +91,7 @@ def test_no_command_ever_leaves_the_limits(first, last, seconds, speed):
 
 
 def test_slow_motions_keep_leg_velocities_too():
-    plan = PLANNER.plan(REST, there_and_back(SQUAT, 0.15), 3.0)
+    plan = planner().plan(REST, there_and_back(SQUAT, 0.15), 3.0)
     velocity = np.abs(np.diff(plan.q[:, 7:], axis=0)) / plan.knot_s
     assert (velocity <= HUMANOID.per_joint("velocity") * 1.001).all()
     assert plan.speed < 3.0
@@ -100,28 +100,28 @@ def test_slow_motions_keep_leg_velocities_too():
 def test_plans_join_without_a_jump():
     up = Motion(sweep({}, ARMS, 1.0)[:, TRACKED], RATE_HZ)
     bow = Motion(sweep({}, BOW, 1.0)[:, TRACKED], RATE_HZ)  # starts elsewhere than "up" ends
-    one = PLANNER.plan(REST, up, 1.0)
-    two = PLANNER.plan(one.end, bow, 1.0)
+    one = planner().plan(REST, up, 1.0)
+    two = planner().plan(one.end, bow, 1.0)
     np.testing.assert_allclose(two.q[0], one.q[-1], atol=1e-6)
     q = np.vstack((one.q, two.q[1:]))[:, 7:]
     jump = np.abs(np.diff(q, n=2, axis=0)) / one.knot_s**2
     at_join = jump[len(one.q) - 4 : len(one.q) + 2].max()
     assert at_join < 40.0  # [rad/s^2]; a step of the posture would give thousands
-    assert np.abs(two.q[-1, 7:] - PLANNER.plan(REST, bow, 1.0).q[-1, 7:]).max() < 1e-5
+    assert np.abs(two.q[-1, 7:] - planner().plan(REST, bow, 1.0).q[-1, 7:]).max() < 1e-5
 
 
 def test_half_speed_takes_twice_as_long():
     motion = there_and_back(ARMS, 1.0)
-    full, half = (PLANNER.plan(REST, motion, speed) for speed in (1.0, 0.5))
+    full, half = (planner().plan(REST, motion, speed) for speed in (1.0, 0.5))
     assert full.duration_s == pytest.approx(motion.duration_s, abs=0.03)
     assert half.duration_s == pytest.approx(2 * motion.duration_s, abs=0.03)
     assert (full.speed, half.speed) == (1.0, 0.5)
 
 
 def test_holding_comes_to_rest_where_it_is():
-    moving = PLANNER.plan(REST, Motion(sweep({}, ARMS, 1.0)[:60, TRACKED], RATE_HZ), 1.0)
+    moving = planner().plan(REST, Motion(sweep({}, ARMS, 1.0)[:60, TRACKED], RATE_HZ), 1.0)
     assert np.abs(moving.end.velocity).max() > 0.5
-    hold = PLANNER.hold(moving.end, 1.0)
+    hold = planner().hold(moving.end, 1.0)
     assert np.abs(hold.end.velocity).max() < 1e-3
     np.testing.assert_allclose(hold.end.target, moving.end.target, atol=1e-4)
 
@@ -144,27 +144,27 @@ def test_plans_are_pure_and_cached():
 @pytest.mark.parametrize("speed", [0.0, -1.0, np.nan, np.inf])
 def test_a_bad_speed_is_refused(speed):
     with pytest.raises(InvalidValueError, match="speed must be positive"):
-        PLANNER.plan(REST, there_and_back(BOW, 1.0), speed)
+        planner().plan(REST, there_and_back(BOW, 1.0), speed)
 
 
 def test_bad_motions_are_refused():
     frames = there_and_back(BOW, 1.0).frames
     with pytest.raises(InvalidValueError, match="shape"):
-        PLANNER.plan(REST, Motion(frames[:, :5], 100.0))
+        planner().plan(REST, Motion(frames[:, :5], 100.0))
     with pytest.raises(InvalidValueError, match="shape"):
-        PLANNER.plan(REST, Motion(frames[:1], 100.0))
+        planner().plan(REST, Motion(frames[:1], 100.0))
     broken = frames.copy()
     broken[3, 4] = np.nan
     with pytest.raises(InvalidValueError, match="finite"):
-        PLANNER.plan(REST, Motion(broken, 100.0))
+        planner().plan(REST, Motion(broken, 100.0))
     whole = sweep({}, BOW, 1.0)
     with pytest.raises(InvalidValueError, match="shape"):
-        PLANNER.motion(whole[:, :5], 100.0)
+        planner().motion(whole[:, :5], 100.0)
     with pytest.raises(InvalidValueError, match="rate_hz"):
-        PLANNER.motion(whole, 0.0)
+        planner().motion(whole, 0.0)
     whole[3, -1] = np.nan  # a leg's joint
     with pytest.raises(InvalidValueError, match="finite"):
-        PLANNER.motion(whole, 100.0)
+        planner().motion(whole, 100.0)
 
 
 def test_refining_reproduces_a_parabola_exactly():
@@ -200,7 +200,7 @@ def test_the_live_controller_follows_a_stream_and_balances():
     assert np.abs(data.qpos[7:] - reference.q[7:]).max() < 0.02
     np.testing.assert_allclose(reference.target, frames[-1][TRACKED], atol=2e-3)
     # where the stream ends, the law ends where a plan does
-    planned = PLANNER.plan(REST, Motion(frames[:, TRACKED], RATE_HZ), 1.0).end
+    planned = planner().plan(REST, Motion(frames[:, TRACKED], RATE_HZ), 1.0).end
     np.testing.assert_allclose(reference.q[7:], planned.q[7:], atol=5e-3)
 
 

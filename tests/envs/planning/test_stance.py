@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from planners import planner
 from standing_library import BOW, RATE_HZ, STANDING_M, sweep
 
 from mplearn.maths.plane import turn_in_plane
@@ -14,7 +15,6 @@ from mplearn_envs.mechanics import reference_robot, rest_reference
 from mplearn_envs.mechanics.heels import bearing_corners, foot_places, raised_foot
 from mplearn_envs.mechanics.kinematics import places
 from mplearn_envs.mechanics.reference import sole_middles, soles
-from mplearn_envs.planning import Planner
 from mplearn_envs.planning.clearance import outline_gap
 from mplearn_envs.planning.stance import stand
 from mplearn_envs.planning.stride import left_from_right
@@ -24,7 +24,6 @@ from mplearn_envs.skills.feasibility import FeasibilityCheck
 HUMANOID = humanoid()
 REFERENCE = reference_robot(HUMANOID)
 REST = rest_reference(HUMANOID)
-PLANNER = Planner(HUMANOID)
 SPLIT = np.array([-0.5, 0.2, 0.0])  # the left foot behind
 
 
@@ -45,7 +44,7 @@ def between(first, last, seconds=1.2):
 
 def lunge():
     high, low = shown(SPLIT, (0.5, 0.0), (-0.1, 0, 0.1)), shown(SPLIT, (0.9, 0.0), (-0.3, 0, 0.1))
-    return PLANNER.motion(between(high, low), RATE_HZ)
+    return planner().motion(between(high, low), RATE_HZ)
 
 
 @settings(max_examples=50, deadline=None)
@@ -85,7 +84,7 @@ def test_stances_are_read_from_the_motion():
     np.testing.assert_allclose(motion.stance.place, SPLIT, atol=0.02)
     np.testing.assert_allclose(motion.stance.heel[[0, -1]], [[0.5, 0.0], [0.9, 0.0]], atol=0.02)
     assert motion.footwork is None
-    beside = PLANNER.motion(sweep({}, BOW, 1.0), RATE_HZ).stance
+    beside = planner().motion(sweep({}, BOW, 1.0), RATE_HZ).stance
     np.testing.assert_array_equal(beside.place, left_from_right(REFERENCE.ground))
     assert not beside.heel.any()
 
@@ -95,7 +94,7 @@ def test_a_foot_far_away_that_seems_high_stands():
     place = np.array([0.0, 0.6, 0.4])
     frames = np.tile(shown(place, (0.0, 0.0), (-0.15, 0.0, 0.2)), (50, 1))
     frames[:, 1] += 0.07
-    assert PLANNER.motion(frames, RATE_HZ).footwork is None
+    assert planner().motion(frames, RATE_HZ).footwork is None
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -103,7 +102,7 @@ def test_a_lunge_is_stepped_into_and_out_of_with_a_wrong_model(seed):
     simulation = Simulation(HUMANOID)
     disturb(simulation.model, 0.1, np.random.default_rng(seed))
     simulation.reset()
-    down = PLANNER.plan(REST, lunge(), 0.5)
+    down = planner().plan(REST, lunge(), 0.5)
     assert down.error.max() < 1e-3 and down.zmp_margin_m.min() > 0.01
     np.testing.assert_allclose(left_from_right(down.end.ground), SPLIT, atol=0.1)
     assert down.end.heel[0] == pytest.approx(0.9, abs=0.02) and down.end.heel[1] == 0.0
@@ -116,7 +115,7 @@ def test_a_lunge_is_stepped_into_and_out_of_with_a_wrong_model(seed):
     assert not simulation.perform(down).fallen
     back = simulation.soles()[0, 2:, 2].mean()
     assert 0.1 < back < 0.24  # the heel is up
-    bow = PLANNER.plan(down.end, PLANNER.motion(sweep({}, BOW, 1.0), RATE_HZ), 0.5)
+    bow = planner().plan(down.end, planner().motion(sweep({}, BOW, 1.0), RATE_HZ), 0.5)
     assert not simulation.perform(bow).fallen
     np.testing.assert_allclose(bow.end.ground, REFERENCE.ground, atol=0.02)
     assert not bow.end.heel.any()
@@ -124,12 +123,12 @@ def test_a_lunge_is_stepped_into_and_out_of_with_a_wrong_model(seed):
 
 def test_between_stances_that_are_nearly_the_same_nobody_steps():
     """The way into a lunge and the way out of it are shown 13 cm apart: the feet stay."""
-    down = PLANNER.plan(REST, lunge(), 0.5)
+    down = planner().plan(REST, lunge(), 0.5)
     nearer = np.array([SPLIT[0] + 0.13, *SPLIT[1:]])
     low, high = shown(nearer, (0.9, 0.0), (-0.3, 0, 0.1)), shown(nearer, (0.5, 0.0), (-0.1, 0, 0.1))
-    rises = PLANNER.motion(between(low, high), RATE_HZ)
+    rises = planner().motion(between(low, high), RATE_HZ)
     np.testing.assert_allclose(rises.stance.place, nearer, atol=0.02)
-    up = PLANNER.plan(down.end, rises, 0.5)
+    up = planner().plan(down.end, rises, 0.5)
     assert (up.up == -1).all() and up.error.max() < 1e-3 and up.zmp_margin_m.min() > 0.014
     np.testing.assert_allclose(up.end.ground, down.end.ground, atol=1e-6)
     simulation = Simulation(HUMANOID)
@@ -137,17 +136,17 @@ def test_between_stances_that_are_nearly_the_same_nobody_steps():
     assert not simulation.perform(down).fallen and not simulation.perform(up).fallen
     # from beside each other the feet go where they are shown
     np.testing.assert_allclose(
-        left_from_right(PLANNER.plan(REST, rises, 0.5).end.ground), nearer, atol=0.02
+        left_from_right(planner().plan(REST, rises, 0.5).end.ground), nearer, atol=0.02
     )
 
 
 def test_feet_stand_as_wide_as_shown_or_as_a_step_reaches():
     wide = np.array([*turn_in_plane(0.0, 0.45, 0.25), 0.5])
     frames = np.tile(shown(wide, (0.0, 0.0), (-0.1, 0.0, 0.1)), (50, 1))
-    np.testing.assert_allclose(PLANNER.motion(frames, RATE_HZ).stance.place, wide, atol=0.02)
+    np.testing.assert_allclose(planner().motion(frames, RATE_HZ).stance.place, wide, atol=0.02)
     far = np.array([-0.9, 0.2, 0.0])
     frames = np.tile(shown(far, (0.9, 0.0), (-0.3, 0.0, 0.2)), (50, 1))
-    place = PLANNER.motion(frames, RATE_HZ).stance.place
+    place = planner().motion(frames, RATE_HZ).stance.place
     assert 0.5 < -place[0] < 0.9
 
 
@@ -168,15 +167,15 @@ def touching(plan):
 def test_out_of_a_wide_stance_a_turned_foot_does_not_meet_the_other(pitch, roll):
     wide = np.array([*turn_in_plane(0.0, 0.41, 0.15), 0.29])
     frames = np.tile(shown(wide, (0.0, 0.0), (-0.1, 0.0, 0.1)), (50, 1))
-    stands = PLANNER.plan(REST, PLANNER.motion(frames, RATE_HZ), 0.5).end
+    stands = planner().plan(REST, planner().motion(frames, RATE_HZ), 0.5).end
     inwards = {"hip_pitch_r": pitch, "hip_roll_r": roll, "hip_yaw_r": -0.5}
     knee_up = {"hip_pitch_l": -1.2, "knee_l": 1.4}
     raises, exchanges = (
-        PLANNER.motion(sweep(*ends, 1.2), RATE_HZ)._replace(stance=None)
+        planner().motion(sweep(*ends, 1.2), RATE_HZ)._replace(stance=None)
         for ends in (({}, inwards), (knee_up, {}))
     )
-    up = PLANNER.plan(stands, raises, 0.5)
-    down = PLANNER.plan(up.end, exchanges, 0.5)
+    up = planner().plan(stands, raises, 0.5)
+    down = planner().plan(up.end, exchanges, 0.5)
     for plan in (up, down):
         assert plan.error.max() < 1e-3
         assert touching(plan) == 0
@@ -214,23 +213,23 @@ def test_the_gap_between_soles_is_that_of_their_boundaries(x, y, one_yaw, other_
 def test_who_rises_too_fast_is_slowed_until_he_stands(speed):
     """Out of a deep squat joints and base are at their velocity limits, and soon in the air."""
     frames = sweep({"base_height": -0.42, "base_pitch": 0.5}, {"base_height": 0.0}, 0.9)
-    motion = PLANNER.motion(frames, RATE_HZ)
-    low = FeasibilityCheck(PLANNER).posture(motion)
-    plan = PLANNER.plan(low, motion, speed)
+    motion = planner().motion(frames, RATE_HZ)
+    low = FeasibilityCheck(planner()).posture(motion)
+    plan = planner().plan(low, motion, speed)
     assert plan.error.max() < 0.01 and plan.zmp_margin_m.min() > 0.013
 
 
 def test_who_sits_down_without_a_chair_leans_as_far_as_must_be():
     """Upright, ankles would have to bend too far; the depth is kept."""
     frames = sweep({}, {"base_height": -0.42}, 1.5)
-    motion = PLANNER.motion(frames, RATE_HZ)
+    motion = planner().motion(frames, RATE_HZ)
     lean = motion.frames[:, 2] - frames[:, 2]
     np.testing.assert_allclose(motion.frames[:, 0], frames[:, 0], atol=1e-9)
     assert lean[0] == 0.0 and 0.05 < lean[-1] < 0.5 and lean.min() >= 0.0
-    assert FeasibilityCheck(PLANNER).judge(motion, 0.5).feasible
+    assert FeasibilityCheck(planner()).judge(motion, 0.5).feasible
     simulation = Simulation(HUMANOID)
     simulation.reset()
-    assert not simulation.perform(PLANNER.plan(REST, motion, 0.5)).fallen
+    assert not simulation.perform(planner().plan(REST, motion, 0.5)).fallen
     assert soles(HUMANOID, simulation.data.qpos)[..., 2].max() < 0.005
     shallow = sweep({}, {"base_height": -0.1}, 1.0)
-    np.testing.assert_array_equal(PLANNER.motion(shallow, RATE_HZ).frames[:, 0], shallow[:, 0])
+    np.testing.assert_array_equal(planner().motion(shallow, RATE_HZ).frames[:, 0], shallow[:, 0])

@@ -1,9 +1,12 @@
 """Feet that leave the ground: what is read from motions, how it is planned and performed."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from planners import planner
 from standing_library import KICK, RATE_HZ, posture, sweep
 
 from mplearn_envs.execution.simulation import Simulation
@@ -20,11 +23,18 @@ from mplearn_envs.robot import humanoid
 
 HUMANOID = humanoid()
 REFERENCE = reference_robot(HUMANOID)
-PLANNER = Planner(HUMANOID)
 REST = rest_reference(HUMANOID)
 KNEE_UP = {"hip_pitch_r": -1.2, "knee_r": 1.4, "shoulder_pitch_l": -0.6}
-RAISE = PLANNER.motion(sweep({}, KNEE_UP, 1.0), RATE_HZ)
-LOWER = PLANNER.motion(sweep(KNEE_UP, {}, 1.0), RATE_HZ)
+
+
+@cache
+def raising():
+    return planner().motion(sweep({}, KNEE_UP, 1.0), RATE_HZ)
+
+
+@cache
+def lowering():
+    return planner().motion(sweep(KNEE_UP, {}, 1.0), RATE_HZ)
 
 
 def started(seed=None, feedback="steps"):
@@ -57,9 +67,9 @@ def test_lifts_are_read_from_the_motion():
     assert (whole.up_at(False), whole.up_at(True)) == (-1, -1)
     assert whole.rise[:, 1].max() == 0 and 0.15 < whole.rise[:, 0].max() < 0.3
     assert np.all(whole.rise[[0, -1]] == 0)
-    assert (RAISE.footwork.up_at(False), RAISE.footwork.up_at(True)) == (-1, 1)
-    assert (LOWER.footwork.up_at(False), LOWER.footwork.up_at(True)) == (1, -1)
-    assert PLANNER.motion(sweep({}, {"base_pitch": 0.5}, 1.0), RATE_HZ).footwork is None
+    assert (raising().footwork.up_at(False), raising().footwork.up_at(True)) == (-1, 1)
+    assert (lowering().footwork.up_at(False), lowering().footwork.up_at(True)) == (1, -1)
+    assert planner().motion(sweep({}, {"base_pitch": 0.5}, 1.0), RATE_HZ).footwork is None
 
 
 def test_one_foot_after_the_other_is_two_lifts():
@@ -116,16 +126,16 @@ def test_the_pendulums_plan_is_the_least_squares_optimum(settled):
 @pytest.mark.parametrize("speed", [0.5, 1.0])
 def test_a_raised_knee_is_performed_held_and_lowered(speed):
     simulation = started(seed=1)
-    up = PLANNER.plan(REST, RAISE, speed)
+    up = planner().plan(REST, raising(), speed)
     assert up.end.lifted == 1 and up.error.max() < 1e-6 and up.zmp_margin_m.min() > 0.02
     first = simulation.perform(up)
-    held = simulation.perform(PLANNER.hold(up.end, 3.0))
+    held = simulation.perform(planner().hold(up.end, 3.0))
     # the leg is where the demonstrator had it
     names = [HUMANOID.joint_names.index(name) for name in ("hip_pitch_r", "knee_r")]
     assert np.abs(simulation.data.qpos[7:][names] - (-1.2, 1.4)).max() < np.deg2rad(2.0)
     soles = simulation.soles()[..., 2]
-    assert soles[0].max() < 0.004 and soles[1].min() > 0.7 * RAISE.footwork.rise[-1, 1]
-    down = PLANNER.plan(up.end, LOWER, speed)
+    assert soles[0].max() < 0.004 and soles[1].min() > 0.7 * raising().footwork.rise[-1, 1]
+    down = planner().plan(up.end, lowering(), speed)
     last = simulation.perform(down)
     assert down.end.lifted == -1
     for performance in (first, held, last):
@@ -136,19 +146,19 @@ def test_a_raised_knee_is_performed_held_and_lowered(speed):
 
 
 def test_the_weight_need_not_return_to_the_middle():
-    down = PLANNER.plan(PLANNER.plan(REST, RAISE, 1.0).end, LOWER, 1.0)
+    down = planner().plan(planner().plan(REST, raising(), 1.0).end, lowering(), 1.0)
     left, _ = sole_middles(REFERENCE, REFERENCE.ground)
     assert abs(down.cog[-1, 1] - left[1]) < 0.07
-    hold = PLANNER.hold(down.end, 2.0)
+    hold = planner().hold(down.end, 2.0)
     assert abs(hold.cog[-1, 1]) < 1e-4
-    assert hold.steps and not PLANNER.hold(hold.end, 2.0).steps
+    assert hold.steps and not planner().hold(hold.end, 2.0).steps
 
 
 def test_where_another_foot_is_up_it_is_exchanged_first():
-    up = PLANNER.plan(REST, RAISE, 1.0)
+    up = planner().plan(REST, raising(), 1.0)
     left = {name.replace("_r", "_l"): value for name, value in KNEE_UP.items()}
-    motion = PLANNER.motion(sweep(left, {}, 1.0), RATE_HZ)
-    plan = PLANNER.plan(up.end, motion, 1.0)
+    motion = planner().motion(sweep(left, {}, 1.0), RATE_HZ)
+    plan = planner().plan(up.end, motion, 1.0)
     changes = plan.up[np.flatnonzero(np.diff(plan.up, prepend=9))]
     assert changes.tolist() == [1, -1, 0, -1]
     simulation = started(seed=2)
@@ -159,11 +169,11 @@ def test_where_another_foot_is_up_it_is_exchanged_first():
 def test_the_weight_takes_the_time_it_needs_from_where_it_rests():
     """After a foot has landed quickly the weight is still over the other one."""
     knee = {"hip_pitch_l": -1.2, "knee_l": 1.4}
-    other = PLANNER.motion(sweep({}, knee, 0.8), RATE_HZ)
-    here = PLANNER.plan(PLANNER.plan(REST, RAISE, 2.0).end, LOWER, 2.0).end
-    plan = PLANNER.plan(here, other, 2.0)
+    other = planner().motion(sweep({}, knee, 0.8), RATE_HZ)
+    here = planner().plan(planner().plan(REST, raising(), 2.0).end, lowering(), 2.0).end
+    plan = planner().plan(here, other, 2.0)
     moving = np.linalg.norm(plan.zmp - plan.cog[:, :2], axis=1)
-    config = PLANNER.config
+    config = planner().config
     assert np.all(plan.zmp_margin_m > config.zmp_margin_m + config.model_error * moving - 2e-3)
     bold = Planner(HUMANOID, PlannerConfig(zmp_margin_m=-1.0)).plan(here, other, 2.0)
     assert bold.zmp_margin_m.min() < 0.0 and bold.duration_s < plan.duration_s < 2.0
@@ -174,10 +184,10 @@ LEG_AHEAD = {"hip_pitch_r": -1.6, "hip_roll_r": 0.1}
 
 def test_a_foot_passes_the_other_one_and_does_not_meet_it():
     inwards = LEG_AHEAD | {"hip_roll_r": 0.25}
-    raise_it = PLANNER.motion(sweep({}, inwards, 1.0), RATE_HZ)
-    still = PLANNER.motion(np.stack([posture({})] * 50), RATE_HZ)
-    up = PLANNER.plan(REST, raise_it, 0.5)
-    down = PLANNER.plan(up.end, still, 0.5)
+    raise_it = planner().motion(sweep({}, inwards, 1.0), RATE_HZ)
+    still = planner().motion(np.stack([posture({})] * 50), RATE_HZ)
+    up = planner().plan(REST, raise_it, 0.5)
+    down = planner().plan(up.end, still, 0.5)
     for plan in (up, down):
         assert plan.error.max() < 0.01
         for q in plan.q:
@@ -191,11 +201,11 @@ def test_a_foot_passes_the_other_one_and_does_not_meet_it():
 
 
 def test_out_of_a_deep_squat_the_robot_rises_before_it_raises_a_leg():
-    deep = PLANNER.motion(sweep({}, {"base_height": -0.38, "base_pitch": 0.6}, 1.0), RATE_HZ)
-    held = PLANNER.motion(np.stack([posture(LEG_AHEAD)] * 50), RATE_HZ)
-    squat = PLANNER.plan(REST, deep, 0.5)
+    deep = planner().motion(sweep({}, {"base_height": -0.38, "base_pitch": 0.6}, 1.0), RATE_HZ)
+    held = planner().motion(np.stack([posture(LEG_AHEAD)] * 50), RATE_HZ)
+    squat = planner().plan(REST, deep, 0.5)
     assert squat.error.max() < 1e-3
-    plan = PLANNER.plan(squat.end, held, 0.5)
+    plan = planner().plan(squat.end, held, 0.5)
     assert plan.end.lifted == 1 and plan.error.max() < 0.01
     simulation = started(seed=5)
     assert not simulation.perform(squat).fallen and not simulation.perform(plan).fallen
@@ -214,7 +224,7 @@ def test_steps_end_where_the_motion_ends_them(name):
     simulation = started(seed=3)
     here = REST
     for side, before, after in WALKS[name]:
-        plan = PLANNER.plan(here, step(side, before, after), 1.0)
+        plan = planner().plan(here, step(side, before, after), 1.0)
         assert not simulation.perform(plan).fallen
         here = plan.end
     left, right = places(REFERENCE.tree, REFERENCE.stance.feet, simulation.data.qpos[None])[0]
@@ -247,7 +257,7 @@ def test_a_foot_that_moves_over_the_floor_is_clear_of_it():
     rise = SLOW.footwork.rise.copy()
     rise[:, 1] = np.where(rise[:, 1] > 0, np.maximum(rise[:, 1] ** 2 / 0.06, 0.015), 0.0)
     motion = SLOW._replace(footwork=SLOW.footwork._replace(rise=rise, lifts=(lift,)))
-    plan = PLANNER.plan(REST, motion, 0.5)
+    plan = planner().plan(REST, motion, 0.5)
     moves = np.linalg.norm(np.diff(plan.ground[:, 1, :2], axis=0), axis=1) / plan.knot_s
     heights = np.array([soles(HUMANOID, q)[1, :, 2].min() for q in plan.q[1:]])
     assert moves.max() > 0.2
@@ -270,7 +280,7 @@ def test_a_foot_is_led_round_the_other_one():
 def test_strides_follow_each_other_without_a_fall():
     simulation, here = started(), REST
     for motion in (SLOW, OTHER, SLOW, OTHER):
-        plan = PLANNER.plan(here, motion, 0.4)
+        plan = planner().plan(here, motion, 0.4)
         assert plan.error.max() < 0.01 and plan.zmp_margin_m.min() > 0.01
         assert not simulation.perform(plan).fallen
         here = plan.end
@@ -279,19 +289,19 @@ def test_strides_follow_each_other_without_a_fall():
 def test_what_cannot_be_done_from_a_stride_is_done_from_where_the_feet_are_side_by_side():
     """A squat is too deep for the ankles with one foot a third of a metre ahead."""
     squat = {"base_height": -0.2, "shoulder_pitch_l": -1.0}
-    deep = PLANNER.motion(sweep({}, squat, 2.0), RATE_HZ)
+    deep = planner().motion(sweep({}, squat, 2.0), RATE_HZ)
     simulation = started()
-    stride = PLANNER.plan(REST, SLOW, 0.4)
+    stride = planner().plan(REST, SLOW, 0.4)
     assert abs(stride.end.ground[0, 0] - stride.end.ground[1, 0]) > 0.3
-    plan = PLANNER.plan(stride.end, deep, 0.5)
+    plan = planner().plan(stride.end, deep, 0.5)
     assert plan.error.max() < 0.01
     assert not simulation.perform(stride).fallen and not simulation.perform(plan).fallen
 
 
 def test_steps_are_a_pure_function_and_cached():
-    first = PLANNER.plan(REST, RAISE, 0.5, key="raise")
-    assert PLANNER.plan(REST, RAISE, 0.5, key="raise") is first
-    fresh = Planner(HUMANOID).plan(REST, RAISE, 0.5)
+    first = planner().plan(REST, raising(), 0.5, key="raise")
+    assert planner().plan(REST, raising(), 0.5, key="raise") is first
+    fresh = Planner(HUMANOID).plan(REST, raising(), 0.5)
     assert fresh.commands.tobytes() == first.commands.tobytes()
     states = []
     for _ in range(2):
@@ -303,9 +313,9 @@ def test_steps_are_a_pure_function_and_cached():
 
 def test_holding_torques_are_those_of_a_robot_on_one_foot():
     simulation = started()
-    up = PLANNER.plan(REST, RAISE, 0.5)
+    up = planner().plan(REST, raising(), 0.5)
     simulation.perform(up)
-    hold = PLANNER.hold(up.end, 2.0)
+    hold = planner().hold(up.end, 2.0)
     simulation.perform(hold)
     middles = sole_middles(REFERENCE, hold.ground[-1:])
     expected = holding_torques(REFERENCE, hold.q[-1:], hold.share[-1:], hold.cog[-1:, :2], middles)[
@@ -320,7 +330,7 @@ def test_feedback_of_the_ankles_damps_a_push():
     for feedback in ("never", "always"):
         simulation = started(feedback=feedback)
         simulation.data.qvel[0] += 0.12
-        performance = simulation.perform(PLANNER.hold(REST, 1.0))
+        performance = simulation.perform(planner().hold(REST, 1.0))
         assert not performance.fallen
         largest[feedback] = performance.cog_deviation_m.max()
     assert largest["always"] < 0.9 * largest["never"]
@@ -344,7 +354,7 @@ def test_no_command_ever_leaves_the_limits_on_one_foot_either(first, last, secon
     ends = np.array([first, last]) * 1.2 - 0.1
     x = np.linspace(0, 1, max(2, round(50 * seconds)))[:, None]
     frames = low + (ends[0] * (1 - x) + ends[1] * x) * (high - low)
-    plan = PLANNER.plan(REST, PLANNER.motion(frames, 50.0), speed)
+    plan = planner().plan(REST, planner().motion(frames, 50.0), speed)
     assert np.isfinite(plan.commands).all()
     assert (plan.commands >= limits[:, 0]).all() and (plan.commands <= limits[:, 1]).all()
     assert len(plan.commands) == (len(plan.q) - 1) * 5 and np.isfinite(plan.end.q).all()

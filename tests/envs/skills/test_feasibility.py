@@ -1,7 +1,10 @@
 """Verdicts and their reasons."""
 
+from functools import cache
+
 import numpy as np
 import pytest
+from planners import planner
 from standing_library import (
     ARMS,
     BOW,
@@ -17,13 +20,16 @@ from standing_library import (
 from mplearn.errors import InvalidValueError
 from mplearn_envs.environment.options import MotionOptions
 from mplearn_envs.mechanics.reference import tracked_columns
-from mplearn_envs.planning import Motion, Planner
+from mplearn_envs.planning import Motion
 from mplearn_envs.robot import humanoid
 from mplearn_envs.skills.feasibility import FeasibilityCheck, FeasibilityConfig, Problem
 from mplearn_envs.skills.repertoire import Repertoire
 from mplearn_envs.skills.skills import Skills
 
-CHECK = FeasibilityCheck(Planner(humanoid()))
+
+@cache
+def check():
+    return FeasibilityCheck(planner())
 
 
 def judged(check, frames, rate_hz, speed):
@@ -37,7 +43,7 @@ def kinds(verdict):
 @pytest.mark.parametrize("end", [ARMS, BOW, SQUAT])
 @pytest.mark.parametrize("speed", [0.5, 1.0])
 def test_motions_with_both_feet_down_are_feasible(end, speed):
-    verdict = judged(CHECK, sweep({}, end, 1.0), RATE_HZ, speed)
+    verdict = judged(check(), sweep({}, end, 1.0), RATE_HZ, speed)
     assert verdict.feasible and verdict.speed == speed
     assert verdict.zmp_margin_m > 0.05 and 0.05 < verdict.torque_share < 0.6
 
@@ -48,7 +54,7 @@ def test_lifting_a_foot_is_feasible_and_says_which(side, speed):
     lift = {name.replace("_l", f"_{side}"): value for name, value in KICK.items()}
     which = "lr".index(side)
     for frames, feet in ((sweep({}, lift, 0.8), (-1, which)), (sweep(lift, {}, 0.8), (which, -1))):
-        verdict = judged(CHECK, frames, RATE_HZ, speed)
+        verdict = judged(check(), frames, RATE_HZ, speed)
         assert verdict.feasible, verdict.problems
         assert (verdict.starts_up, verdict.ends_up) == feet
         assert 0.3 < verdict.tempo <= speed + 0.01
@@ -56,7 +62,7 @@ def test_lifting_a_foot_is_feasible_and_says_which(side, speed):
 
 def test_a_jump_is_refused_with_that_reason():
     up = sweep({}, {"base_height": 0.2}, 0.3)
-    verdict = judged(CHECK, np.vstack((up, up[::-1])), RATE_HZ, 0.5)
+    verdict = judged(check(), np.vstack((up, up[::-1])), RATE_HZ, 0.5)
     assert kinds(verdict) == ["flight"]
     assert verdict.problems[0].value == pytest.approx(0.2, abs=0.01)
     assert "allowed 0.06" in str(verdict.problems[0])
@@ -64,21 +70,21 @@ def test_a_jump_is_refused_with_that_reason():
 
 def test_small_differences_of_the_feet_are_no_lift():
     shuffle = {"knee_l": 0.15, "hip_pitch_l": -0.08, "ankle_pitch_l": -0.07}
-    assert judged(CHECK, sweep({}, shuffle, 1.0), RATE_HZ, 0.5).feasible
+    assert judged(check(), sweep({}, shuffle, 1.0), RATE_HZ, 0.5).feasible
 
 
 def test_too_fast_a_motion_is_slowed_down_and_at_last_refused():
     fast = sweep({}, ARMS, 0.12)
-    slowed = judged(CHECK, fast, RATE_HZ, 1.0)
+    slowed = judged(check(), fast, RATE_HZ, 1.0)
     assert slowed.speed < 1.0
     frantic = judged(
-        CHECK, np.vstack([sweep({}, ARMS, 0.05), sweep(ARMS, {}, 0.05)] * 3), RATE_HZ, 2.0
+        check(), np.vstack([sweep({}, ARMS, 0.05), sweep(ARMS, {}, 0.05)] * 3), RATE_HZ, 2.0
     )
     assert not frantic.feasible and {"velocity", "torque", "balance"} & set(kinds(frantic))
 
 
 def test_what_is_beyond_the_joints_is_refused():
-    verdict = judged(CHECK, sweep({}, {"elbow_l": 1.0}, 1.0), RATE_HZ, 0.5)
+    verdict = judged(check(), sweep({}, {"elbow_l": 1.0}, 1.0), RATE_HZ, 0.5)
     assert kinds(verdict) == ["limit"]
     assert verdict.problems[0].where == "elbow_l"
 
@@ -87,8 +93,8 @@ def test_a_squat_too_deep_for_the_legs_is_out_of_reach():
     """With the trunk upright, that is; leaning ahead the robot reaches it."""
     deep = sweep({}, {"base_height": -0.47}, 2.0)
     upright = Motion(np.ascontiguousarray(deep[:, tracked_columns(humanoid())]), RATE_HZ)
-    assert judged(CHECK, deep, RATE_HZ, 0.5).feasible
-    verdict = CHECK.judge(upright, 0.5)
+    assert judged(check(), deep, RATE_HZ, 0.5).feasible
+    verdict = check().judge(upright, 0.5)
     assert not verdict.feasible and "reach" in kinds(verdict)
     where = next(each.where for each in verdict.problems if each.kind == "reach")
     assert where.startswith("ankle_pitch_l, ankle_pitch_r")
@@ -96,9 +102,9 @@ def test_a_squat_too_deep_for_the_legs_is_out_of_reach():
 
 def test_torque_and_balance_limits_are_kept():
     motion = sweep({}, BOW, 1.0)
-    weak = FeasibilityCheck(CHECK.planner, FeasibilityConfig(torque_share=0.05))
+    weak = FeasibilityCheck(check().planner, FeasibilityConfig(torque_share=0.05))
     assert "torque" in kinds(judged(weak, motion, RATE_HZ, 0.5))
-    timid = FeasibilityCheck(CHECK.planner, FeasibilityConfig(zmp_margin_m=0.2))
+    timid = FeasibilityCheck(check().planner, FeasibilityConfig(zmp_margin_m=0.2))
     assert "balance" in kinds(judged(timid, motion, RATE_HZ, 0.5))
 
 
@@ -123,16 +129,16 @@ def test_limits_that_are_none_are_refused(wrong):
 
 def test_a_jerky_motion_is_slowed_for_balance():
     """A bow whose full speed would throw the zero-moment point out of the soles."""
-    careful = FeasibilityCheck(CHECK.planner, FeasibilityConfig(zmp_margin_m=0.09))
+    careful = FeasibilityCheck(check().planner, FeasibilityConfig(zmp_margin_m=0.09))
     verdict = judged(careful, sweep({}, {"base_pitch": 0.9}, 0.7), RATE_HZ, 1.0)
     assert verdict.speed < 1.0
     assert verdict.feasible and verdict.zmp_margin_m > 0.09
 
 
 def test_standing_postures_are_reached():
-    motion = CHECK.planner.motion(np.stack([posture({})] * 2), RATE_HZ)
+    motion = check().planner.motion(np.stack([posture({})] * 2), RATE_HZ)
     assert motion.frames[0, 0] == STANDING_M
-    reference = CHECK.posture(motion)
+    reference = check().posture(motion)
     np.testing.assert_allclose(reference.target, motion.frames[0], atol=1e-6)
     assert np.abs(reference.velocity).max() < 1e-6
 
@@ -143,11 +149,11 @@ def test_transitions_are_judged_where_that_is_wanted(monkeypatch):
     skills = Skills(library, robot)
     pairs = [(a, b) for a in library.ids for b in library.ids]
     assert not any(skills.follows(a, b) for a, b in pairs)
-    assert CHECK.judge_plan(skills.plan(skills.end(pairs[1][0]), pairs[1][1])) == ()
+    assert check().judge_plan(skills.plan(skills.end(pairs[1][0]), pairs[1][1])) == ()
     up, down = (library[name].id for name in ("arms up", "arms down"))
     plan = skills.plan(skills.end(up), down)
     off = plan._replace(error=plan.error + 0.1, zmp_margin_m=plan.zmp_margin_m - 0.2)
-    assert [each.kind for each in CHECK.judge_plan(off)] == ["reach", "balance"]
+    assert [each.kind for each in check().judge_plan(off)] == ["reach", "balance"]
 
     after = Repertoire(library, robot).after(down)
     asked = []
