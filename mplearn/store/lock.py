@@ -43,7 +43,8 @@ class WriterLock:
                 holder = file.read(200).strip() or "another process"
                 file.close()
                 raise StoreInUseError(
-                    f"{path} is being written to by {holder}; readers may open it"
+                    f"{path} is being written to by {holder}, which must end first (Ctrl-C or "
+                    "SIGTERM: it keeps what it has learned); readers may open it"
                 )
             try:
                 same = os.path.samestat(os.fstat(file.fileno()), self._path.stat())

@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import sqlite3
+import tempfile
 import warnings
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 from rich.console import Console
 from streams import CHANNELS, RATE_HZ, learner, stream
 
+import mplearn.store.store
 import mplearn_agents.learning.watched
 from mplearn import PrimitiveLibrary, Recording
 from mplearn.errors import StoreWarning, StoreWriteError
@@ -145,6 +147,47 @@ def test_what_cannot_be_is_said_in_a_line(
     (tmp_path / "b.db").write_bytes(store.read_bytes()[:5000])
     assert "damaged" in refused(capsys, "store", "check", tmp_path / "b.db")
     assert "--out, or a store" in refused(capsys, "learn", tmp_path)
+
+
+@pytest.mark.parametrize("how", ["file", "live"])
+@pytest.mark.parametrize("with_out", [True, False])
+def test_where_the_disk_stays_full_the_library_is_kept_elsewhere(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    how: str,
+    with_out: bool,
+) -> None:
+    opened = mplearn.store.store.open_writing
+
+    def full(path: Path) -> sqlite3.Connection:
+        connection = opened(path)
+        pages = connection.execute("PRAGMA page_count").fetchone()[0]
+        connection.execute(f"PRAGMA max_page_count = {pages + 8}")
+        return connection
+
+    monkeypatch.setattr(mplearn.store.store, "open_writing", full)
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    data, out = tmp_path / "take.csv", tmp_path / "out.mplearn"
+    rows = np.column_stack((np.arange(len(TAKES[0].frames)) / RATE_HZ, TAKES[0].frames))
+    np.savetxt(data, rows, delimiter=",", header="time,a,b,c,d", comments="")
+    take = ["--live", f"recording:{data}", "--speed", "inf"] if how == "live" else [str(data)]
+    argv = ["learn", *take, "--observe", "channels", "--store", str(tmp_path / "life.db")]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StoreWarning)  # it says that learning goes on
+        assert main(argv + ["--out", str(out)] * with_out) == 3
+    told = capsys.readouterr()
+    (kept,) = [out] if with_out else tmp_path.glob("mplearn-*/life.mplearn")
+    assert f"the library is in {kept}" in told.err
+    assert "full" in told.err
+    assert ("written to" in told.out.split("segments")[-1]) == with_out
+    assert f"and {tmp_path / 'life.db'}" not in " ".join(told.out.split("segments")[-1].split())
+    whole = learner()
+    for _ in whole.learn_recording(TAKES[0]):
+        pass
+    assert len(PrimitiveLibrary.load(kept)) == len(whole.tree.leaves) > 0
+    assert StoreReader(tmp_path / "life.db").life.n_frames < whole.n_frames  # what fitted is sound
 
 
 def test_what_could_not_be_written_is_not_said_to_be_done(

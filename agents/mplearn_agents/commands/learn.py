@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import InvalidValueError, MPLearnError, RecordingError, StateError
+from mplearn_agents.learning.keeping import close_store, say_unkept, written_to
 from mplearn_agents.learning.live import add_live_arguments, learn_from_source
 from mplearn_agents.recordings.reading import (
     add_corpus_arguments,
@@ -21,7 +22,7 @@ from mplearn_agents.recordings.reading import (
     say_takes,
 )
 from mplearn_agents.terminal.arguments import count, positive
-from mplearn_agents.terminal.exit_codes import INTERRUPTED
+from mplearn_agents.terminal.exit_codes import INTERRUPTED, NOT_KEPT
 from mplearn_agents.terminal.inert import printable
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Learn, save the library and print a summary; return 130 where not all was learned."""
+    """Learn, save the library and print a summary; return a code of `terminal.exit_codes`."""
     if (args.data is None) == (args.live is None):
         raise InvalidValueError("give a recording, or --live SOURCE")
     if args.jobs is not None or args.ray is not None:
@@ -106,8 +107,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out is None and args.store is None:
         raise InvalidValueError("give a library to write, --out, or a store, --store, or both")
     if args.live is not None:
-        learn_from_source(args, partial(_configured, args))
-        return 0
+        return learn_from_source(args, partial(_configured, args))
     return _learn_from_files(args)
 
 
@@ -153,20 +153,22 @@ def _learn_from_files(args: argparse.Namespace) -> int:
             library = life.snapshot(shown_once=True)
         if not len(library) and not log.stopped:
             library = with_takes(library, [observe(each).frames for each in recordings])
-    if args.out is not None:
-        args.out.parent.mkdir(parents=True, exist_ok=True)
-        library.save(args.out)
+        if args.out is not None:
+            args.out.parent.mkdir(parents=True, exist_ok=True)
+            library.save(args.out)
+        unkept = close_store(life, library, args.out)
     console.print(primitive_table(library))
-    paths = [str(path) for path in (args.out, args.store) if path is not None]
+    paths = written_to(args, unkept)
     console.print(
         f"{n_known} primitives from {_takes_of(recordings, log)}, "
         f"{log.watched_s / 60:.1f} minutes of motion in {len(log.moving)} segments, "
-        f"{log.times_real_time:.0f} x real time; written to {printable(' and '.join(paths))}",
+        f"{log.times_real_time:.0f} x real time"
+        + (f"; written to {printable(paths)}" if paths else ""),
         markup=False,
     )
     if log.already:
         console.print(f"{log.already} takes had been learned before, and are in the store already.")
-    if log.stopped:
+    if log.stopped and not unkept:
         console.print(
             "Stopped: what was learned until then is written."
             + (" The same command goes on from there." if args.store is not None else "")
@@ -189,6 +191,9 @@ def _learn_from_files(args: argparse.Namespace) -> int:
             f"{log.reasons}",
             markup=False,
         )
+    if unkept:
+        say_unkept(f"{unkept}; the same command goes on from what the store holds")
+        return NOT_KEPT
     return INTERRUPTED if log.stopped else 0
 
 

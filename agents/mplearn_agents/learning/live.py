@@ -13,9 +13,11 @@ from threading import Event as Flag
 from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import MPLearnError, RecordingError
+from mplearn_agents.learning.keeping import close_store, say_unkept, written_to
 from mplearn_agents.learning.pauses import short_pauses
 from mplearn_agents.recordings.reading import hints_of
 from mplearn_agents.terminal.arguments import pace, positive
+from mplearn_agents.terminal.exit_codes import NOT_KEPT
 from mplearn_agents.terminal.inert import printable
 from mplearn_agents.terminal.interrupts import asked_to_stop
 
@@ -82,8 +84,10 @@ class LiveLog:
 
 def learn_from_source(
     args: argparse.Namespace, configure: Callable[[LearnerConfig], LearnerConfig]
-) -> None:
+) -> int:
     """Learn from a live source until it ends or somebody stops it; save the library.
+
+    Returns 3 where not all that was learned is kept, as `mplearn_agents.cli` says, 0 otherwise.
 
     Args:
         args: The options of ``mplearn learn``.
@@ -140,7 +144,7 @@ def learn_from_source(
             finally:
                 if log.life is not None:
                     stack.push(log.life)
-        _report(console, args, source, log, stopped=stop.is_set())
+        return _report(console, args, source, log, stopped=stop.is_set())
 
 
 def learn_live(
@@ -239,8 +243,8 @@ def _save(args: argparse.Namespace, library: PrimitiveLibrary) -> None:
 
 def _report(
     console: Any, args: argparse.Namespace, source: Source, log: LiveLog, *, stopped: bool
-) -> None:
-    """Write the library, and say what came of it all."""
+) -> int:
+    """Write the library, close the store, and say what came of it all; return the exit code."""
     from mplearn_agents.learning.watched import why_nothing
     from mplearn_agents.terminal.tables import primitive_table
 
@@ -250,7 +254,10 @@ def _report(
         raise RecordingError(f"nothing could be learned from {source.name}: {told}")
     library = log.life.snapshot()
     _save(args, library)
-    paths = [str(path) for path in (args.out, args.store) if path is not None]
+    unkept = close_store(log.life, library, args.out)
+    paths = written_to(args, unkept)
+    if unkept:
+        say_unkept(unkept)
     if args.json:
         summary = {
             "event": "Summary",
@@ -262,15 +269,17 @@ def _report(
             "stopped": stopped,
             "library": None if args.out is None else str(args.out),
             "store": None if args.store is None else str(args.store),
+            "unkept": unkept or None,
             **vars(source.tally),
         }
         print(json.dumps(summary), flush=True)
-        return
+        return NOT_KEPT if unkept else 0
     console.print(primitive_table(library))
     console.print(
         f"{len(library)} primitives from {log.watched_s / 60:.1f} minutes of motion in "
-        f"{log.segments} segments; "
-        f"{'stopped, ' if stopped else ''}written to {printable(' and '.join(paths))}",
+        f"{log.segments} segments"
+        + ("; stopped" if stopped else "")
+        + (f"{',' if stopped else ';'} written to {printable(paths)}" if paths else ""),
         markup=False,
     )
     if not len(library):
@@ -280,3 +289,4 @@ def _report(
         console.print(f"frames and packets that were not as they should be: {told}", markup=False)
     if log.lost_s:
         console.print(f"nothing was learned from {log.lost_s:.1f} s", markup=False)
+    return NOT_KEPT if unkept else 0
