@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..recording import BoolArray, FloatArray, IntArray
+from .distances import rounding, squared_distances
 
 _ROWS = 256
 
@@ -63,13 +64,11 @@ def nearest_in_each(
     Returns:
         Shape (n, m, count), increasing; inf where a stretch has fewer points.
     """
-    from scipy.spatial.distance import cdist
-
-    n, ends = len(points), [*starts[1:], len(points)]
+    n, ends, unit = len(points), [*starts[1:], len(points)], rounding(points)
     near = np.full((n, len(starts), count), np.inf, dtype=np.float32)
     for first in range(0, n, _ROWS):
         rows = np.arange(first, min(n, first + _ROWS))
-        distances = cdist(points[rows], points, "sqeuclidean")
+        distances = squared_distances(points[rows], points, unit)
         distances[np.abs(rows[:, None] - np.arange(n)) <= apart] = np.inf
         for k, (start, end) in enumerate(zip(starts, ends, strict=True)):
             ordered = np.sort(distances[:, start:end], axis=1)[:, :count]

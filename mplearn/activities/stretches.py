@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..recording import FloatArray
+from .distances import rounding, squared_distances
 
 _ROWS = 128
 
@@ -32,16 +33,16 @@ def band_of_links(
     Returns:
         Shape (n, reach + 1): entry (v, d) is that of the points v and v - d, both ways.
     """
-    from scipy.spatial.distance import cdist
-
-    n = len(points)
+    n, unit = len(points), rounding(points)
     band = np.zeros((n, reach + 1))
     for first in range(0, n, _ROWS):
         rows = np.arange(first, min(n, first + _ROWS))
         columns = np.arange(max(0, first - reach), min(n, rows[-1] + reach + 1))
         gap = np.abs(rows[:, None] - columns)
         allowed = (gap > apart) & (gap <= reach)
-        distances = np.where(allowed, cdist(points[rows], points[columns], "sqeuclidean"), np.inf)
+        distances = np.where(
+            allowed, squared_distances(points[rows], points[columns], unit), np.inf
+        )
         kth = min(count, len(columns)) - 1
         near = allowed & (distances <= np.partition(distances, kth, axis=1)[:, kth : kth + 1])
         links = near / np.maximum(near.sum(axis=1, keepdims=True), 1)  # ties share

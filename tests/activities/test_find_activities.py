@@ -59,6 +59,16 @@ def test_an_activity_of_any_length_is_one():
     assert find_activities(frames[:1], 30.0).tolist() == [0]
 
 
+@pytest.mark.parametrize("step_s", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize("per_s", [0.25, 0.5, 1.0])
+def test_what_comes_back_to_the_very_same_postures_is_one(per_s, step_s):
+    """Its periods are whole numbers of steps: its copies are equally near but for rounding."""
+    phase = 2 * np.pi * per_s * np.arange(3000) / 50.0
+    frames = np.column_stack((np.sin(phase), 0.5 * np.cos(phase)))
+    config = ActivityConfig(step_s=step_s)
+    np.testing.assert_array_equal(find_activities(frames, 50.0, config), 0)
+
+
 def test_missing_values_are_bridged():
     frames, truth = motion(SCRIPT, 30.0)
     frames[100:110] = np.nan
