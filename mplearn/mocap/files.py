@@ -18,6 +18,18 @@ _SMALL_BYTES = 4_000_000
 _LONGEST_SHOWN = 300  # characters of what a file holds
 _LARGE_BYTES = 8_000_000
 _TELLING = 64  # bytes of plain letters, in which every second one is 0 in UTF-16
+_NOTHING = b"\0\x1a"  # behind a text: space of a disk that was not written, the end by DOS
+# how what was saved instead of a recording begins, what it is, and what is wanted
+_NO_RECORDINGS = (
+    (
+        b"version https://git-lfs",
+        "a pointer of Git LFS",
+        "the file that it stands for (git lfs pull)",
+    ),
+    (b"<!doctype html", "a page of the web", "the file that it links to"),
+    (b"<html", "a page of the web", "the file that it links to"),
+)
+_ZIP, _GZIP = b"PK\x03\x04", b"\x1f\x8b\x08"
 # characters that a line, and a cell, of a large table has at least: more lines of nothing than
 # memory holds are no measurement
 _LEAST_LINE, _LEAST_CELL = 12, 1.6
@@ -82,7 +94,7 @@ def head(path: Path, n_bytes: int = 8192) -> bytes:
 
 def head_text(path: Path, n_bytes: int = 8192) -> str:
     """Return the start of a text file; empty if it is unreadable, or no text."""
-    data = _plain(head(path, n_bytes))
+    data = _plain(head(path, n_bytes)).rstrip(_NOTHING)
     return "" if b"\0" in data else data.decode("utf-8-sig", errors="replace")
 
 
@@ -111,7 +123,20 @@ def read_bytes(path: Path) -> bytes:
         raise bad_file(path, f"expands to more than {limit} bytes", "a recording of motion")
     if not data.strip():
         raise bad_file(path, "the file is empty", f"a {suffix(path)} recording")
+    _refuse_other_files(path, data)
     return data
+
+
+def _refuse_other_files(path: Path, data: bytes) -> None:
+    """Refuse what was saved instead of a recording, or around it."""
+    start = data[:_TELLING].lstrip(b"\xef\xbb\xbf \t\r\n").lower()
+    for begins, found, expected in _NO_RECORDINGS:
+        if start.startswith(begins):
+            raise bad_file(path, f"it is {found}, not a recording", expected)
+    if data.startswith(_ZIP) and suffix(path) != ".npz":
+        raise bad_file(path, "it is a zip archive", "the file that is packed in it")
+    if data.startswith(_GZIP):
+        raise bad_file(path, "it is packed by gzip", f"the name {path.name}.gz, or it unpacked")
 
 
 def read_text(path: Path) -> str:
@@ -126,7 +151,7 @@ def read_text(path: Path) -> str:
         >>> read_text(Path("take.csv"))
         'time_s,coude gauche\n'
     """
-    data = _plain(read_bytes(path))
+    data = _plain(read_bytes(path)).rstrip(_NOTHING)
     if b"\0" in data:
         raise bad_file(path, "the file is binary", f"the text of a {suffix(path)} recording")
     if len(data) > _LARGE_BYTES:

@@ -139,20 +139,38 @@ def test_what_is_no_array_of_joints(tmp_path: Path, shape: tuple[int, ...]) -> N
         open_recording(tmp_path / "a.npy", hints=Hints(rate_hz=RATE_HZ))
 
 
-@pytest.mark.parametrize("order", ["(T, P, J, 3)", "(P, T, J, 3)", "(3, T, J, P)"])
+ORDERS = {
+    "(T, P, J, 3)": (0, 1, 2, 3),
+    "(P, T, J, 3)": (1, 0, 2, 3),
+    "(3, T, J, P)": (3, 0, 2, 1),
+    "(1, 3, T, J, P)": (3, 0, 2, 1),
+    "(T, J, 3, P)": (0, 2, 3, 1),
+}
+
+
+def test_joints_before_frames(tmp_path: Path, landmarks: dict[str, np.ndarray]) -> None:
+    points = joints("COCO", landmarks)
+    np.save(tmp_path / "a.npy", points.swapaxes(0, 1))
+    take = open_recording(tmp_path / "a.npy", hints=Hints(rate_hz=RATE_HZ))
+    assert take.markers == pytest.approx(points)
+
+
+def test_turns_of_joints_are_no_people(tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", np.tile(np.eye(3), (40, 17, 1, 1)))
+    with pytest.raises(RecordingError, match=r"\(3, frames, joints, people\)"):
+        open_recording(tmp_path / "a.npy", hints=Hints(rate_hz=RATE_HZ))
+
+
+@pytest.mark.parametrize("order", ORDERS)
 def test_people_of_an_array_are_takes_of_their_own(
     tmp_path: Path, landmarks: dict[str, np.ndarray], order: str
 ) -> None:
     one = joints("COCO", landmarks)
     other = one[::-1] + np.array([0.0, 2.0, 0.0])
     nobody = np.zeros_like(one)
-    people = np.stack([one, other, *([] if order[1] == "3" else [nobody])], axis=1)
-    axes = {
-        "(T, P, J, 3)": (0, 1, 2, 3),
-        "(P, T, J, 3)": (1, 0, 2, 3),
-        "(3, T, J, P)": (3, 0, 2, 1),
-    }
-    np.save(tmp_path / "a.npy", people.transpose(axes[order]))
+    people = np.stack([one, other, *([] if "3" in order[:8] else [nobody])], axis=1)
+    array = people.transpose(ORDERS[order])
+    np.save(tmp_path / "a.npy", array[None] if order[1] == "1" else array)
     found = open_recordings(tmp_path / "a.npy", hints=Hints(rate_hz=RATE_HZ))
     assert [each.person for each in found] == ["person0", "person1"]
     for k, each in enumerate(found):

@@ -11,6 +11,7 @@ import re
 import struct
 from collections.abc import Callable
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from mocap_writers import (
     write_g1_csv,
     write_mvnx,
     write_smpl,
+    write_trc,
 )
 from scipy.spatial.transform import Rotation
 
@@ -893,3 +895,47 @@ def test_an_mvnx_file_that_was_cut_off(tmp_path: Path, cut: int) -> None:
     assert len(plain) - 1 <= len(found) <= len(plain)
     assert found.frames == pytest.approx(plain.frames[: len(found)], abs=1e-8)
     assert found.report is not None and any("cut off" in x for x in found.report.warnings)
+
+
+@pytest.mark.parametrize("suffix", ["bvh", "trc", "csv", "tsv", "c3d", "npz", "mvnx", "xdf"])
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n", "Git LFS"),
+        (b"\n<!DOCTYPE html>\n<html><body>404</body></html>\n", "page of the web"),
+        (gzip.compress(b"time_s,elbow\n0,1\n"), "packed by gzip"),
+    ],
+)
+def test_what_was_saved_instead_of_a_recording_is_called_so(
+    tmp_path: Path, suffix: str, content: bytes, says: str
+) -> None:
+    path = tmp_path / f"a.{suffix}"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=says):
+        open_recording(path, hints=Hints(rate_hz=50.0))
+
+
+def test_a_zip_archive_is_called_so(tmp_path: Path) -> None:
+    with ZipFile(tmp_path / "a.bvh", "w") as archive:
+        archive.writestr("a.bvh", "HIERARCHY")
+    with pytest.raises(RecordingError, match="zip archive"):
+        open_recording(tmp_path / "a.bvh")
+
+
+@pytest.mark.parametrize("behind", ["\x1a", "\0" * 512])
+@pytest.mark.parametrize("write", [write_bvh, write_trc, write_g1_csv])
+def test_what_lies_behind_a_text_is_none(
+    tmp_path: Path, write: Callable[[Path], Path], behind: str
+) -> None:
+    path = write(tmp_path / f"a.{write.__name__[-3:]}")
+    plain = open_recording(path)
+    path.write_text(path.read_text() + behind)
+    assert np.array_equal(open_recording(path).frames, plain.frames)
+
+
+@pytest.mark.parametrize("begun", ["-", "1.2 -", ".", "1e-"])
+def test_a_bvh_file_may_end_within_a_number(tmp_path: Path, begun: str) -> None:
+    path = write_bvh(tmp_path / "a.bvh")
+    plain = open_recording(path)
+    path.write_text(path.read_text() + begun)
+    assert np.array_equal(open_recording(path).frames, plain.frames)

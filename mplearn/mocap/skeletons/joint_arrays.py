@@ -162,7 +162,8 @@ class JointArrayReader(Reader):
     """Reads arrays of joints: see the module's docstring.
 
     Of one person they are (T, J, 3), (T, 3 J), (3, T, J), (T, 3, J) or (J, 3, T). Of several people
-    they are (T, P, J, 3) or (P, T, J, 3), or (3, T, J, P), as networks have it.
+    they are (T, P, J, 3), (P, T, J, 3), (T, J, 3, P), or (3, T, J, P), as networks have it, where
+    that may be one of a batch, (1, 3, T, J, P). (J, T, 3) is read where T is no number of joints.
     """
 
     format = "joint array"
@@ -244,9 +245,15 @@ def _name_of_joints(archive: NPZFile) -> str | None:
 
 def _as_people(path: Path, array: FloatArray) -> list[FloatArray]:
     """Return an array as the joints of each person, shape (T, J, 3) each."""
+    if array.ndim == 5 and len(array) == 1:  # a batch of one take, as networks have it
+        array = array[0]
+    if array.ndim == 4 and array.shape[1] in _BY_NUMBER and array.shape[2] == 3 != array.shape[3]:
+        array = np.moveaxis(array, 3, 1)  # (T, J, 3, P)
     points = array
     last = array.shape[-1:]
     channels_first = array.ndim == 3 or (array.ndim == 4 and last[0] not in (3, 4))
+    if array.ndim == 3 and last[0] in (3, 4) and array.shape[1] not in _BY_NUMBER:
+        points = array.swapaxes(0, 1) if len(array) in _BY_NUMBER else array  # (J, T, 3)
     if channels_first and array.shape[0] == 3 and array.shape[2] in _BY_NUMBER:
         points = np.moveaxis(array, 0, -1)  # (T, J, 3), or (T, J, P, 3)
         points = points.swapaxes(1, 2) if array.ndim == 4 else points
@@ -267,8 +274,9 @@ def _as_people(path: Path, array: FloatArray) -> list[FloatArray]:
         raise bad_file(
             path,
             f"an array of shape {array.shape}",
-            f"(frames, joints, 3), of {', '.join(map(str, sorted(_BY_NUMBER)))} joints, or "
-            "(frames, people, joints, 3); a table (CSV) can name others",
+            "(frames, joints, 3), (frames, people, joints, 3) with fewer people than frames, or "
+            "(3, frames, joints, people), of "
+            f"{', '.join(map(str, sorted(_BY_NUMBER)))} joints; a table (CSV) can name others",
         )
     return [points[..., :3].copy() for points in people]  # the fourth says how sure a joint is
 

@@ -16,6 +16,7 @@ from .numbers import missing_or_number, split_glued
 
 _HEADER = re.compile(r"\s*(frame\s*time|frames?)\s*:?\s*(?![a-z])(.*)", re.IGNORECASE)
 _STEP = re.compile(r"\s*([-+]?[\d.,]+(?:[edED][-+]?\d+)?)\s*(ms|msec|milliseconds)?", re.I)
+_BEGUN = re.compile(r"(?<=\s)[-+]?(?:\.|\d+\.?\d*[eE][-+]?)?\Z")  # of a number that is cut off
 _STEP_S = (1e-5, 1.0)
 _COMMON_HZ = (24, 25, 30, 50, 60, 72, 75, 90, 100, 120, 144, 150, 200, 240)
 _USUAL_HZ = (24, 25, 30, 48, 50, 60, 72, 75, 90, 100, 120, 125, 144, 150, 200, 240, 250, 300, 360,
@@ -59,7 +60,7 @@ def parse_motion(
         at = end + 1
         first_line += 1
     rate_hz = rate_hz or _rate(path, said.get("Frame Time", ""), findings)
-    flat, counts, lines = _flat(path, text[at:], first_line, findings)
+    flat, counts, lines = _flat(path, _BEGUN.sub("", text[at:]), first_line, findings)
     flat, counts = _without_extra(flat, counts, width, findings)
     said_frames = said.get("Frames", "")[:12]
     n_said = int(said_frames) if said_frames.isdecimal() else None
