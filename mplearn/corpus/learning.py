@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..errors import CorpusError, InvalidValueError, MPLearnError, RecordingError
+from ..errors import CorpusError, InvalidValueError, MPLearnError, RecordingError, StoreError
 from ..learner import LearnerConfig, MotionLearner
 from ..learner.learner_state import FILES
 from ..merging import merged_learner, merged_state
@@ -140,7 +140,10 @@ def learn_corpus(
     if not takes:
         known = ", ".join(sorted({take.person or "a person unnamed" for take in found.takes}))
         raise RecordingError(f"no take of {' or '.join(people)} in {folder}; there are: {known}")
-    into.mkdir(parents=True, exist_ok=True)
+    try:
+        into.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(f"there cannot be a folder {into}: {error.strerror}") from error
     own = executor or (Processes(jobs) if jobs else Here())
     unreadable = {name: str(error) for name, error in found.unreadable.items()}
     try:
@@ -197,8 +200,11 @@ def _planned(
             "shards": shards,
         }
         temporary = path.with_suffix(".new")
-        temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
-        temporary.replace(path)
+        try:
+            temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
+            temporary.replace(path)
+        except OSError as error:
+            raise StoreError(f"{path} cannot be written: {error.strerror}") from error
     return _Plan(config, shards)
 
 

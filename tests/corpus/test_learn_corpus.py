@@ -33,7 +33,7 @@ from mplearn.corpus import (
 from mplearn.corpus.cluster import RayTasks, _pass_on
 from mplearn.corpus.executors import Here
 from mplearn.corpus.shard import ShardJournal
-from mplearn.errors import CorpusError, InvalidValueError, RecordingError
+from mplearn.errors import CorpusError, InvalidValueError, RecordingError, StoreError
 from mplearn.merging import merge_learners
 from mplearn.mocap import Hints, TakeFiles, readers, register_reader, registry
 from mplearn.mocap.markers.csv_table import CSVReader
@@ -200,6 +200,19 @@ class StopsAfter:
     def __call__(self, progress: Progress) -> None:
         if progress.learned >= self._n:
             self.stop.set()
+
+
+def test_where_nothing_can_be_written_is_told(tmp_path: Path) -> None:
+    write = "time_s,elbow\n" + "".join(f"{k / 50:.2f},{k % 7}\n" for k in range(200))
+    (tmp_path / "takes").mkdir()
+    (tmp_path / "takes" / "slow.csv").write_text(write)
+    reading = Reading(observe="channels")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StoreError, match=r"cannot be a folder .*file: File exists"):
+        learn_corpus(tmp_path / "takes", tmp_path / "file", reading=reading, jobs=0)
+    (tmp_path / "into" / "plan.new").mkdir(parents=True)
+    with pytest.raises(StoreError, match=r"plan.json cannot be written: Is a directory"):
+        learn_corpus(tmp_path / "takes", tmp_path / "into", reading=reading, jobs=0)
 
 
 def test_stopped_it_goes_on(folder: Path, alone: bytes, tmp_path: Path) -> None:
