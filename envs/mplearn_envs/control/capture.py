@@ -240,10 +240,11 @@ def choose_step(
     reach: Reach,
     only: int,
     since_s: float = 0.0,
+    crosses: bool = True,
 ) -> Step:
     """Return the step that catches the DCM best: inside the soles, without hurry, near and soon.
 
-    Feet cross only where the other one cannot step, for its foot stands alone.
+    Feet cross only where the other one could not step, for its foot stood alone.
 
     Args:
         corners: Of both soles in their feet's frames, shape (2, 4, 3) [m].
@@ -253,12 +254,13 @@ def choose_step(
         reach: Where a foot can land, and how soon.
         only: The one foot that can step; -1 for either.
         since_s: For how long that foot has been on its way [s].
+        crosses: Whether the one foot that can step may cross the other.
     """
     best = np.inf
     found = Step(max(only, 0), LONGEST_S, feet[max(only, 0)].copy(), np.inf, BESIDE)
     soonest = max(reach.soonest - since_s, _SOONEST_S)
     lag = max(_LAG_S - since_s, 0.0)
-    n_ways = 3 if only >= 0 and reach.across > 0.0 else 1
+    n_ways = 3 if only >= 0 and crosses and reach.across > 0.0 else 1
     for side in range(2):
         if only == 1 - side:
             continue

@@ -74,7 +74,8 @@ class StepState(NamedTuple):
     Attributes:
         phase: What is going on (`STANDS`, `SHIFTS`: the weight goes to one foot, `SWINGS`); which
             foot steps, 0 left, 1 right; whether it steps back and not to catch; how many steps were
-            taken; and on which way the foot goes (`BESIDE`); shape (5,).
+            taken; on which way the foot goes (`BESIDE`); and whether it may cross the other one,
+            for it was in the air when that was pushed; shape (6,).
         time: Time in this phase, how long the step lasts, and for how long the weight has rested,
             shape (3,) [s].
         place: Where the foot lands: x, y [m] and yaw [rad], shape (3,).
@@ -95,7 +96,7 @@ class StepState(NamedTuple):
 
 def new_step_state() -> StepState:
     """Return what is remembered at first: nothing."""
-    return StepState(*(np.zeros(n) for n in (5, 3, 3, 2, 4, 4, 4)))
+    return StepState(*(np.zeros(n) for n in (6, 3, 3, 2, 4, 4, 4)))
 
 
 @kernel
@@ -130,7 +131,7 @@ def begin_stepping(
     if up >= 0:
         step = choose_step(robot.corners, now.feet, now.dcm, now.rate, law.reach, up, 0.0)
         _lift(robot, stepping, now, up, step.time_s, step.place)
-        stepping.phase[4] = step.way
+        stepping.phase[4], stepping.phase[5] = step.way, 1.0
 
 
 @kernel
@@ -196,6 +197,7 @@ def _lift(
     """Begin a step, one to catch."""
     stepping.phase[0], stepping.phase[1], stepping.phase[2] = SWINGS, side, 0.0
     stepping.phase[3] += 1.0
+    stepping.phase[5] = 0.0
     stepping.time[0], stepping.time[1] = 0.0, time_s
     stepping.place[:] = place
     stepping.foot[:3], stepping.foot[3] = (
@@ -218,7 +220,14 @@ def _on_one_foot(
     if stepping.phase[2] == 0.0:
         if stepping.time[0] < law.decides_s:
             step = choose_step(
-                robot.corners, now.feet, now.dcm, now.rate, law.reach, side, stepping.time[0]
+                robot.corners,
+                now.feet,
+                now.dcm,
+                now.rate,
+                law.reach,
+                side,
+                stepping.time[0],
+                stepping.phase[5] == 1.0,
             )
             stepping.time[1] = stepping.time[0] + step.time_s
             stepping.phase[4], stepping.place[:] = step.way, step.place

@@ -17,6 +17,7 @@ from mplearn.errors import InvalidValueError
 from mplearn.recording import FloatArray
 from mplearn_envs.levels import from_levels
 from mplearn_envs.robot import Robot
+from mplearn_envs.robot.legs import let_legs_touch
 
 from .reflexes import NO_PUSHES, Pushes
 
@@ -146,9 +147,18 @@ def body_model(robot: Robot, body: Body) -> mujoco.MjModel:
         >>> body_model(humanoid(), Body()).nu
         30
     """
-    if body.bumps_m == 0.0:
+    if body.bumps_m == 0.0 and not body.steps:
         return mujoco.MjModel.from_xml_string(robot.xml)
     spec = mujoco.MjSpec.from_string(robot.xml)
+    if body.steps:
+        let_legs_touch(spec, robot.thighs)
+    if body.bumps_m > 0.0:
+        _add_bumps(spec, body)
+    return spec.compile()
+
+
+def _add_bumps(spec: mujoco.MjSpec, body: Body) -> None:
+    """Make a model's floor uneven, level yet."""
     half_m = 0.5 * (_CELLS - 1) * _CELL_M
     spec.add_hfield(
         name="ground",
@@ -160,7 +170,6 @@ def body_model(robot: Robot, body: Body) -> mujoco.MjModel:
     floor = spec.geom("floor")
     floor.type, floor.hfieldname = mujoco.mjtGeom.mjGEOM_HFIELD, "ground"
     floor.pos = [0.0, 0.0, -body.bumps_m]  # what stands out is as high as the floor was
-    return spec.compile()
 
 
 class Drawn(NamedTuple):
