@@ -1,5 +1,8 @@
 """The lab streaming layer, with an outlet of ours."""
 
+import signal
+import subprocess
+import sys
 import threading
 import time
 import uuid
@@ -12,9 +15,11 @@ from servers import gather, learned
 
 from mplearn.errors import InvalidValueError
 from mplearn.recording import Recording
-from mplearn.sources import Block, Stream, open_source
+from mplearn.sources import Block, Change, Stream, open_source
 from mplearn.sources.played import PlayedSource
-from mplearn.sources.protocols.lsl import described, described_info
+from mplearn.sources.protocols import lsl_process
+from mplearn.sources.protocols.lsl import LSLReceiver, described, described_info
+from mplearn.sources.received import ReceivedSource
 from mplearn.sources.sending import open_sender, send
 
 pylsl = pytest.importorskip("pylsl")
@@ -85,6 +90,53 @@ def test_an_outlet_that_comes_back_is_found_and_what_was_lost_is_counted(name: s
     assert source.tally.frames == len(expected)
     assert source.tally.lost == 100 - len(expected)
     assert source.tally.reconnected == 1
+
+
+def test_where_the_library_crashes_the_stream_is_connected_again(name: str) -> None:
+    receiver = LSLReceiver(name)
+    outlet = pylsl.StreamOutlet(described_info(pylsl, name, Stream(("a", "b"), 100.0)))
+    with ReceivedSource(f"lsl:{name}", receiver) as source:
+        items: list[Block | Change] = []
+        for start in (0, 100):
+            connected(source, outlet)
+            for i in range(start, start + 50):
+                outlet.push_sample([float(i), -float(i)], 50.0 + i / 100)
+            until = time.monotonic() + 10.0
+            last = start + 49.0
+            while not any(isinstance(i, Block) and last in i.frames[:, 0] for i in items):
+                items += source.read(0.1)
+                assert time.monotonic() < until
+            if not start:
+                first = receiver._process
+                assert first is not None
+                first.send_signal(signal.SIGSEGV)  # as if liblsl had crashed
+                while not texts_of(items, "disconnected"):
+                    items += source.read(0.1)
+                while outlet.have_consumers():
+                    time.sleep(0.01)
+    came = frames_of(items)[:, 0]
+    assert came[~np.isnan(came)].tolist() == [*range(50), *range(100, 150)]
+    assert source.tally.reconnected == 1
+    assert texts_of(items, "disconnected") == [
+        "the process that pulls the stream ended (signal 11)"
+    ]
+    second = receiver._process
+    assert second is not None
+    assert second is not first
+    assert first.returncode == -signal.SIGSEGV
+    assert second.poll() is not None, "it would go on where nobody reads"
+
+
+def test_who_pulls_ends_when_nobody_reads(name: str) -> None:
+    outlet = pylsl.StreamOutlet(described_info(pylsl, name, Stream(("a",), 100.0)))
+    command = [sys.executable, lsl_process.__file__, "name", name]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        connected(None, outlet)
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()  # as where the process that reads is killed
+        assert process.wait(10.0) == 0
+        assert b"Traceback" not in process.stderr.read()
 
 
 def test_a_description_says_names_and_unit() -> None:

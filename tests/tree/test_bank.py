@@ -114,6 +114,28 @@ def test_a_model_of_what_was_never_seen_is_refused() -> None:
         bank.model(seen)
 
 
+@pytest.mark.parametrize("without_tempo", [False, True])
+def test_what_is_known_of_leaves_is_what_is_measured(without_tempo: bool) -> None:
+    """Whatever was asked before, who came and went since, and where all models are made anew."""
+    rng = np.random.default_rng(5)
+    bank = banked(rng, range(8))
+    for step in range(20):
+        if step == 12:
+            wider = ExemplarBank(bank.config, D, 3.0 * bank.floor)
+            for number in bank.numbers():
+                old = bank[number]
+                wider.add(number, wider.model(old.columns.T, float(old.duration)))
+            bank.take_over(wider)
+        bank.add(8 + step, bank.model(points(rng, bank.config), rng.uniform(40, 160)))
+        bank.drop(int(rng.choice(bank.numbers())))
+        one, other = (rng.permutation(bank.numbers())[:n].tolist() for n in (5, 4))
+        measured = [
+            bank.distances(bank[number], other, without_tempo=without_tempo) for number in one
+        ]
+        found = bank.across(one, other, without_tempo=without_tempo)
+        np.testing.assert_array_equal(found, np.stack(measured))
+
+
 def test_what_is_known_of_the_latest_is_what_is_measured() -> None:
     """Exemplars come and go, in any order, and slots are taken again."""
     rng = np.random.default_rng(3)

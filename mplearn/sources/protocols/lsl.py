@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import time
+import subprocess
+import sys
 from types import ModuleType
 from typing import Any
 from xml.etree import ElementTree
@@ -19,11 +20,11 @@ from ..received import ReceivedSource, Receiver
 from ..registry import Wanted
 from ..sender import Sender
 from ..source import Block, Source, Stream, known_rate
+from . import lsl_process
 from .lines import MOST_CHANNELS
+from .lsl_process import CHUNK, DESCRIBED, FAILED, HEAD, SAMPLES
 
 EXTRA = "live"
-SEARCH_S, WAKE_S, BUFFER_S = 1.0, 0.1, 60
-AT_ONCE = 256  # samples
 TYPE = "MoCap"  # as the layer's conventions call motion capture
 
 
@@ -36,6 +37,9 @@ def open_lsl(address: str, wanted: Wanted) -> Source:
 class LSLReceiver(Receiver):
     """Pulls a stream; where it is lost, one of the same name is looked for.
 
+    It is pulled by another process: where liblsl crashes, that one ends, and the stream is
+    disconnected and connected again as by any other loss.
+
     Args:
         name: Of the stream; the first one of type MoCap where empty.
 
@@ -46,34 +50,51 @@ class LSLReceiver(Receiver):
     ordered = True
 
     def __init__(self, name: str) -> None:
-        self._lsl, self._name = lsl(), name
+        lsl()
+        self._name = name
+        self._process: subprocess.Popen[bytes] | None = None
         self.hint = f"no stream {name!r} is on the network" if name else f"no stream of type {TYPE}"
 
     def receive(self, inbox: Inbox) -> None:
-        """Look for the stream, and pull until it is lost."""
+        """Look for the stream, and take what is pulled until it is lost."""
         what = ("name", self._name) if self._name else ("type", TYPE)
-        found: list[Any] = []
-        while not found:
-            if inbox.closed:
-                return
-            found = self._lsl.resolve_byprop(*what, minimum=1, timeout=SEARCH_S)
-        inlet = self._lsl.StreamInlet(found[0], max_buflen=BUFFER_S, recover=False)
-        try:
-            stream, columns = described(inlet.info(timeout=5.0).as_xml())
-            while not inbox.closed:
-                chunk, stamps = inlet.pull_chunk(
-                    timeout=WAKE_S, max_samples=AT_ONCE, min_samples=1, as_numpy=True
-                )
-                arrived_s = time.monotonic()
-                for values, stamp in zip(chunk, stamps, strict=True):
-                    row = np.asarray(values, dtype=np.float64)[columns]
-                    row[np.isinf(row)] = np.nan
-                    inbox.put(Sample(stream, row, arrived_s, time_s=float(stamp)))
-        finally:
-            inlet.close_stream()
+        command = [sys.executable, lsl_process.__file__, *what]
+        with subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE
+        ) as self._process:
+            try:
+                _take(self._process, inbox)
+            finally:
+                self._process.kill()
 
     def close(self) -> None:
         """Nothing stays open."""
+
+
+def _take(process: subprocess.Popen[bytes], inbox: Inbox) -> None:
+    """Take what a process of `lsl_process` says."""
+    assert process.stdout is not None
+    stream, columns = Stream((), 0.0), np.zeros(0, np.int64)
+    while not inbox.closed:
+        head = process.stdout.read(HEAD.size)
+        if len(head) < HEAD.size:
+            code = process.wait()
+            why = f"signal {-code}" if code < 0 else f"code {code}"
+            raise OSError(f"the process that pulls the stream ended ({why})")
+        kind, size = HEAD.unpack(head)
+        body = process.stdout.read(size)
+        if kind == FAILED:
+            raise OSError(body.decode("utf-8", "replace"))
+        if kind == DESCRIBED:
+            stream, used = described(body.decode("utf-8", "surrogateescape"))
+            columns = np.array(used)
+        elif kind == SAMPLES:
+            arrived_s, n = CHUNK.unpack_from(body)
+            numbers = np.frombuffer(body, "<f8", offset=CHUNK.size)
+            rows = numbers[n:].reshape(n, -1)[:, columns]
+            rows[np.isinf(rows)] = np.nan
+            for row, time_s in zip(rows, numbers[:n].tolist(), strict=True):
+                inbox.put(Sample(stream, row, arrived_s, time_s=time_s))
 
 
 class LSLSender(Sender):

@@ -23,6 +23,7 @@ AT_ONCE = 128  # segments that are modelled together
 
 _PRIOR = 1.0  # transitions of either kind added to each state's count
 _STEEPNESS = 4.0  # a segment twice as long, as two motions in one are, is three times as far
+_KNOWN = 16384  # divergences among exemplars of leaves that are kept to be asked for again
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +71,7 @@ class ExemplarBank:
         self._latest: tuple[int, Exemplar | None] = -1, None
         self._levelled: tuple[FloatArray, FloatArray] | None = None
         self._met = np.zeros(0)  # divergences of the latest from what is in each slot, NaN: unknown
+        self._among: dict[tuple[int, int], float] = {}  # divergences by numbers, see `across`
         per_state, per_transition = (config.n_states, n_channels), (config.n_states,)
         self._arrays = SlotArrays(
             (n_channels, config.normalisation.n_points),
@@ -184,7 +186,7 @@ class ExemplarBank:
     def take_over(self, other: ExemplarBank) -> None:
         """Hold what another bank holds, from now on instead of it."""
         self.floor, self._slots, self._arrays = other.floor, other._slots, other._arrays
-        self._latest = -1, None
+        self._latest, self._among = (-1, None), {}
 
     def profile(self, exemplar: Exemplar) -> FloatArray:
         """Return the points times the root of their weights, shape (D * P,); 0 where missing."""
@@ -211,19 +213,53 @@ class ExemplarBank:
         latest that came is not measured again.
         """
         slots = self._slots_of(others)
-        if exemplar is self._latest[1]:
-            unknown = slots[np.isnan(self._met[slots])]
-            if len(unknown):
-                self._met[unknown] = self._divergences(exemplar, unknown)
-            raw = self._met[slots]
-        else:
-            raw = self._divergences(exemplar, slots)
+        raw = self._raw(exemplar, slots)
+        return self._lengths(raw, exemplar.duration, slots, without_tempo=without_tempo)
+
+    def across(
+        self, numbers: Sequence[int], others: Sequence[int], *, without_tempo: bool = False
+    ) -> FloatArray:
+        """Return the `distances` of exemplars from others, shape (k, l).
+
+        What leaves are judged by is asked for again whenever one more comes to them: what was
+        measured then is not measured again.
+        """
+        slots = self._slots_of(others)
+        rows = [self._divergences_of(number, others) for number in numbers]
+        durations = self._arrays.gather(self._slots_of(numbers), _DURATION)
+        return self._lengths(np.array(rows), durations[:, None], slots, without_tempo=without_tempo)
+
+    def _divergences_of(self, number: int, others: Sequence[int]) -> list[float]:
+        """Return the divergences of an exemplar from others, shape (l,), some of them known."""
+        pairs = [(min(number, other), max(number, other)) for other in others]
+        missing = [k for k, pair in enumerate(pairs) if pair not in self._among]
+        if missing:
+            if len(self._among) > _KNOWN:
+                self._among = {}
+                missing = list(range(len(pairs)))
+            found = self._raw(self[number], self._slots_of([others[k] for k in missing]))
+            self._among.update(zip((pairs[k] for k in missing), found.tolist(), strict=True))
+        return [self._among[pair] for pair in pairs]
+
+    def _lengths(
+        self, raw: FloatArray, duration: FloatArray, slots: IntArray, *, without_tempo: bool
+    ) -> FloatArray:
+        """Return divergences as distances, which grow where durations differ by much."""
         distances = self.distance.length(raw)
         if not without_tempo and np.isfinite(self.config.tempo):
-            one, other = exemplar.duration, self._arrays.gather(slots, _DURATION)
-            beyond = np.maximum(one, other) / np.minimum(one, other) / self.config.tempo
+            other = self._arrays.gather(slots, _DURATION)
+            beyond = np.maximum(duration, other) / np.minimum(duration, other) / self.config.tempo
             distances *= np.maximum(beyond, 1.0) ** _STEEPNESS
         return np.asarray(distances)
+
+    def _raw(self, exemplar: Exemplar, slots: IntArray) -> FloatArray:
+        """Return divergences, shape (k,); those of the latest as far as they are known."""
+        if exemplar is not self._latest[1]:
+            return self._divergences(exemplar, slots)
+        unknown = slots[np.isnan(self._met[slots])]
+        if len(unknown):
+            self._met[unknown] = self._divergences(exemplar, unknown)
+        return np.asarray(self._met[slots])
 
     def _divergences(self, exemplar: Exemplar, slots: IntArray) -> FloatArray:
         found = np.empty(len(slots))
@@ -248,8 +284,8 @@ class ExemplarBank:
             matrix = matrix.copy()
         for i in np.unique(rows).tolist():
             group = others[rows == i]
-            row = self.distances(self[numbers[i]], [numbers[j] for j in group], without_tempo=True)
-            matrix[i, group] = matrix[group, i] = row
+            row = self.across([numbers[i]], [numbers[j] for j in group], without_tempo=True)
+            matrix[i, group] = matrix[group, i] = row[0]
         return matrix
 
     def matrix(self, numbers: Sequence[int], *, without_tempo: bool = False) -> FloatArray:
@@ -268,7 +304,7 @@ class ExemplarBank:
         """Return a bank that holds the same, and goes on apart; what neither changes is shared."""
         twin = copy(self)
         twin._slots, twin._arrays = dict(self._slots), self._arrays.fork()
-        twin._latest = -1, None
+        twin._latest, twin._among = (-1, None), {}
         return twin
 
     def state(self, numbers: Iterable[int]) -> BankState:

@@ -185,8 +185,7 @@ class Structure:
 
     def joint(self, first: Node, second: Node) -> FloatArray:
         """Return the distances among the exemplars of two nodes, those of the first before."""
-        bank = self.memory.bank
-        across = np.stack([bank.distances(bank[n], second.members) for n in first.members])
+        across = self.memory.bank.across(first.members, second.members)
         return np.block([[first.matrix, across], [across.T, second.matrix]])
 
     def remove(self, leaf: Node, when: int, *, forget: bool) -> Change:
