@@ -76,8 +76,9 @@ def test_only_the_robots_soles_collide():
         ("ankle_pitch_l", 0.5, "toes_l", 2, -1),
     ],
 )
-@pytest.mark.parametrize("body", [human_body(), robot_body()], ids=["human", "robot"])
-def test_signs_of_the_joints(body, joint, angle, part, axis, sign):
+@pytest.mark.parametrize("make_body", [human_body, robot_body], ids=["human", "robot"])
+def test_signs_of_the_joints(make_body, joint, angle, part, axis, sign):
+    body = make_body()
     q = body.rest
     before = body.tree.forward(q)[0][body.tree.body(part), axis]
     q[7 + body.joint_names.index(joint)] = angle

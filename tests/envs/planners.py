@@ -1,7 +1,9 @@
-"""The humanoid's planner, made when a test asks: collecting tests compiles no kernels of plans."""
+"""The humanoid's planner and reference, made when a test asks: collecting compiles no kernels."""
 
 from functools import cache
 
+from mplearn_envs.mechanics import reference_robot, rest_reference
+from mplearn_envs.mechanics.reference import Reference, ReferenceRobot
 from mplearn_envs.planning import Planner
 from mplearn_envs.robot import humanoid
 
@@ -9,3 +11,13 @@ from mplearn_envs.robot import humanoid
 @cache
 def planner() -> Planner:
     return Planner(humanoid())
+
+
+@cache
+def humanoid_reference() -> ReferenceRobot:
+    return reference_robot(humanoid())
+
+
+@cache
+def at_rest() -> Reference:
+    return rest_reference(humanoid())

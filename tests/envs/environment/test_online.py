@@ -152,7 +152,6 @@ def test_it_complies():
         ({"demonstrator": "nobody"}, "'synthetic', a Recording or a LiveDemonstrator"),
         ({"warm_up_s": -1.0}, "warm_up_s"),
         ({"warm_up_s": np.nan}, "warm_up_s"),
-        ({"library": standing_library()}, "learns its library"),
         ({"task": "follow"}, "follow"),
         ({"actions": {"capacity": 1}}, "capacity"),
     ],
@@ -160,6 +159,11 @@ def test_it_complies():
 def test_bad_options_are_refused(options, message):
     with pytest.raises(InvalidValueError, match=message):
         make(**options)
+
+
+def test_who_learns_its_library_is_given_none():
+    with pytest.raises(InvalidValueError, match="learns its library"):
+        make(library=standing_library())
 
 
 def test_a_demonstrator_of_another_body_is_refused():

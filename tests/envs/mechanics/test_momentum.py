@@ -2,14 +2,13 @@
 
 import mujoco
 import numpy as np
+from planners import humanoid_reference
 
-from mplearn_envs.mechanics import reference_robot
 from mplearn_envs.mechanics.momentum import ground_reaction, momenta
 from mplearn_envs.mechanics.support import zero_moment_point
 from mplearn_envs.robot import humanoid
 
 HUMANOID = humanoid()
-REFERENCE = reference_robot(HUMANOID)
 
 
 def test_momenta_are_mujocos():
@@ -18,9 +17,14 @@ def test_momenta_are_mujocos():
     data = mujoco.MjData(model)
     q, v = rng.normal(scale=0.5, size=(5, model.nq)), rng.normal(size=(5, model.nv))
     q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1)[:, None]
-    feet = REFERENCE.stance.feet
+    feet = humanoid_reference().stance.feet
     cog, linear, angular, soles = momenta(
-        REFERENCE.tree, REFERENCE.inertia, feet, REFERENCE.corners, q, v
+        humanoid_reference().tree,
+        humanoid_reference().inertia,
+        feet,
+        humanoid_reference().corners,
+        q,
+        v,
     )
     for t in range(len(q)):
         data.qpos[:], data.qvel[:] = q[t], v[t]
@@ -33,7 +37,7 @@ def test_momenta_are_mujocos():
         np.testing.assert_allclose(angular[t], data.subtree_angmom[1], atol=1e-10)
         for side, foot in enumerate(feet):
             turn, place = data.xmat[foot + 1].reshape(3, 3), data.xpos[foot + 1]
-            expected = REFERENCE.corners[side] @ turn.T + place
+            expected = humanoid_reference().corners[side] @ turn.T + place
             np.testing.assert_allclose(soles[t, side], expected, atol=1e-10)
 
 
@@ -41,12 +45,12 @@ def test_the_grounds_reaction_is_what_the_contacts_carry():
     """A robot that sways: the zero-moment point from the momentum is the contacts'."""
     model = HUMANOID.model()
     data = mujoco.MjData(model)
-    data.qpos[:] = REFERENCE.rest
+    data.qpos[:] = humanoid_reference().rest
     sway = HUMANOID.joint_names.index("waist_yaw")
     names = [HUMANOID.joint_names.index(f"shoulder_pitch_{side}") for side in "lr"]
     q, v, expected = [], [], []
     for step in range(200):
-        data.ctrl[:] = REFERENCE.rest[7:]
+        data.ctrl[:] = humanoid_reference().rest[7:]
         data.ctrl[sway] = 0.3 * np.sin(0.02 * step)
         data.ctrl[names] = 0.4 * np.sin(0.02 * step)
         q.append(data.qpos.copy())
@@ -60,9 +64,13 @@ def test_the_grounds_reaction_is_what_the_contacts_carry():
             total += lift
             weighted += lift * contact.pos[:2]
         expected.append(weighted / max(total, 1.0))
-    points = REFERENCE.stance.feet[:0], REFERENCE.corners[:0]
-    dynamics = momenta(REFERENCE.tree, REFERENCE.inertia, *points, np.array(q), np.array(v))
-    zmp = ground_reaction(float(REFERENCE.tree.mass.sum()), *dynamics[:3], model.opt.timestep)
+    points = humanoid_reference().stance.feet[:0], humanoid_reference().corners[:0]
+    dynamics = momenta(
+        humanoid_reference().tree, humanoid_reference().inertia, *points, np.array(q), np.array(v)
+    )
+    zmp = ground_reaction(
+        float(humanoid_reference().tree.mass.sum()), *dynamics[:3], model.opt.timestep
+    )
     np.testing.assert_allclose(zmp[20:], np.array(expected)[20:-1], atol=0.004)
     assert np.ptp(np.array(expected)[20:, 0]) > 0.01
 

@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from planners import humanoid_reference
 
 from mplearn.maths.rotation_kernels import rotation_error
 from mplearn.maths.yaw_roll_pitch import roll_pitch_matrix
 from mplearn_envs.control.balance import BalanceController
 from mplearn_envs.mechanics.kinematics import forward, mass_tree, rotate_quaternion
-from mplearn_envs.mechanics.reference import reference_robot, rest_reference
+from mplearn_envs.mechanics.reference import rest_reference
 from mplearn_envs.mechanics.velocity_ik import (
     add_leg_columns,
     errors,
@@ -22,11 +23,10 @@ from mplearn_envs.robot import humanoid
 
 MODEL = humanoid().model()
 TREE = mass_tree(MODEL)
-ROBOT = reference_robot(humanoid())
 
 
 def random_posture(rng, scale=0.5):
-    q = ROBOT.rest.copy()
+    q = humanoid_reference().rest.copy()
     q[:3] += rng.normal(scale=0.1, size=3)
     q[3:7] = rng.normal(size=4)
     q[3:7] /= np.linalg.norm(q[3:7])
@@ -58,7 +58,7 @@ def test_the_rows_jacobian_is_their_derivative(seed):
     q = random_posture(rng, 0.2)
     q[3:7] = rotate_quaternion(np.array([1.0, 0, 0, 0]), rng.normal(scale=0.2, size=3))
     q[2] = 0.7  # well below the guard, where the height row is plain
-    stance = ROBOT.stance
+    stance = humanoid_reference().stance
     pose = forward(TREE, q)
     jacobian = jacobian_rows(stance, pose)
     add_leg_columns(TREE, stance, pose, jacobian)
@@ -99,36 +99,38 @@ def test_a_rotation_error_undoes_the_rotation(vector, quaternion):
 
 
 def settled(upper, height, roll, pitch):
-    q = ROBOT.rest.copy()
-    q[7 + ROBOT.upper] = upper
-    return settle(TREE, ROBOT.stance, q, height, roll_pitch_matrix(roll, pitch), 1e-10, 60)
+    q = humanoid_reference().rest.copy()
+    q[7 + humanoid_reference().upper] = upper
+    return settle(
+        TREE, humanoid_reference().stance, q, height, roll_pitch_matrix(roll, pitch), 1e-10, 60
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_balanced_posture_is_minks(seed):
     mink = pytest.importorskip("mink")
     rng = np.random.default_rng(seed)
-    limits = ROBOT.limits[3:]
+    limits = humanoid_reference().limits[3:]
     upper = np.clip(rng.normal(scale=0.6, size=len(limits)), limits[:, 0], limits[:, 1])
     height, roll, pitch = 0.72, 0.05 * rng.normal(), 0.3 * rng.random()
     ours, worst = settled(upper, height, roll, pitch)
     assert worst < 1e-9
 
-    configuration = mink.Configuration(MODEL, q=_with(ROBOT.rest, upper))
+    configuration = mink.Configuration(MODEL, q=_with(humanoid_reference().rest, upper))
     tasks = []
     for side, name in enumerate(humanoid().feet):
         foot = mink.FrameTask(name, "body", position_cost=1.0, orientation_cost=1.0)
         foot.set_target(
             mink.SE3.from_rotation_and_translation(
-                mink.SO3.from_matrix(ROBOT.stance.foot_rotation[side]),
-                ROBOT.stance.foot_position[side],
+                mink.SO3.from_matrix(humanoid_reference().stance.foot_rotation[side]),
+                humanoid_reference().stance.foot_position[side],
             )
         )
         tasks.append(foot)
     com = mink.ComTask(cost=np.array([1.0, 1.0, 0.0]))
-    com.set_target(np.append(ROBOT.stance.cog, 0.0))
+    com.set_target(np.append(humanoid_reference().stance.cog, 0.0))
     pelvis = mink.FrameTask("pelvis", "body", position_cost=[0.0, 0.0, 1.0], orientation_cost=1.0)
-    free = [6 + int(j) for j in ROBOT.upper]
+    free = [6 + int(j) for j in humanoid_reference().upper]
     upper_body = mink.DofFreezingTask(MODEL, dof_indices=free)
     for _ in range(200):
         # mink weighs errors in the body's frame: a target above the body leaves height alone
@@ -150,14 +152,14 @@ def test_the_balanced_posture_is_minks(seed):
 
 def _with(q, upper):
     out = q.copy()
-    out[7 + ROBOT.upper] = upper
+    out[7 + humanoid_reference().upper] = upper
     return out
 
 
 def test_knees_never_get_straight():
     knees = [7 + humanoid().joint_names.index(n) for n in humanoid().knees]
     for height in np.linspace(0.80, 1.2, 9):
-        q, _ = settled(np.zeros(len(ROBOT.upper)), height, 0.0, 0.3)
+        q, _ = settled(np.zeros(len(humanoid_reference().upper)), height, 0.0, 0.3)
         assert (q[knees] > humanoid().guard_knee_rad - 1e-3).all()
 
 
@@ -173,7 +175,7 @@ def test_knees_do_not_get_straight_while_the_hips_rise():
 
 
 def test_the_height_is_reached_where_the_guard_is_far():
-    q, worst = settled(np.zeros(len(ROBOT.upper)), 0.7, 0.0, 0.0)
+    q, worst = settled(np.zeros(len(humanoid_reference().upper)), 0.7, 0.0, 0.0)
     assert worst < 1e-9
     assert q[2] == pytest.approx(0.7, abs=1e-3)
 

@@ -5,13 +5,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planners import planner
+from planners import at_rest, humanoid_reference, planner
 from standing_library import ARMS, BOW, RATE_HZ, SQUAT, sweep
 
 from mplearn.errors import FrameError, InvalidValueError
 from mplearn_envs.control import StandingController, UpperBodyTracker
 from mplearn_envs.execution.simulation import Simulation
-from mplearn_envs.mechanics import reference_robot, rest_reference
 from mplearn_envs.mechanics.reference import tracked_columns
 from mplearn_envs.mechanics.support import convex_hull, support_margin
 from mplearn_envs.planning import Motion, Planner
@@ -19,9 +18,7 @@ from mplearn_envs.planning.splines import refine
 from mplearn_envs.robot import humanoid
 
 HUMANOID = humanoid()
-REFERENCE = reference_robot(HUMANOID)
 TRACKED = tracked_columns(HUMANOID)
-REST = rest_reference(HUMANOID)
 
 
 def there_and_back(posture, seconds):
@@ -36,7 +33,7 @@ def there_and_back(posture, seconds):
     ids=["both arms", "bow 45 deg", "squat 18 cm", "bow and nod", "squat and arm"],
 )
 def test_the_robot_stays_upright_balanced_and_on_track(posture, speed):
-    plan = planner().plan(REST, there_and_back(posture, 1.0), speed)
+    plan = planner().plan(at_rest(), there_and_back(posture, 1.0), speed)
     simulation = Simulation(HUMANOID)
     simulation.reset()
     performance = simulation.perform(plan)
@@ -48,7 +45,7 @@ def test_the_robot_stays_upright_balanced_and_on_track(posture, speed):
 
 def test_the_robot_stays_upright_with_a_wrong_model():
     """Masses, gains and friction differ from what was planned with."""
-    plan = planner().plan(REST, there_and_back(BOW, 1.0), 0.5)
+    plan = planner().plan(at_rest(), there_and_back(BOW, 1.0), 0.5)
     rng = np.random.default_rng(0)
     for friction in (0.6, 1.0):
         simulation = Simulation(HUMANOID)
@@ -75,15 +72,15 @@ unit = st.floats(0.0, 1.0)
 )
 def test_no_command_ever_leaves_the_limits(first, last, seconds, speed):
     """Any motion between any two postures: positions and velocities keep their limits."""
-    low, high = REFERENCE.limits.T
+    low, high = humanoid_reference().limits.T
     ends = np.array([first, last]) * 1.4 - 0.2  # beyond the limits, too
     x = np.linspace(0, 1, max(2, round(100 * seconds)))[:, None]
     frames = low + (ends[0] * (1 - x) + ends[1] * x) * (high - low)
-    plan = planner().plan(REST, Motion(frames, 100.0), speed)
+    plan = planner().plan(at_rest(), Motion(frames, 100.0), speed)
     limits = HUMANOID.position_limits
     assert (plan.commands >= limits[:, 0]).all() and (plan.commands <= limits[:, 1]).all()
     velocity = np.abs(np.diff(plan.q[:, 7:], axis=0)) / plan.knot_s
-    upper = REFERENCE.upper
+    upper = humanoid_reference().upper
     allowed = HUMANOID.per_joint("velocity")
     assert (velocity[:, upper] <= allowed[upper] * (1 + 1e-6)).all()
     assert np.isfinite(plan.commands).all()
@@ -91,7 +88,7 @@ def test_no_command_ever_leaves_the_limits(first, last, seconds, speed):
 
 
 def test_slow_motions_keep_leg_velocities_too():
-    plan = planner().plan(REST, there_and_back(SQUAT, 0.15), 3.0)
+    plan = planner().plan(at_rest(), there_and_back(SQUAT, 0.15), 3.0)
     velocity = np.abs(np.diff(plan.q[:, 7:], axis=0)) / plan.knot_s
     assert (velocity <= HUMANOID.per_joint("velocity") * 1.001).all()
     assert plan.speed < 3.0
@@ -100,26 +97,26 @@ def test_slow_motions_keep_leg_velocities_too():
 def test_plans_join_without_a_jump():
     up = Motion(sweep({}, ARMS, 1.0)[:, TRACKED], RATE_HZ)
     bow = Motion(sweep({}, BOW, 1.0)[:, TRACKED], RATE_HZ)  # starts elsewhere than "up" ends
-    one = planner().plan(REST, up, 1.0)
+    one = planner().plan(at_rest(), up, 1.0)
     two = planner().plan(one.end, bow, 1.0)
     np.testing.assert_allclose(two.q[0], one.q[-1], atol=1e-6)
     q = np.vstack((one.q, two.q[1:]))[:, 7:]
     jump = np.abs(np.diff(q, n=2, axis=0)) / one.knot_s**2
     at_join = jump[len(one.q) - 4 : len(one.q) + 2].max()
     assert at_join < 40.0  # [rad/s^2]; a step of the posture would give thousands
-    assert np.abs(two.q[-1, 7:] - planner().plan(REST, bow, 1.0).q[-1, 7:]).max() < 1e-5
+    assert np.abs(two.q[-1, 7:] - planner().plan(at_rest(), bow, 1.0).q[-1, 7:]).max() < 1e-5
 
 
 def test_half_speed_takes_twice_as_long():
     motion = there_and_back(ARMS, 1.0)
-    full, half = (planner().plan(REST, motion, speed) for speed in (1.0, 0.5))
+    full, half = (planner().plan(at_rest(), motion, speed) for speed in (1.0, 0.5))
     assert full.duration_s == pytest.approx(motion.duration_s, abs=0.03)
     assert half.duration_s == pytest.approx(2 * motion.duration_s, abs=0.03)
     assert (full.speed, half.speed) == (1.0, 0.5)
 
 
 def test_holding_comes_to_rest_where_it_is():
-    moving = planner().plan(REST, Motion(sweep({}, ARMS, 1.0)[:60, TRACKED], RATE_HZ), 1.0)
+    moving = planner().plan(at_rest(), Motion(sweep({}, ARMS, 1.0)[:60, TRACKED], RATE_HZ), 1.0)
     assert np.abs(moving.end.velocity).max() > 0.5
     hold = planner().hold(moving.end, 1.0)
     assert np.abs(hold.end.velocity).max() < 1e-3
@@ -129,12 +126,12 @@ def test_holding_comes_to_rest_where_it_is():
 def test_plans_are_pure_and_cached():
     motion = there_and_back(BOW, 1.0)
     planner = Planner(HUMANOID)
-    first = planner.plan(REST, motion, 0.5, key="bow")
-    assert planner.plan(REST, motion, 0.5, key="bow") is first
-    fresh = Planner(HUMANOID).plan(REST, motion, 0.5)
+    first = planner.plan(at_rest(), motion, 0.5, key="bow")
+    assert planner.plan(at_rest(), motion, 0.5, key="bow") is first
+    fresh = Planner(HUMANOID).plan(at_rest(), motion, 0.5)
     assert fresh is not first
     assert fresh.commands.tobytes() == first.commands.tobytes()
-    assert planner.hold(REST, 0.5).duration_s != planner.hold(REST, 1.0).duration_s
+    assert planner.hold(at_rest(), 0.5).duration_s != planner.hold(at_rest(), 1.0).duration_s
     # the same posture recurs exactly, so that a walk in a circle is planned once
     second = planner.plan(first.end, motion, 0.5, key="bow")
     third = planner.plan(second.end, motion, 0.5, key="bow")
@@ -144,19 +141,19 @@ def test_plans_are_pure_and_cached():
 @pytest.mark.parametrize("speed", [0.0, -1.0, np.nan, np.inf])
 def test_a_bad_speed_is_refused(speed):
     with pytest.raises(InvalidValueError, match="speed must be positive"):
-        planner().plan(REST, there_and_back(BOW, 1.0), speed)
+        planner().plan(at_rest(), there_and_back(BOW, 1.0), speed)
 
 
 def test_bad_motions_are_refused():
     frames = there_and_back(BOW, 1.0).frames
     with pytest.raises(InvalidValueError, match="shape"):
-        planner().plan(REST, Motion(frames[:, :5], 100.0))
+        planner().plan(at_rest(), Motion(frames[:, :5], 100.0))
     with pytest.raises(InvalidValueError, match="shape"):
-        planner().plan(REST, Motion(frames[:1], 100.0))
+        planner().plan(at_rest(), Motion(frames[:1], 100.0))
     broken = frames.copy()
     broken[3, 4] = np.nan
     with pytest.raises(InvalidValueError, match="finite"):
-        planner().plan(REST, Motion(broken, 100.0))
+        planner().plan(at_rest(), Motion(broken, 100.0))
     whole = sweep({}, BOW, 1.0)
     with pytest.raises(InvalidValueError, match="shape"):
         planner().motion(whole[:, :5], 100.0)
@@ -183,7 +180,7 @@ def test_the_live_controller_follows_a_stream_and_balances():
     controller = StandingController(HUMANOID)
     model = HUMANOID.model()
     data = mujoco.MjData(model)
-    data.qpos[:] = REFERENCE.rest
+    data.qpos[:] = humanoid_reference().rest
     frames = np.vstack((sweep({}, BOW, 2.0), sweep(BOW, ARMS, 2.0), sweep(ARMS, {}, 2.0)))
     limits = HUMANOID.position_limits
     soles = convex_hull(np.array([[-0.09, -0.145], [0.15, -0.145], [0.15, 0.145], [-0.09, 0.145]]))
@@ -200,7 +197,7 @@ def test_the_live_controller_follows_a_stream_and_balances():
     assert np.abs(data.qpos[7:] - reference.q[7:]).max() < 0.02
     np.testing.assert_allclose(reference.target, frames[-1][TRACKED], atol=2e-3)
     # where the stream ends, the law ends where a plan does
-    planned = planner().plan(REST, Motion(frames[:, TRACKED], RATE_HZ), 1.0).end
+    planned = planner().plan(at_rest(), Motion(frames[:, TRACKED], RATE_HZ), 1.0).end
     np.testing.assert_allclose(reference.q[7:], planned.q[7:], atol=5e-3)
 
 
@@ -209,7 +206,7 @@ def test_the_live_controller_limits_velocities_and_refuses_bad_frames():
     before = controller.reference.target
     controller.update(sweep(ARMS, ARMS, 0.1)[0])  # a jump of 2.2 rad
     step = np.abs(controller.reference.target - before)
-    assert (step <= REFERENCE.velocity * 0.004 + 1e-12).all() and step.max() > 0.03
+    assert (step <= humanoid_reference().velocity * 0.004 + 1e-12).all() and step.max() > 0.03
     with pytest.raises(FrameError, match="33 values"):
         controller.update(np.zeros(5))
     with pytest.raises(FrameError, match="finite"):
@@ -217,4 +214,4 @@ def test_the_live_controller_limits_velocities_and_refuses_bad_frames():
     controller.reset()
     np.testing.assert_array_equal(controller.reference.target, before)
     with pytest.raises(InvalidValueError, match="period"):
-        UpperBodyTracker(REFERENCE.limits, REFERENCE.velocity, 0.0)
+        UpperBodyTracker(humanoid_reference().limits, humanoid_reference().velocity, 0.0)

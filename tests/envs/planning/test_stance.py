@@ -5,13 +5,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planners import planner
+from planners import at_rest, humanoid_reference, planner
 from standing_library import BOW, RATE_HZ, STANDING_M, sweep
 
 from mplearn.maths.plane import turn_in_plane
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.experiments.model_error import disturb
-from mplearn_envs.mechanics import reference_robot, rest_reference
 from mplearn_envs.mechanics.heels import bearing_corners, foot_places, raised_foot
 from mplearn_envs.mechanics.kinematics import places
 from mplearn_envs.mechanics.reference import sole_middles, soles
@@ -22,16 +21,14 @@ from mplearn_envs.robot import humanoid
 from mplearn_envs.skills.feasibility import FeasibilityCheck
 
 HUMANOID = humanoid()
-REFERENCE = reference_robot(HUMANOID)
-REST = rest_reference(HUMANOID)
 SPLIT = np.array([-0.5, 0.2, 0.0])  # the left foot behind
 
 
 def shown(place, heel, base):
     """Return the features of a posture, shape (3 + n,), and check that it is one."""
-    target = REST.target.copy()
+    target = at_rest().target.copy()
     target[:3] = STANDING_M + base[0], base[1], base[2]
-    q, worst = stand(REFERENCE, place, np.array(heel), target, 0.5)
+    q, worst = stand(humanoid_reference(), place, np.array(heel), target, 0.5)
     assert worst < 1e-3
     return np.concatenate((target[:3], q[7:]))
 
@@ -51,8 +48,11 @@ def lunge():
 @given(st.floats(-3.0, 3.0), st.floats(0.0, 1.2), st.integers(0, 1))
 def test_a_raised_heel_leaves_the_front_edge_where_it_is(yaw, heel, side):
     place = np.array([0.3, -0.2, yaw])
-    corners, flat = REFERENCE.corners[side], REFERENCE.stance.foot_rotation[side]
-    height = REFERENCE.stance.foot_position[side, 2]
+    corners, flat = (
+        humanoid_reference().corners[side],
+        humanoid_reference().stance.foot_rotation[side],
+    )
+    height = humanoid_reference().stance.foot_position[side, 2]
     before, after = (
         corners @ rotation.T + position
         for position, rotation in (
@@ -63,19 +63,23 @@ def test_a_raised_heel_leaves_the_front_edge_where_it_is(yaw, heel, side):
     length = np.ptp(corners[:, 0])
     np.testing.assert_allclose(after[2:, 2] - after[:2, 2], length * np.sin(heel), atol=1e-12)
     position, _ = raised_foot(corners, flat, height, place, heel)
-    found = foot_places(REFERENCE.corners, np.stack((place, place)), np.array([heel, heel]))[side]
+    found = foot_places(
+        humanoid_reference().corners, np.stack((place, place)), np.array([heel, heel])
+    )[side]
     np.testing.assert_allclose(found, (position[0], position[1], yaw), atol=1e-9)
 
 
 def test_who_stands_on_toes_stands_on_the_front_edge():
     flat, tilted = np.zeros(2), np.array([0.0, 0.6])
-    assert bearing_corners(REFERENCE.corners, flat) is REFERENCE.corners
-    left, right = bearing_corners(REFERENCE.corners, tilted)
-    np.testing.assert_array_equal(left, REFERENCE.corners[0])
-    assert np.ptp(right[:, 0]) == 0.0 and np.ptp(right[:, 1]) == np.ptp(REFERENCE.corners[1, :, 1])
-    moved = sole_middles(REFERENCE, REFERENCE.ground, tilted)
-    moved -= sole_middles(REFERENCE, REFERENCE.ground)
-    half = 0.5 * np.ptp(REFERENCE.corners[1, :, 0])
+    assert bearing_corners(humanoid_reference().corners, flat) is humanoid_reference().corners
+    left, right = bearing_corners(humanoid_reference().corners, tilted)
+    np.testing.assert_array_equal(left, humanoid_reference().corners[0])
+    assert np.ptp(right[:, 0]) == 0.0 and np.ptp(right[:, 1]) == np.ptp(
+        humanoid_reference().corners[1, :, 1]
+    )
+    moved = sole_middles(humanoid_reference(), humanoid_reference().ground, tilted)
+    moved -= sole_middles(humanoid_reference(), humanoid_reference().ground)
+    half = 0.5 * np.ptp(humanoid_reference().corners[1, :, 0])
     np.testing.assert_allclose(moved, [[0.0, 0.0], [half, 0.0]], atol=1e-12)
 
 
@@ -85,7 +89,7 @@ def test_stances_are_read_from_the_motion():
     np.testing.assert_allclose(motion.stance.heel[[0, -1]], [[0.5, 0.0], [0.9, 0.0]], atol=0.02)
     assert motion.footwork is None
     beside = planner().motion(sweep({}, BOW, 1.0), RATE_HZ).stance
-    np.testing.assert_array_equal(beside.place, left_from_right(REFERENCE.ground))
+    np.testing.assert_array_equal(beside.place, left_from_right(humanoid_reference().ground))
     assert not beside.heel.any()
 
 
@@ -102,14 +106,14 @@ def test_a_lunge_is_stepped_into_and_out_of_with_a_wrong_model(seed):
     simulation = Simulation(HUMANOID)
     disturb(simulation.model, 0.1, np.random.default_rng(seed))
     simulation.reset()
-    down = planner().plan(REST, lunge(), 0.5)
+    down = planner().plan(at_rest(), lunge(), 0.5)
     assert down.error.max() < 1e-3 and down.zmp_margin_m.min() > 0.01
     np.testing.assert_allclose(left_from_right(down.end.ground), SPLIT, atol=0.1)
     assert down.end.heel[0] == pytest.approx(0.9, abs=0.02) and down.end.heel[1] == 0.0
     # as one plan: no jump where one step ends and the next begins
     assert np.abs(np.diff(down.q, axis=0)).max() < 0.1
-    feet = places(REFERENCE.tree, REFERENCE.stance.feet, down.q)
-    edge = foot_places(REFERENCE.corners, down.ground, down.heel)
+    feet = places(humanoid_reference().tree, humanoid_reference().stance.feet, down.q)
+    edge = foot_places(humanoid_reference().corners, down.ground, down.heel)
     standing = down.up != 0
     np.testing.assert_allclose(feet[standing, 0, :2], edge[standing, 0, :2], atol=1e-4)
     assert not simulation.perform(down).fallen
@@ -117,13 +121,13 @@ def test_a_lunge_is_stepped_into_and_out_of_with_a_wrong_model(seed):
     assert 0.1 < back < 0.24  # the heel is up
     bow = planner().plan(down.end, planner().motion(sweep({}, BOW, 1.0), RATE_HZ), 0.5)
     assert not simulation.perform(bow).fallen
-    np.testing.assert_allclose(bow.end.ground, REFERENCE.ground, atol=0.02)
+    np.testing.assert_allclose(bow.end.ground, humanoid_reference().ground, atol=0.02)
     assert not bow.end.heel.any()
 
 
 def test_between_stances_that_are_nearly_the_same_nobody_steps():
     """The way into a lunge and the way out of it are shown 13 cm apart: the feet stay."""
-    down = planner().plan(REST, lunge(), 0.5)
+    down = planner().plan(at_rest(), lunge(), 0.5)
     nearer = np.array([SPLIT[0] + 0.13, *SPLIT[1:]])
     low, high = shown(nearer, (0.9, 0.0), (-0.3, 0, 0.1)), shown(nearer, (0.5, 0.0), (-0.1, 0, 0.1))
     rises = planner().motion(between(low, high), RATE_HZ)
@@ -136,7 +140,7 @@ def test_between_stances_that_are_nearly_the_same_nobody_steps():
     assert not simulation.perform(down).fallen and not simulation.perform(up).fallen
     # from beside each other the feet go where they are shown
     np.testing.assert_allclose(
-        left_from_right(planner().plan(REST, rises, 0.5).end.ground), nearer, atol=0.02
+        left_from_right(planner().plan(at_rest(), rises, 0.5).end.ground), nearer, atol=0.02
     )
 
 
@@ -167,7 +171,7 @@ def touching(plan):
 def test_out_of_a_wide_stance_a_turned_foot_does_not_meet_the_other(pitch, roll):
     wide = np.array([*turn_in_plane(0.0, 0.41, 0.15), 0.29])
     frames = np.tile(shown(wide, (0.0, 0.0), (-0.1, 0.0, 0.1)), (50, 1))
-    stands = planner().plan(REST, planner().motion(frames, RATE_HZ), 0.5).end
+    stands = planner().plan(at_rest(), planner().motion(frames, RATE_HZ), 0.5).end
     inwards = {"hip_pitch_r": pitch, "hip_roll_r": roll, "hip_yaw_r": -0.5}
     knee_up = {"hip_pitch_l": -1.2, "knee_l": 1.4}
     raises, exchanges = (
@@ -229,7 +233,7 @@ def test_who_sits_down_without_a_chair_leans_as_far_as_must_be():
     assert FeasibilityCheck(planner()).judge(motion, 0.5).feasible
     simulation = Simulation(HUMANOID)
     simulation.reset()
-    assert not simulation.perform(planner().plan(REST, motion, 0.5)).fallen
+    assert not simulation.perform(planner().plan(at_rest(), motion, 0.5)).fallen
     assert soles(HUMANOID, simulation.data.qpos)[..., 2].max() < 0.005
     shallow = sweep({}, {"base_height": -0.1}, 1.0)
     np.testing.assert_array_equal(planner().motion(shallow, RATE_HZ).frames[:, 0], shallow[:, 0])

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planners import planner
+from planners import at_rest, humanoid_reference, planner
 from standing_library import KICK, RATE_HZ, posture, sweep
 
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.experiments.model_error import disturb
-from mplearn_envs.mechanics import reference_robot, rest_reference
 from mplearn_envs.mechanics.gravity import holding_torques
 from mplearn_envs.mechanics.kinematics import places
 from mplearn_envs.mechanics.pendulum import JERK_WEIGHT, plan_cog, zmp_along
@@ -22,8 +21,6 @@ from mplearn_envs.planning.stride import landing, passing
 from mplearn_envs.robot import humanoid
 
 HUMANOID = humanoid()
-REFERENCE = reference_robot(HUMANOID)
-REST = rest_reference(HUMANOID)
 KNEE_UP = {"hip_pitch_r": -1.2, "knee_r": 1.4, "shoulder_pitch_l": -0.6}
 
 
@@ -53,9 +50,9 @@ def step(side, before, after, speed_hz=100.0):
     rise = np.zeros((101, 2))
     rise[:, side] = 0.06 * np.sin(np.pi * x) ** 2
     up = np.flatnonzero(rise[:, side] > 1e-6)
-    legs = np.repeat(REST.swing[None, :-2], 101, axis=0)
+    legs = np.repeat(at_rest().swing[None, :-2], 101, axis=0)
     lifts = (Lift(side, int(up[0]), int(up[-1]) + 1),)
-    frames = np.repeat(REST.target[None], 101, axis=0)
+    frames = np.repeat(at_rest().target[None], 101, axis=0)
     return Motion(frames, speed_hz, Footwork(legs, rise, apart, lifts))
 
 
@@ -85,7 +82,7 @@ def test_feet_are_seen_from_each_other():
     frame = posture({"hip_yaw_l": 0.4, "hip_roll_l": 0.3})
     footwork = read_footwork(HUMANOID, np.stack((frame, frame)), RATE_HZ)
     q = np.concatenate(([0.0, 0.0, frame[0], 1.0, 0.0, 0.0, 0.0], frame[3:]))
-    left, right = places(REFERENCE.tree, REFERENCE.stance.feet, q[None])[0]
+    left, right = places(humanoid_reference().tree, humanoid_reference().stance.feet, q[None])[0]
     np.testing.assert_allclose(footwork.left_from_right[0], left - right, atol=1e-12)
 
 
@@ -126,7 +123,7 @@ def test_the_pendulums_plan_is_the_least_squares_optimum(settled):
 @pytest.mark.parametrize("speed", [0.5, 1.0])
 def test_a_raised_knee_is_performed_held_and_lowered(speed):
     simulation = started(seed=1)
-    up = planner().plan(REST, raising(), speed)
+    up = planner().plan(at_rest(), raising(), speed)
     assert up.end.lifted == 1 and up.error.max() < 1e-6 and up.zmp_margin_m.min() > 0.02
     first = simulation.perform(up)
     held = simulation.perform(planner().hold(up.end, 3.0))
@@ -146,8 +143,8 @@ def test_a_raised_knee_is_performed_held_and_lowered(speed):
 
 
 def test_the_weight_need_not_return_to_the_middle():
-    down = planner().plan(planner().plan(REST, raising(), 1.0).end, lowering(), 1.0)
-    left, _ = sole_middles(REFERENCE, REFERENCE.ground)
+    down = planner().plan(planner().plan(at_rest(), raising(), 1.0).end, lowering(), 1.0)
+    left, _ = sole_middles(humanoid_reference(), humanoid_reference().ground)
     assert abs(down.cog[-1, 1] - left[1]) < 0.07
     hold = planner().hold(down.end, 2.0)
     assert abs(hold.cog[-1, 1]) < 1e-4
@@ -155,7 +152,7 @@ def test_the_weight_need_not_return_to_the_middle():
 
 
 def test_where_another_foot_is_up_it_is_exchanged_first():
-    up = planner().plan(REST, raising(), 1.0)
+    up = planner().plan(at_rest(), raising(), 1.0)
     left = {name.replace("_r", "_l"): value for name, value in KNEE_UP.items()}
     motion = planner().motion(sweep(left, {}, 1.0), RATE_HZ)
     plan = planner().plan(up.end, motion, 1.0)
@@ -170,7 +167,7 @@ def test_the_weight_takes_the_time_it_needs_from_where_it_rests():
     """After a foot has landed quickly the weight is still over the other one."""
     knee = {"hip_pitch_l": -1.2, "knee_l": 1.4}
     other = planner().motion(sweep({}, knee, 0.8), RATE_HZ)
-    here = planner().plan(planner().plan(REST, raising(), 2.0).end, lowering(), 2.0).end
+    here = planner().plan(planner().plan(at_rest(), raising(), 2.0).end, lowering(), 2.0).end
     plan = planner().plan(here, other, 2.0)
     moving = np.linalg.norm(plan.zmp - plan.cog[:, :2], axis=1)
     config = planner().config
@@ -186,7 +183,7 @@ def test_a_foot_passes_the_other_one_and_does_not_meet_it():
     inwards = LEG_AHEAD | {"hip_roll_r": 0.25}
     raise_it = planner().motion(sweep({}, inwards, 1.0), RATE_HZ)
     still = planner().motion(np.stack([posture({})] * 50), RATE_HZ)
-    up = planner().plan(REST, raise_it, 0.5)
+    up = planner().plan(at_rest(), raise_it, 0.5)
     down = planner().plan(up.end, still, 0.5)
     for plan in (up, down):
         assert plan.error.max() < 0.01
@@ -203,7 +200,7 @@ def test_a_foot_passes_the_other_one_and_does_not_meet_it():
 def test_out_of_a_deep_squat_the_robot_rises_before_it_raises_a_leg():
     deep = planner().motion(sweep({}, {"base_height": -0.38, "base_pitch": 0.6}, 1.0), RATE_HZ)
     held = planner().motion(np.stack([posture(LEG_AHEAD)] * 50), RATE_HZ)
-    squat = planner().plan(REST, deep, 0.5)
+    squat = planner().plan(at_rest(), deep, 0.5)
     assert squat.error.max() < 1e-3
     plan = planner().plan(squat.end, held, 0.5)
     assert plan.end.lifted == 1 and plan.error.max() < 0.01
@@ -222,12 +219,14 @@ WALKS = {
 @pytest.mark.parametrize("name", WALKS)
 def test_steps_end_where_the_motion_ends_them(name):
     simulation = started(seed=3)
-    here = REST
+    here = at_rest()
     for side, before, after in WALKS[name]:
         plan = planner().plan(here, step(side, before, after), 1.0)
         assert not simulation.perform(plan).fallen
         here = plan.end
-    left, right = places(REFERENCE.tree, REFERENCE.stance.feet, simulation.data.qpos[None])[0]
+    left, right = places(
+        humanoid_reference().tree, humanoid_reference().stance.feet, simulation.data.qpos[None]
+    )[0]
     c, s = np.cos(right[2]), np.sin(right[2])
     x, y, turn = left - right
     wanted = WALKS[name][-1][2]
@@ -239,11 +238,12 @@ def test_steps_end_where_the_motion_ends_them(name):
 
 def test_a_foot_lands_beside_the_other_not_on_it():
     ground = np.array([[0.3, 0.09, 0.0], [0.0, -0.09, 0.0]])
-    place = landing(REFERENCE, ground, 0, np.array([0.0, 0.05, 0.0]))
-    width = np.ptp(REFERENCE.corners[0, :, 1])
+    place = landing(humanoid_reference(), ground, 0, np.array([0.0, 0.05, 0.0]))
+    width = np.ptp(humanoid_reference().corners[0, :, 1])
     assert place[1] + 0.09 > width
     np.testing.assert_array_equal(  # almost where it stood is where it stood
-        landing(REFERENCE, REFERENCE.ground, 1, np.array([0.03, 0.2, 0.1])), REFERENCE.ground[1]
+        landing(humanoid_reference(), humanoid_reference().ground, 1, np.array([0.03, 0.2, 0.1])),
+        humanoid_reference().ground[1],
     )
 
 
@@ -257,7 +257,7 @@ def test_a_foot_that_moves_over_the_floor_is_clear_of_it():
     rise = SLOW.footwork.rise.copy()
     rise[:, 1] = np.where(rise[:, 1] > 0, np.maximum(rise[:, 1] ** 2 / 0.06, 0.015), 0.0)
     motion = SLOW._replace(footwork=SLOW.footwork._replace(rise=rise, lifts=(lift,)))
-    plan = planner().plan(REST, motion, 0.5)
+    plan = planner().plan(at_rest(), motion, 0.5)
     moves = np.linalg.norm(np.diff(plan.ground[:, 1, :2], axis=0), axis=1) / plan.knot_s
     heights = np.array([soles(HUMANOID, q)[1, :, 2].min() for q in plan.q[1:]])
     assert moves.max() > 0.2
@@ -268,17 +268,17 @@ def test_a_foot_is_led_round_the_other_one():
     stands = np.array([0.0, -0.09, 0.0])
     x = np.linspace(0.0, 1.0, 50)[:, None]
     way = np.array([-0.45, 0.03, 0.0]) * (1 - x) + np.array([0.45, 0.03, 0.0]) * x
-    led = passing(REFERENCE, stands, 0, way)
-    length, width, _ = np.ptp(REFERENCE.corners[0], axis=0)
+    led = passing(humanoid_reference(), stands, 0, way)
+    length, width, _ = np.ptp(humanoid_reference().corners[0], axis=0)
     beside = np.abs(led[:, 0]) < length
     assert (led[beside, 1] + 0.09 > width + 0.019).all()
     np.testing.assert_array_equal(led[[0, -1]], way[[0, -1]])
-    right = passing(REFERENCE, stands * (1, -1, 1), 1, way * (1, -1, 1))
+    right = passing(humanoid_reference(), stands * (1, -1, 1), 1, way * (1, -1, 1))
     np.testing.assert_allclose(right, led * (1, -1, 1), atol=1e-15)
 
 
 def test_strides_follow_each_other_without_a_fall():
-    simulation, here = started(), REST
+    simulation, here = started(), at_rest()
     for motion in (SLOW, OTHER, SLOW, OTHER):
         plan = planner().plan(here, motion, 0.4)
         assert plan.error.max() < 0.01 and plan.zmp_margin_m.min() > 0.01
@@ -291,7 +291,7 @@ def test_what_cannot_be_done_from_a_stride_is_done_from_where_the_feet_are_side_
     squat = {"base_height": -0.2, "shoulder_pitch_l": -1.0}
     deep = planner().motion(sweep({}, squat, 2.0), RATE_HZ)
     simulation = started()
-    stride = planner().plan(REST, SLOW, 0.4)
+    stride = planner().plan(at_rest(), SLOW, 0.4)
     assert abs(stride.end.ground[0, 0] - stride.end.ground[1, 0]) > 0.3
     plan = planner().plan(stride.end, deep, 0.5)
     assert plan.error.max() < 0.01
@@ -299,9 +299,9 @@ def test_what_cannot_be_done_from_a_stride_is_done_from_where_the_feet_are_side_
 
 
 def test_steps_are_a_pure_function_and_cached():
-    first = planner().plan(REST, raising(), 0.5, key="raise")
-    assert planner().plan(REST, raising(), 0.5, key="raise") is first
-    fresh = Planner(HUMANOID).plan(REST, raising(), 0.5)
+    first = planner().plan(at_rest(), raising(), 0.5, key="raise")
+    assert planner().plan(at_rest(), raising(), 0.5, key="raise") is first
+    fresh = Planner(HUMANOID).plan(at_rest(), raising(), 0.5)
     assert fresh.commands.tobytes() == first.commands.tobytes()
     states = []
     for _ in range(2):
@@ -313,14 +313,14 @@ def test_steps_are_a_pure_function_and_cached():
 
 def test_holding_torques_are_those_of_a_robot_on_one_foot():
     simulation = started()
-    up = planner().plan(REST, raising(), 0.5)
+    up = planner().plan(at_rest(), raising(), 0.5)
     simulation.perform(up)
     hold = planner().hold(up.end, 2.0)
     simulation.perform(hold)
-    middles = sole_middles(REFERENCE, hold.ground[-1:])
-    expected = holding_torques(REFERENCE, hold.q[-1:], hold.share[-1:], hold.cog[-1:, :2], middles)[
-        0
-    ]
+    middles = sole_middles(humanoid_reference(), hold.ground[-1:])
+    expected = holding_torques(
+        humanoid_reference(), hold.q[-1:], hold.share[-1:], hold.cog[-1:, :2], middles
+    )[0]
     assert np.abs(expected).max() > 20.0
     np.testing.assert_allclose(simulation.data.actuator_force, expected, atol=2.5)
 
@@ -330,7 +330,7 @@ def test_feedback_of_the_ankles_damps_a_push():
     for feedback in ("never", "always"):
         simulation = started(feedback=feedback)
         simulation.data.qvel[0] += 0.12
-        performance = simulation.perform(planner().hold(REST, 1.0))
+        performance = simulation.perform(planner().hold(at_rest(), 1.0))
         assert not performance.fallen
         largest[feedback] = performance.cog_deviation_m.max()
     assert largest["always"] < 0.9 * largest["never"]
@@ -349,12 +349,12 @@ unit = st.floats(0.0, 1.0)
 def test_no_command_ever_leaves_the_limits_on_one_foot_either(first, last, seconds, speed):
     """Any motion of the whole body between any two postures."""
     limits = HUMANOID.position_limits
-    low = np.concatenate((REFERENCE.limits[:3, 0], limits[:, 0]))
-    high = np.concatenate((REFERENCE.limits[:3, 1], limits[:, 1]))
+    low = np.concatenate((humanoid_reference().limits[:3, 0], limits[:, 0]))
+    high = np.concatenate((humanoid_reference().limits[:3, 1], limits[:, 1]))
     ends = np.array([first, last]) * 1.2 - 0.1
     x = np.linspace(0, 1, max(2, round(50 * seconds)))[:, None]
     frames = low + (ends[0] * (1 - x) + ends[1] * x) * (high - low)
-    plan = planner().plan(REST, planner().motion(frames, 50.0), speed)
+    plan = planner().plan(at_rest(), planner().motion(frames, 50.0), speed)
     assert np.isfinite(plan.commands).all()
     assert (plan.commands >= limits[:, 0]).all() and (plan.commands <= limits[:, 1]).all()
     assert len(plan.commands) == (len(plan.q) - 1) * 5 and np.isfinite(plan.end.q).all()
