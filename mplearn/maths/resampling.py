@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..errors import InvalidValueError
 from ..recording import FloatArray
 from .compiling import njit
+
+_ROUNDING = 1e-6  # of a place [frame]
 
 
 def interpolate_linearly(frames: FloatArray, places: FloatArray) -> FloatArray:
@@ -18,12 +21,20 @@ def interpolate_linearly(frames: FloatArray, places: FloatArray) -> FloatArray:
     Returns:
         Shape (P, D).
 
+    Raises:
+        InvalidValueError: A place lies before the first frame or behind the last one.
+
     Example:
         >>> interpolate_linearly(np.array([[0.0], [1.0], [3.0]]), np.array([0.5, 1.5, 2.0]))
         array([[0.5],
                [2. ],
                [3. ]])
     """
+    last = len(frames) - 1
+    if len(places) and not (places.min() > -_ROUNDING and places.max() < last + _ROUNDING):
+        raise InvalidValueError(
+            f"places must lie in [0, {last}], not {places.min()} to {places.max()}"
+        )
     return _interpolated(np.array(frames, np.float64, order="C", copy=None), places)
 
 

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import interp1d, make_interp_spline
 
+from mplearn.errors import InvalidValueError
 from mplearn.maths.easing import minimum_jerk, smooth_step
 from mplearn.maths.resampling import bridge_gaps, interpolate_linearly, stretch
 from mplearn.maths.splines import interpolate
@@ -46,6 +47,14 @@ def test_beside_a_gap_stands_its_edge():
     frames = np.array([[0.0], [1.0], [np.nan], [np.nan], [4.0]])
     found = interpolate_linearly(frames, np.array([0.5, 1.2, 1.5, 2.5, 3.4, 3.5, 3.9]))
     np.testing.assert_array_equal(found.ravel(), [0.5, 1.0, np.nan, np.nan, np.nan, 4.0, 4.0])
+
+
+@pytest.mark.parametrize("place", [-0.1, 2.1, np.nan, np.inf])
+def test_there_is_nothing_before_the_first_frame_or_behind_the_last(place):
+    with pytest.raises(InvalidValueError, match=r"places must lie in \[0, 2\]"):
+        interpolate_linearly(np.zeros((3, 1)), np.array([0.0, place]))
+    with pytest.raises(InvalidValueError, match="places"):
+        stretch(np.zeros((0, 1)), 4)
 
 
 @settings(deadline=None)
