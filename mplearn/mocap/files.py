@@ -82,7 +82,7 @@ def _is(path: Path, kind: Callable[[int], bool]) -> bool:
 
 
 def head(path: Path, n_bytes: int = 8192) -> bytes:
-    """Return the start of a file, unpacked where its name ends in ``.gz``; empty if unreadable."""
+    """Return the start of a file, unpacked where it is gzipped; empty if unreadable."""
     if not is_file(path):
         return b""
     try:
@@ -99,16 +99,18 @@ def head_text(path: Path, n_bytes: int = 8192) -> str:
 
 
 def read_bytes(path: Path) -> bytes:
-    """Return the content of a file, unpacked where its name ends in ``.gz``.
+    """Return the content of a file, unpacked where it is gzipped, whatever its name.
 
     Raises:
-        RecordingError: The file is missing, empty, unreadable, no regular file, or a gzip file that
-            is damaged or expands beyond what measured motion does.
+        RecordingError: The file is missing, empty, unreadable, no regular file, a gzip file that
+            is damaged or expands beyond what measured motion does, or what was saved instead of a
+            recording: a pointer to it, a page of the web, an archive.
     """
     if not is_file(path):
         raise bad_file(path, "no such file", "a readable file")
-    packed = path.suffix.lower() == ".gz"
+    packed = False
     try:
+        packed = _is_packed(path)
         limit = path.stat().st_size
         if packed:
             limit = max(_SMALL_BYTES, _MOST_PACKED * limit)
@@ -135,8 +137,6 @@ def _refuse_other_files(path: Path, data: bytes) -> None:
             raise bad_file(path, f"it is {found}, not a recording", expected)
     if data.startswith(_ZIP) and suffix(path) != ".npz":
         raise bad_file(path, "it is a zip archive", "the file that is packed in it")
-    if data.startswith(_GZIP):
-        raise bad_file(path, "it is packed by gzip", f"the name {path.name}.gz, or it unpacked")
 
 
 def read_text(path: Path) -> str:
@@ -184,7 +184,13 @@ def _plain(data: bytes) -> bytes:
 
 
 def _opened(path: Path) -> BufferedIOBase:
-    return gzip.open(path) if path.suffix.lower() == ".gz" else path.open("rb")
+    return gzip.open(path) if _is_packed(path) else path.open("rb")
+
+
+def _is_packed(path: Path) -> bool:
+    """Whether a file is gzipped: browsers unpack what they load, and leave its name."""
+    with path.open("rb") as file:
+        return file.read(len(_GZIP)) == _GZIP
 
 
 def _ungzipped(path: Path) -> str:

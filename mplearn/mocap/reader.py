@@ -73,6 +73,8 @@ class Reader(ABC):
     Attributes:
         format: Name of the format or dialect, for reports and messages.
         suffixes: The file suffixes of the format, lower case, without ``.gz``.
+        begins: How the text of all its files begins, upper case, where that tells the format
+            whatever a file is called.
 
     Example:
         >>> class Shouts(Reader):
@@ -89,6 +91,7 @@ class Reader(ABC):
 
     format: ClassVar[str]
     suffixes: ClassVar[tuple[str, ...]]
+    begins: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:

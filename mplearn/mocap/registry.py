@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from pathlib import Path
 
 from ..errors import InvalidValueError, RecordingError
 from ..plugins import join_installed
-from .files import bad_file, is_file, suffix
+from .files import bad_file, head_text, is_file, read_bytes, suffix
 from .reader import Reader
 
 ENTRY_POINTS = "mplearn.readers"
 """Group of the entry points by which an installed package brings readers (classes) of its own."""
+
+_XML = re.compile(r"<\?XML[^>]*>\s*")
+_TELLING = 256  # bytes, in which formats that name themselves do
 
 _registered: list[Reader] = []  # the latest is asked first
 
@@ -69,11 +73,17 @@ def suffixes() -> tuple[str, ...]:
     return tuple(sorted({ending for reader in readers() for ending in reader.suffixes}))
 
 
-def reader_of(path: Path) -> Reader | None:
-    """Return the reader that takes a file; None for none."""
-    if not is_file(path):
+def reader_of(path: Path, *, any_suffix: bool = False) -> Reader | None:
+    """Return the reader that takes a file; None for none.
+
+    Args:
+        path: The file.
+        any_suffix: Whether its start may tell its format where its suffix is nobody's.
+    """
+    if not is_file(path) or not (any_suffix or suffix(path) in suffixes()):
         return None
-    fitting = (r for r in readers() if suffix(path) in r.suffixes)
+    start = _XML.sub("", head_text(path, _TELLING).lstrip().upper())
+    fitting = (r for r in readers() if suffix(path) in r.suffixes or start.startswith(r.begins))
     return next((reader for reader in fitting if reader.accepts(path)), None)
 
 
@@ -81,12 +91,13 @@ def reader_for(path: Path) -> Reader:
     """Return the reader for a file that is meant to be read; the most general one in doubt.
 
     Raises:
-        RecordingError: No reader knows its suffix.
+        RecordingError: No reader knows its suffix, or its start.
     """
-    found = reader_of(path)
+    found = reader_of(path, any_suffix=True)
     if found is None:
         fitting = [r for r in readers() if suffix(path) in r.suffixes]
         if not fitting:
+            read_bytes(path)  # tells what was saved instead of a recording
             raise bad_file(
                 path, f"unknown suffix {suffix(path)!r}", f"one of {', '.join(suffixes())}"
             )

@@ -903,7 +903,6 @@ def test_an_mvnx_file_that_was_cut_off(tmp_path: Path, cut: int) -> None:
     [
         (b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n", "Git LFS"),
         (b"\n<!DOCTYPE html>\n<html><body>404</body></html>\n", "page of the web"),
-        (gzip.compress(b"time_s,elbow\n0,1\n"), "packed by gzip"),
     ],
 )
 def test_what_was_saved_instead_of_a_recording_is_called_so(

@@ -52,7 +52,7 @@ class MotiveReader(Reader):
         rate = said.get("export frame rate") or said.get("capture frame rate") or ""
         unit = named_unit(said.get("length units", ""))
         space = Space(unit or 1.0, "y", "x", says_unit=unit is not None)
-        said_hz = number(path, rate, "Export Frame Rate") if rate else None
+        said_hz = number(path, rate.replace(",", "."), "Export Frame Rate") if rate else None
         return read_block(sheet, block, said_hz, space, hints, findings)
 
 

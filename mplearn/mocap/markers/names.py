@@ -16,8 +16,8 @@ _UNIDENTIFIED = re.compile(
     r"[-*~?.]+\d*|un(?:labell?ed|named|ident(?:ified)?|known)(?![a-z]).*|uname\*?\d*|new[ _]\d+",
     re.I,
 )
-_SEPARATORS = ":|"
-WORD_MARKS = ":_.- "
+_SEPARATORS = ":|/"
+WORD_MARKS = ":_.-/ "
 """What stands between the words of a label."""
 
 

@@ -33,6 +33,7 @@ class TRCReader(Reader):
 
     format = "TRC"
     suffixes = (".trc",)
+    begins = ("PATHFILETYPE",)
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read the markers; see `Reader.read`."""

@@ -50,6 +50,7 @@ class MVNXReader(Reader):
 
     format = "MVNX"
     suffixes = (".mvnx",)
+    begins = ("<MVNX",)
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read angles, or where the segments' origins and ends are; see `Reader.read`."""

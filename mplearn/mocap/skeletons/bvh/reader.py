@@ -56,6 +56,7 @@ class BVHReader(Reader):
 
     format = "BVH"
     suffixes = (".bvh",)
+    begins = ("HIERARCHY",)
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read angles, or positions by forward kinematics; see `Reader.read`."""
