@@ -124,9 +124,13 @@ def read_bytes(path: Path) -> bytes:
     if packed and len(data) > limit:
         raise bad_file(path, f"expands to more than {limit} bytes", "a recording of motion")
     if not data.strip():
-        raise bad_file(path, "the file is empty", f"a {suffix(path)} recording")
+        raise _empty(path)
     _refuse_other_files(path, data)
     return data
+
+
+def _empty(path: Path) -> RecordingError:
+    return bad_file(path, "the file is empty", f"a {suffix(path)} recording")
 
 
 def _refuse_other_files(path: Path, data: bytes) -> None:
@@ -152,6 +156,8 @@ def read_text(path: Path) -> str:
         'time_s,coude gauche\n'
     """
     data = _plain(read_bytes(path)).rstrip(_NOTHING)
+    if not data.strip():
+        raise _empty(path)
     if b"\0" in data:
         raise bad_file(path, "the file is binary", f"the text of a {suffix(path)} recording")
     if len(data) > _LARGE_BYTES:

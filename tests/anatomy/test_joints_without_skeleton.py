@@ -131,6 +131,43 @@ def test_who_is_mirrored_is_refused(joints: Recording) -> None:
         recognise(replace(joints, frames=mirrored.reshape(len(joints), -1)))
 
 
+CALLED = {  # as Kinect's are, which are known by their names where they are noisy
+    **dict(zip(("Hips", "Spine", "Neck_end"), ("HipCenter", "Spine", "Head"), strict=True)),
+    **{
+        f"{side}{joint}": f"{name}{side}"
+        for side in ("Left", "Right")
+        for joint, name in (
+            *(("Arm", "Shoulder"), ("ForeArm", "Elbow"), ("Hand", "Wrist")),
+            *(("UpLeg", "Hip"), ("Leg", "Knee"), ("Foot", "Ankle"), ("Toe", "Foot")),
+        )
+    },
+}
+
+
+@pytest.mark.parametrize("feet", [True, False], ids=["feet", "knees"])
+def test_who_is_mirrored_and_noisy_is_refused(joints: Recording, feet: bool) -> None:
+    kept = [joint for joint in CALLED if feet or not joint.endswith("Toe")]
+    rng = np.random.default_rng(2)
+    points = joints.markers[:, [JOINTS.index(joint) for joint in kept]]
+    points = points + 0.01 * rng.normal(size=points.shape)
+    channels = marker_channels(tuple(CALLED[joint] for joint in kept))
+    right = replace(joints, frames=points.reshape(len(points), -1), channels=channels)
+    assert "knee_l" in recognise(right).places
+    mirrored = points * [1.0, -1.0, 1.0]
+    with pytest.raises(BodyError, match=r"left-handed \(Hints\(mirrored="):
+        recognise(replace(right, frames=mirrored.reshape(len(points), -1)))
+
+
+def test_who_lies_prone_for_a_while_is_not_mirrored(joints: Recording) -> None:
+    points = joints.markers[:, [JOINTS.index(joint) for joint in CALLED]]
+    points[len(points) // 4 :] = points[len(points) // 4 :] @ np.array(
+        [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]  # falls on the face
+    )
+    points += 0.01 * np.random.default_rng(2).normal(size=points.shape)
+    channels = marker_channels(tuple(CALLED.values()))
+    recognise(replace(joints, frames=points.reshape(len(points), -1), channels=channels))
+
+
 def test_what_does_not_hang_together_has_no_bones(truth: Truth, joints: Recording) -> None:
     assert with_bones(truth.markers) is None  # on skin
     still = np.repeat(joints.frames[:1], 50, axis=0)
