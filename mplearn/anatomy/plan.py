@@ -21,6 +21,7 @@ from .proportions import ARM, LEG, STRANGE, LimbLaw, fit_limb
 SHORTEST_PAIR = 0.18  # of the longest way: fingers and eyes are shorter pairs than limbs
 MOST_NODES = 16  # of a limb that are looked at
 NAMED = 2.0  # what a name is worth, in the logarithm of odds
+CARRIED, RIGID = 6.0, 0.004  # what it costs never to move, as wings; of the longest way
 UPRIGHT = 2.0  # what it is worth that arms are above legs
 NECK, AS_LIKELY = 0.5, 0.25  # how high a neck is, how far beside it ways may begin: of the trunk
 PAIRED, SIDEWAYS = 1.0, 0.8  # what it costs a head to come in two, side by side: cosine
@@ -134,6 +135,7 @@ def _plan(tree: JointTree, legs: _Ways | None, arms: _Ways | None, reach: float)
     found_legs = _limbs(tree, legs, LEG, 1)
     found_arms = _limbs(tree, arms, ARM, -1)
     cost += sum(pair.cost if pair else 0.5 * STRANGE for pair in (found_legs, found_arms))
+    cost += sum(CARRIED for ways in (legs, arms) if ways is not None and _is_rigid(tree, ways))
     spine: tuple[int, ...] = ()
     head: tuple[int, ...] = ()
     if legs is not None and arms is None:
@@ -172,6 +174,14 @@ def _limbs(tree: JointTree, pair: _Ways | None, law: LimbLaw, legs: int) -> Limb
         outer=_sides(chains, lambda c: c[last + 1 :]),
         cost=limb.cost - NAMED * legs * says_leg(names),
     )
+
+
+def _is_rigid(tree: JointTree, pair: _Ways) -> bool:
+    """Whether two branches never move, neither against each other nor against where they part."""
+    root, ways = pair
+    points = tree.points[:, [root, *ways[0], *ways[-1]]]
+    between = np.linalg.norm(points[:, :, None] - points[:, None], axis=3)
+    return bool(np.ptp(between, axis=0).max() < RIGID * tree.extent)
 
 
 def _sides(chains: Sequence[tuple[int, ...]], part):  # type: ignore[no-untyped-def]

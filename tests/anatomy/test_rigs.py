@@ -74,6 +74,16 @@ def test_what_rises_above_an_unnamed_head_is_no_head(tmp_path, truth, costume, a
     assert body.stature_m == pytest.approx(truth.body.height_m, rel=0.02)
 
 
+@pytest.mark.parametrize("costume", ["wings", "high"])
+def test_what_never_moves_is_no_arm(tmp_path, truth, costume):
+    """Wings are longer than arms, and here as like them as arms without hands."""
+    rig = Rig(names="numbers", costume=(costume,), without=("ends",))
+    path = write_rig(tmp_path / "rig.bvh", truth.body, truth.postures[::3], 25.0, rig)
+    body = recognise(open_recording(path, positions=True, hints=Hints(unit_m=0.01, up_axis="y")))
+    used = {name for _, names in body.parts for name in names}
+    assert not [name for name in used if name.startswith(costume)]
+
+
 def test_left_and_right_are_told_by_facing_not_by_names(tmp_path, truth):
     """The numbers of `numbers` say nothing; sides are those of the person."""
     body = recognise(opened(tmp_path, truth, Rig(names="numbers", reverse=True)))
