@@ -1,5 +1,5 @@
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 import pytest
@@ -48,17 +48,21 @@ def primitive(id, source, target, seed=0):
     return Example(id, fit(motions, 8), tuple(motions), float(np.mean(lengths)) / RATE)
 
 
-PATH = [primitive(4, 0, 1), primitive(7, 1, 2), primitive(7, 1, 2), primitive(9, 2, 0)]
+@cache
+def walk():
+    return [primitive(4, 0, 1), primitive(7, 1, 2), primitive(7, 1, 2), primitive(9, 2, 0)]
+
+
 rng = np.random.default_rng
 
 
 @pytest.mark.parametrize("style", STYLES)
 def test_every_style_performs_the_path(style):
-    motion = generate(PATH, CHANNELS, RATE, style=style, rng=rng(0))
+    motion = generate(walk(), CHANNELS, RATE, style=style, rng=rng(0))
     assert motion.path == (4, 7, 7, 9)
     durations = np.diff(np.append(motion.starts, len(motion))) / RATE
-    np.testing.assert_allclose(durations, [p.mean_duration_s for p in PATH], atol=1 / RATE)
-    for position, one in enumerate(PATH):
+    np.testing.assert_allclose(durations, [p.mean_duration_s for p in walk()], atol=1 / RATE)
+    for position, one in enumerate(walk()):
         piece = motion.piece(position)
         assert set(piece.primitive_ids.tolist()) == {one.id}
     # each primitive ends where it was demonstrated to end (7 after 7 has to jump back first)
@@ -69,7 +73,7 @@ def test_every_style_performs_the_path(style):
 @pytest.mark.parametrize("style", STYLES)
 @pytest.mark.parametrize("rate_hz", [20.0, 31.7, 250.0])
 def test_any_rate_gives_the_same_motion(style, rate_hz):
-    path = PATH[:2]
+    path = walk()[:2]
     at_own = generate(path, CHANNELS, RATE, style=style, rng=rng(1))
     other = generate(path, CHANNELS, RATE, style=style, rng=rng(1), rate_hz=rate_hz)
     assert other.duration_s == pytest.approx(at_own.duration_s, abs=2 / rate_hz)
@@ -84,7 +88,7 @@ def test_any_rate_gives_the_same_motion(style, rate_hz):
 @settings(max_examples=15, deadline=None)
 @given(start=st.lists(st.floats(-3, 3), min_size=3, max_size=3))
 def test_a_given_posture_is_the_first_frame_and_nothing_jumps(style, start):
-    motion = generate(PATH[:2], CHANNELS, RATE, style=style, rng=rng(2), start=np.array(start))
+    motion = generate(walk()[:2], CHANNELS, RATE, style=style, rng=rng(2), start=np.array(start))
     np.testing.assert_allclose(motion.frames[0], start, atol=1e-5)
     np.testing.assert_allclose(motion.frames[1], start, atol=0.05)  # and from rest
     furthest = np.abs(np.array(start) - POSTURES[0]).max() + 1.5
@@ -93,7 +97,7 @@ def test_a_given_posture_is_the_first_frame_and_nothing_jumps(style, start):
 
 
 def test_deterministic_unfiltered_is_the_papers():
-    one = PATH[0]
+    one = walk()[0]
     motion = generate([one], CHANNELS, RATE, cutoff_hz=np.inf)
     postures, stays = np.unique(motion.frames, axis=0, return_counts=True)
     assert len(postures) == one.hmm.n_states
@@ -108,9 +112,9 @@ def test_deterministic_unfiltered_is_the_papers():
 
 
 def test_filtered_deterministic_is_the_filter_of_the_steps():
-    steps = generate(PATH, CHANNELS, RATE, cutoff_hz=np.inf)
+    steps = generate(walk(), CHANNELS, RATE, cutoff_hz=np.inf)
     np.testing.assert_array_equal(
-        generate(PATH, CHANNELS, RATE, cutoff_hz=4.0).frames, lowpass(steps.frames, RATE, 4.0)
+        generate(walk(), CHANNELS, RATE, cutoff_hz=4.0).frames, lowpass(steps.frames, RATE, 4.0)
     )
 
 
@@ -118,7 +122,7 @@ def test_smooth_beats_the_papers_in_error_and_in_jerk():
     errors, jerks = {}, {}
     held_out = demonstration(0, 1, 103, rng(99), noise=0.0)
     for style in ("deterministic", "smooth"):
-        motion = generate(PATH[:1], CHANNELS, RATE, style=style)
+        motion = generate(walk()[:1], CHANNELS, RATE, style=style)
         errors[style] = np.sqrt(np.mean((motion.frames - held_out) ** 2))
         jerks[style] = np.abs(np.diff(motion.frames, n=3, axis=0)).mean()
     assert errors["smooth"] < 0.5 * errors["deterministic"]
@@ -127,7 +131,7 @@ def test_smooth_beats_the_papers_in_error_and_in_jerk():
 
 
 def test_nearest_replays_an_exemplar():
-    one = PATH[0]
+    one = walk()[0]
     motion = generate([one], CHANNELS, RATE, style="nearest")
     n = len(motion)
     distances = []
@@ -142,21 +146,21 @@ def test_nearest_replays_an_exemplar():
 
 def test_averaged_is_reproducible_and_tends_to_the_expected_motion():
     few = [
-        generate(PATH[:1], CHANNELS, RATE, style="averaged", rng=rng(5)).frames for _ in range(2)
+        generate(walk()[:1], CHANNELS, RATE, style="averaged", rng=rng(5)).frames for _ in range(2)
     ]
     np.testing.assert_array_equal(*few)
-    many = generate(PATH[:1], CHANNELS, RATE, style="averaged", rng=rng(5), n_samples=800)
-    smooth = generate(PATH[:1], CHANNELS, RATE, style="smooth")
+    many = generate(walk()[:1], CHANNELS, RATE, style="averaged", rng=rng(5), n_samples=800)
+    smooth = generate(walk()[:1], CHANNELS, RATE, style="smooth")
     assert np.abs(many.frames - smooth.frames).mean() < 0.06
     with pytest.raises(InvalidValueError, match="rng"):
-        generate(PATH[:1], CHANNELS, RATE, style="averaged")
+        generate(walk()[:1], CHANNELS, RATE, style="averaged")
 
 
 def test_a_primitive_without_exemplars_can_still_be_generated():
-    bare = Example(3, PATH[0].hmm, (), PATH[0].mean_duration_s)
+    bare = Example(3, walk()[0].hmm, (), walk()[0].mean_duration_s)
     for style in ("deterministic", "averaged", "smooth"):
         motion = generate([bare], CHANNELS, RATE, style=style, rng=rng(0))
-        full = generate(PATH[:1], CHANNELS, RATE, style=style, rng=rng(0))
+        full = generate(walk()[:1], CHANNELS, RATE, style=style, rng=rng(0))
         assert abs(len(motion) - len(full)) <= 1
         assert np.abs(motion.frames[:100] - full.frames[:100]).max() < 0.35
     with pytest.raises(InvalidValueError, match="no exemplars"):
@@ -185,14 +189,14 @@ def test_bad_requests_are_named():
         ({"cutoff_hz": np.nan}, "cutoff_hz"),
     ):
         with pytest.raises(InvalidValueError, match=match):
-            generate(PATH[:1], CHANNELS, RATE, **wrong)
+            generate(walk()[:1], CHANNELS, RATE, **wrong)
     with pytest.raises(InvalidValueError, match="at least one primitive"):
         generate([], CHANNELS, RATE)
 
 
 def test_gaps_are_bridged_in_time_or_filled_from_the_model():
-    hmm = PATH[0].hmm
-    frames = PATH[0].exemplars[0].copy()
+    hmm = walk()[0].hmm
+    frames = walk()[0].exemplars[0].copy()
     frames[20:40, 0] = np.nan
     frames[:, 1] = np.nan
     filled = gaps_filled(frames, hmm)

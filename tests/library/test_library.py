@@ -8,52 +8,52 @@ from mplearn.errors import InvalidValueError, UnknownPrimitiveError
 from mplearn.graph import TransitionGraph
 from mplearn.library import CompactMotion, Primitive, PrimitiveLibrary
 
-LIBRARY = example_library()
-
 
 def test_primitives_are_found_by_id_and_by_name():
-    assert LIBRARY[3] is LIBRARY["P3"]
-    assert LIBRARY.names == tuple(f"P{id}" for id in LIBRARY.ids)
-    assert [primitive.id for primitive in LIBRARY] == list(LIBRARY.ids)
-    assert "P3" in LIBRARY
-    assert "bow" not in LIBRARY
+    assert example_library()[3] is example_library()["P3"]
+    assert example_library().names == tuple(f"P{id}" for id in example_library().ids)
+    assert [primitive.id for primitive in example_library()] == list(example_library().ids)
+    assert "P3" in example_library()
+    assert "bow" not in example_library()
     with pytest.raises(UnknownPrimitiveError, match="no primitive 'bow' in the library; it holds"):
-        LIBRARY["bow"]
+        example_library()["bow"]
 
 
 def test_renaming_returns_another_library():
-    renamed = LIBRARY.rename("P3", "bow down")
+    renamed = example_library().rename("P3", "bow down")
     assert renamed["bow down"].id == 3
-    assert "P3" in LIBRARY
+    assert "P3" in example_library()
     assert "P3" not in renamed
-    assert renamed.version != LIBRARY.version
-    assert renamed.rename(3, "P3").version == LIBRARY.version
-    assert renamed["bow down"].exemplars[0] is LIBRARY[3].exemplars[0] or np.array_equal(
-        renamed["bow down"].exemplars[0], LIBRARY[3].exemplars[0]
+    assert renamed.version != example_library().version
+    assert renamed.rename(3, "P3").version == example_library().version
+    assert renamed["bow down"].exemplars[0] is example_library()[3].exemplars[0] or np.array_equal(
+        renamed["bow down"].exemplars[0], example_library()[3].exemplars[0]
     )
     for wrong in ("", "  ", "a\nb", "P4"):
         with pytest.raises(InvalidValueError):
-            LIBRARY.rename(3, wrong)
+            example_library().rename(3, wrong)
 
 
 def test_the_graph_answers_by_name_too():
-    walk = LIBRARY.walk("P0", 12, np.random.default_rng(0))
+    walk = example_library().walk("P0", 12, np.random.default_rng(0))
     assert len(walk) == 12
-    assert walk == LIBRARY.graph.walk(0, 12, np.random.default_rng(0))
-    path = LIBRARY.path("P0", 3, avoid=["P5"])
-    assert path == LIBRARY.graph.path(0, 3, avoid=[5])
-    assert LIBRARY.k_paths(0, "P3", 2) == LIBRARY.graph.k_paths(0, 3, 2)
-    assert LIBRARY.predict_next(["P0", None, 1], 2) == LIBRARY.graph.predict([0, None, 1], 2)
+    assert walk == example_library().graph.walk(0, 12, np.random.default_rng(0))
+    path = example_library().path("P0", 3, avoid=["P5"])
+    assert path == example_library().graph.path(0, 3, avoid=[5])
+    assert example_library().k_paths(0, "P3", 2) == example_library().graph.k_paths(0, 3, 2)
+    assert example_library().predict_next(["P0", None, 1], 2) == example_library().graph.predict(
+        [0, None, 1], 2
+    )
     with pytest.raises(InvalidValueError, match="no recogniser"):
-        LIBRARY.recognise(LIBRARY[0].exemplars[0])
+        example_library().recognise(example_library()[0].exemplars[0])
 
 
 def test_the_library_does_not_change_when_its_source_does():
-    graph = LIBRARY.graph.copy()
-    library = PrimitiveLibrary(LIBRARY.primitives, graph, CHANNELS, RATE)
+    graph = example_library().graph.copy()
+    library = PrimitiveLibrary(example_library().primitives, graph, CHANNELS, RATE)
     version = library.version
     graph.observe(0, 1, 1.0)
-    assert library.graph.count(0, 1) == LIBRARY.graph.count(0, 1)
+    assert library.graph.count(0, 1) == example_library().graph.count(0, 1)
     again = PrimitiveLibrary(library.primitives, library.graph, CHANNELS, RATE)
     assert again.version == version
     with pytest.raises(InvalidValueError, match="snapshot"):
@@ -65,9 +65,9 @@ def test_the_library_does_not_change_when_its_source_does():
 
 @pytest.mark.parametrize("style", ["deterministic", "nearest", "averaged", "smooth"])
 def test_a_path_becomes_a_trajectory_within_limits(style):
-    walk = LIBRARY.walk(None, 6, np.random.default_rng(4))
+    walk = example_library().walk(None, 6, np.random.default_rng(4))
     limits = np.full(len(CHANNELS), 1.5)
-    motion = LIBRARY.generate(
+    motion = example_library().generate(
         walk,
         style=style,
         speed=0.5,
@@ -82,13 +82,13 @@ def test_a_path_becomes_a_trajectory_within_limits(style):
     assert motion.channels == CHANNELS
     assert (np.abs(motion.velocities) <= 1.5).all()
     assert (np.abs(motion.accelerations) <= 30).all()
-    expected_s = sum(LIBRARY[id].mean_duration_s for id in walk)
+    expected_s = sum(example_library()[id].mean_duration_s for id in walk)
     assert motion.duration_s >= 2 * expected_s - 1.0
     np.testing.assert_allclose(motion.frames[0], 0.0, atol=1e-5)
 
 
 def test_a_disconnected_path_can_be_asked_for_too():
-    assert LIBRARY.generate(["P0", "P0"]).path == (0, 0)
+    assert example_library().generate(["P0", "P0"]).path == (0, 0)
 
 
 def test_exemplars_are_kept_nearly_as_they_were():
@@ -129,7 +129,7 @@ def test_primitives_keep_the_most_usual_exemplars_and_no_gaps():
 def test_what_does_not_fit_together_is_no_library():
     graph = TransitionGraph()
     graph.add_node(77)
-    one = LIBRARY[0]
+    one = example_library()[0]
     for primitives, with_graph, channels, rate, match in (
         ((one, one), TransitionGraph(), CHANNELS, RATE, "ids of a library"),
         ((one,), graph, CHANNELS, RATE, "77"),
@@ -142,5 +142,5 @@ def test_what_does_not_fit_together_is_no_library():
 
 
 def test_walks_of_the_example_follow_observed_edges():
-    for i, j in pairwise(LIBRARY.walk(None, 50, np.random.default_rng(1))):
-        assert LIBRARY.graph.count(i, j) > 0
+    for i, j in pairwise(example_library().walk(None, 50, np.random.default_rng(1))):
+        assert example_library().graph.count(i, j) > 0

@@ -1,5 +1,6 @@
 import json
 import zipfile
+from functools import cache
 
 import numpy as np
 import pytest
@@ -16,35 +17,39 @@ from mplearn.library.content import FILES
 from mplearn.state import files
 from mplearn.tree import PrimitiveTree, TreeConfig
 
-LIBRARY = example_library().rename(0, "Bögen: hoch")
+
+@cache
+def named_library():
+    return example_library().rename(0, "Bögen: hoch")
 
 
 @pytest.fixture(scope="module")
 def saved(tmp_path_factory):
-    return LIBRARY.save(tmp_path_factory.mktemp("library") / "a.mplearn")
+    return named_library().save(tmp_path_factory.mktemp("library") / "a.mplearn")
 
 
 def test_what_is_loaded_is_what_was_saved(saved):
     loaded = PrimitiveLibrary.load(saved)
-    assert loaded.version == LIBRARY.version
+    assert loaded.version == named_library().version
     assert (loaded.channels, loaded.rate_hz, loaded.body, loaded.tree) == (
-        LIBRARY.channels,
-        LIBRARY.rate_hz,
-        LIBRARY.body,
-        LIBRARY.tree,
+        named_library().channels,
+        named_library().rate_hz,
+        named_library().body,
+        named_library().tree,
     )
-    for one, other in zip(loaded.primitives, LIBRARY.primitives, strict=True):
+    for one, other in zip(loaded.primitives, named_library().primitives, strict=True):
         assert (one.id, one.name, one.parent) == (other.id, other.name, other.parent)
         for name in ("means", "variances", "log_stay"):
             np.testing.assert_array_equal(getattr(one.hmm, name), getattr(other.hmm, name))
         for a, b in zip(one.exemplars, other.exemplars, strict=True):
             np.testing.assert_array_equal(a, b)
         np.testing.assert_array_equal(one.dynamics.means, other.dynamics.means)
-    assert loaded.graph.state() == LIBRARY.graph.state()
-    walk = LIBRARY.walk(None, 5, np.random.default_rng(0))
+    assert loaded.graph.state() == named_library().graph.state()
+    walk = named_library().walk(None, 5, np.random.default_rng(0))
     for style in ("deterministic", "smooth", "nearest"):
         np.testing.assert_array_equal(
-            loaded.generate(walk, style=style).frames, LIBRARY.generate(walk, style=style).frames
+            loaded.generate(walk, style=style).frames,
+            named_library().generate(walk, style=style).frames,
         )
 
 
@@ -86,11 +91,11 @@ def test_saving_is_all_or_nothing(saved, tmp_path, monkeypatch):
 
     monkeypatch.setattr(files.os, "fsync", fails)
     with pytest.raises(LibraryError, match="No space left"):
-        LIBRARY.save(target)
+        named_library().save(target)
     assert target.read_bytes() == b"precious"
     assert [path.name for path in tmp_path.iterdir()] == ["kept.mplearn"]
     with pytest.raises(LibraryError, match="cannot write"):
-        LIBRARY.save(tmp_path / "nowhere" / "x.mplearn")
+        named_library().save(tmp_path / "nowhere" / "x.mplearn")
 
 
 @settings(max_examples=150, deadline=None)
@@ -111,7 +116,7 @@ def test_damage_anywhere_is_found(saved, tmp_path_factory, data):
     except LibraryError as error:
         assert str(path) in str(error)
     else:  # a flip in the zip's own dates or the like
-        assert loaded.version == LIBRARY.version
+        assert loaded.version == named_library().version
 
 
 SQLITE = b"SQLite format 3\x00"  # what begins like this is taken for a store
@@ -199,7 +204,7 @@ def test_other_files_are_named(saved, tmp_path):
 
 def test_a_large_file_may_hold_what_is_as_large(saved, monkeypatch):
     monkeypatch.setattr(files, "_MAX_BYTES", saved.stat().st_size // 2)
-    assert PrimitiveLibrary.load(saved).version == LIBRARY.version
+    assert PrimitiveLibrary.load(saved).version == named_library().version
 
 
 plain = st.recursive(

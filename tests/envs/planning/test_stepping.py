@@ -247,16 +247,23 @@ def test_a_foot_lands_beside_the_other_not_on_it():
     )
 
 
-SLOW = step(1, (0.0, 0.18, 0.0), (-0.35, 0.17, 0.1), 200.0)  # a stride ahead of the left foot
-OTHER = step(0, (-0.35, 0.17, 0.1), (0.35, 0.17, 0.1), 200.0)  # past the right one, as in walking
+@cache
+def slow_step():
+    return step(1, (0.0, 0.18, 0.0), (-0.35, 0.17, 0.1), 200.0)  # a stride ahead of the left foot
+
+
+@cache
+def other_step():
+    """Return a step past the right foot, as in walking."""
+    return step(0, (-0.35, 0.17, 0.1), (0.35, 0.17, 0.1), 200.0)
 
 
 def test_a_foot_that_moves_over_the_floor_is_clear_of_it():
     """However slowly it rises: here by a millimetre in the first tenth of the step."""
-    lift = SLOW.footwork.lifts[0]
-    rise = SLOW.footwork.rise.copy()
+    lift = slow_step().footwork.lifts[0]
+    rise = slow_step().footwork.rise.copy()
     rise[:, 1] = np.where(rise[:, 1] > 0, np.maximum(rise[:, 1] ** 2 / 0.06, 0.015), 0.0)
-    motion = SLOW._replace(footwork=SLOW.footwork._replace(rise=rise, lifts=(lift,)))
+    motion = slow_step()._replace(footwork=slow_step().footwork._replace(rise=rise, lifts=(lift,)))
     plan = planner().plan(at_rest(), motion, 0.5)
     moves = np.linalg.norm(np.diff(plan.ground[:, 1, :2], axis=0), axis=1) / plan.knot_s
     heights = np.array([soles(HUMANOID, q)[1, :, 2].min() for q in plan.q[1:]])
@@ -279,7 +286,7 @@ def test_a_foot_is_led_round_the_other_one():
 
 def test_strides_follow_each_other_without_a_fall():
     simulation, here = started(), at_rest()
-    for motion in (SLOW, OTHER, SLOW, OTHER):
+    for motion in (slow_step(), other_step(), slow_step(), other_step()):
         plan = planner().plan(here, motion, 0.4)
         assert plan.error.max() < 0.01 and plan.zmp_margin_m.min() > 0.01
         assert not simulation.perform(plan).fallen
@@ -291,7 +298,7 @@ def test_what_cannot_be_done_from_a_stride_is_done_from_where_the_feet_are_side_
     squat = {"base_height": -0.2, "shoulder_pitch_l": -1.0}
     deep = planner().motion(sweep({}, squat, 2.0), RATE_HZ)
     simulation = started()
-    stride = planner().plan(at_rest(), SLOW, 0.4)
+    stride = planner().plan(at_rest(), slow_step(), 0.4)
     assert abs(stride.end.ground[0, 0] - stride.end.ground[1, 0]) > 0.3
     plan = planner().plan(stride.end, deep, 0.5)
     assert plan.error.max() < 0.01
