@@ -29,6 +29,7 @@ _NO_RECORDINGS = (
     (b"<!doctype html", "a page of the web", "the file that it links to"),
     (b"<html", "a page of the web", "the file that it links to"),
 )
+_ZIP_NAME = 30  # where an archive names the first file in it
 _ZIP, _GZIP = b"PK\x03\x04", b"\x1f\x8b\x08"
 # characters that a line, and a cell, of a large table has at least: more lines of nothing than
 # memory holds are no measurement
@@ -139,6 +140,10 @@ def _refuse_other_files(path: Path, data: bytes) -> None:
     for begins, found, expected in _NO_RECORDINGS:
         if start.startswith(begins):
             raise bad_file(path, f"it is {found}, not a recording", expected)
+    if data.startswith(_ZIP) and data[_ZIP_NAME:].startswith(b"header.json"):
+        raise bad_file(
+            path, "it is a library of primitives, not a recording", "a recording of motion"
+        )
     if data.startswith(_ZIP) and suffix(path) != ".npz":
         raise bad_file(path, "it is a zip archive", "the file that is packed in it")
 

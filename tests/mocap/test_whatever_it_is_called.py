@@ -13,6 +13,7 @@ from mplearn.anatomy import recognise
 from mplearn.demonstrator import demonstrate
 from mplearn.errors import RecordingError
 from mplearn.mocap import open_recording, open_recordings
+from mplearn_envs.data.library_source import LibrarySource
 
 pytestmark = pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")
 
@@ -65,6 +66,13 @@ def test_what_has_no_name_of_a_format_is_called_so_too(
     path = tmp_path / "takes.zip"
     path.write_bytes(content)
     with pytest.raises(RecordingError, match=says):
+        open_recording(path)
+
+
+@pytest.mark.parametrize("name", ["my.mplearn", "take.bvh"])
+def test_a_library_is_no_recording(tmp_path: Path, name: str) -> None:
+    path = LibrarySource(None).now().save(tmp_path / name)
+    with pytest.raises(RecordingError, match="library of primitives"):
         open_recording(path)
 
 
