@@ -1,8 +1,8 @@
 """The ``mplearn`` command: one sub-command a module in `mplearn_agents.commands`.
 
 Exit codes, of all commands: 0 done; 1 what was checked is not in order (``doctor``, ``export
---check``); 2 bad input, with one line on standard error; 3 what ``learn`` learned is not all in the
-store, for the disk stayed full (the library is written elsewhere, and where is said); 130
+--check``); 2 bad input, with one line on standard error; 3 what ``learn`` learned is not all
+where it was to be, for that could not be written (where the library is instead is said); 130
 interrupted, 143 by SIGTERM (``learn`` writes what it has learned first, and says 130 of either; who
 looks at a live source ends it by either, which is no interruption).
 """
@@ -30,7 +30,7 @@ from . import commands
 _OF_AN_OPTION = re.compile(r"argument (?P<option>--[\w-]+): (?P<problem>must .*)", re.DOTALL)
 _CODES = (
     "exit codes: 0 done; 1 what was checked is not in order; 2 bad input; 3 not all that "
-    "was learned could be written to the store; 130 interrupted (143 by SIGTERM)"
+    "was learned could be written where it was to be; 130 interrupted (143 by SIGTERM)"
 )
 
 

@@ -1,5 +1,6 @@
 """The lab streaming layer, with an outlet of ours."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from servers import gather, learned
 from mplearn.errors import InvalidValueError
 from mplearn.recording import Recording
 from mplearn.sources import Block, Change, Stream, open_source
+from mplearn.sources.inbox import Inbox
 from mplearn.sources.played import PlayedSource
 from mplearn.sources.protocols import lsl_process
 from mplearn.sources.protocols.lsl import LSLReceiver, described, described_info
@@ -137,6 +139,24 @@ def test_who_pulls_ends_when_nobody_reads(name: str) -> None:
         process.stdout.close()  # as where the process that reads is killed
         assert process.wait(10.0) == 0
         assert b"Traceback" not in process.stderr.read()
+
+
+@pytest.mark.parametrize("safe", ["", "1"])
+def test_who_pulls_finds_modules_where_others_do(tmp_path: Path, safe: str) -> None:
+    (tmp_path / "pylsl.py").write_text("raise ImportError('found')")
+    environment = os.environ | {"PYTHONPATH": str(tmp_path), "PYTHONSAFEPATH": safe}
+    command = [sys.executable, lsl_process.__file__, "name", "x"]
+    done = subprocess.run(command, capture_output=True, env=environment, check=True, timeout=60)
+    assert done.stdout == lsl_process.HEAD.pack(lsl_process.FAILED, 5) + b"found"
+
+
+def test_who_pulls_may_end_amid_a_message(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    head = lsl_process.HEAD.pack(lsl_process.SAMPLES, 1000)
+    script = tmp_path / "ends.py"
+    script.write_text(f"import os; os.write(1, {head!r} + bytes(500)); os._exit(7)")
+    monkeypatch.setattr(lsl_process, "__file__", str(script))
+    with pytest.raises(OSError, match=r"the process that pulls the stream ended \(code 7\)"):
+        LSLReceiver("x").receive(Inbox())
 
 
 def test_a_description_says_names_and_unit() -> None:

@@ -149,15 +149,8 @@ def test_what_cannot_be_is_said_in_a_line(
     assert "--out, or a store" in refused(capsys, "learn", tmp_path)
 
 
-@pytest.mark.parametrize("how", ["file", "live"])
-@pytest.mark.parametrize("with_out", [True, False])
-def test_where_the_disk_stays_full_the_library_is_kept_elsewhere(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    how: str,
-    with_out: bool,
-) -> None:
+def fill_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let stores of this test take little more than what they begin with."""
     opened = mplearn.store.store.open_writing
 
     def full(path: Path) -> sqlite3.Connection:
@@ -169,11 +162,57 @@ def test_where_the_disk_stays_full_the_library_is_kept_elsewhere(
     monkeypatch.setattr(mplearn.store.store, "open_writing", full)
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr(tempfile, "tempdir", None)
-    data, out = tmp_path / "take.csv", tmp_path / "out.mplearn"
+
+
+def learning(tmp_path: Path, how: str) -> list[str]:
+    """Return the command that learns a take from a file, or as it comes."""
+    data = tmp_path / "take.csv"
     rows = np.column_stack((np.arange(len(TAKES[0].frames)) / RATE_HZ, TAKES[0].frames))
     np.savetxt(data, rows, delimiter=",", header="time,a,b,c,d", comments="")
     take = ["--live", f"recording:{data}", "--speed", "inf"] if how == "live" else [str(data)]
-    argv = ["learn", *take, "--observe", "channels", "--store", str(tmp_path / "life.db")]
+    return ["learn", *take, "--observe", "channels"]
+
+
+@pytest.mark.parametrize("how", ["file", "live"])
+@pytest.mark.parametrize("store", ["full", "", "sound"])
+def test_where_the_library_cannot_be_written_what_was_learned_is_kept(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    how: str,
+    store: str,
+) -> None:
+    if store != "sound":
+        fill_disk(tmp_path, monkeypatch)
+    (tmp_path / "file").touch()
+    out, life = tmp_path / "file" / "out.mplearn", tmp_path / "life.db"
+    argv = [*learning(tmp_path, how), "--out", str(out)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StoreWarning)
+        assert main(argv + ["--store", str(life)] * bool(store)) == 3
+    told = capsys.readouterr()
+    rescued = [*tmp_path.glob("mplearn-*/*")]
+    (kept,) = [life] if store == "sound" else rescued
+    assert rescued == [] or store != "sound"
+    assert f"cannot write {out}: " in told.err
+    assert f"the library is in {kept}" in told.err
+    assert ("the same command goes on" in told.err) == (bool(store) and how == "file")
+    assert ("written to" in told.out.split("segments")[-1]) == (store == "sound")
+    assert len(PrimitiveLibrary.load(kept)) > 0
+
+
+@pytest.mark.parametrize("how", ["file", "live"])
+@pytest.mark.parametrize("with_out", [True, False])
+def test_where_the_disk_stays_full_the_library_is_kept_elsewhere(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    how: str,
+    with_out: bool,
+) -> None:
+    fill_disk(tmp_path, monkeypatch)
+    out = tmp_path / "out.mplearn"
+    argv = [*learning(tmp_path, how), "--store", str(tmp_path / "life.db")]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StoreWarning)  # it says that learning goes on
         assert main(argv + ["--out", str(out)] * with_out) == 3

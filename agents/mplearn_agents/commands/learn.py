@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import InvalidValueError, MPLearnError, RecordingError, StateError
-from mplearn_agents.learning.keeping import close_store, say_unkept, written_to
+from mplearn_agents.learning.keeping import keep, say_unkept
 from mplearn_agents.learning.live import add_live_arguments, learn_from_source
 from mplearn_agents.recordings.reading import (
     add_corpus_arguments,
@@ -131,10 +131,10 @@ def _learn_from_files(args: argparse.Namespace) -> int:
         say_takes(console, takes)
         recordings = _of_persons(args, takes.recordings)
         recordings = _as_learned(args, recordings, console)
-    kept = args.store is not None and is_begun(args.store)
+    has_begun = args.store is not None and is_begun(args.store)
     with ExitStack() as stack:
         life: LifelongLearner | None = None
-        if kept:
+        if has_begun:
             life = stack.enter_context(LifelongLearner.open(args.store))
             _check_rules(args, life.learner.config)
             args.rate_hz = args.rate_hz or life.learner.config.rate_hz
@@ -153,22 +153,18 @@ def _learn_from_files(args: argparse.Namespace) -> int:
             library = life.snapshot(shown_once=True)
         if not len(library) and not log.stopped:
             library = with_takes(library, [observe(each).frames for each in recordings])
-        if args.out is not None:
-            args.out.parent.mkdir(parents=True, exist_ok=True)
-            library.save(args.out)
-        unkept = close_store(life, library, args.out)
+        kept = keep(args, life, library)
     console.print(primitive_table(library))
-    paths = written_to(args, unkept)
     console.print(
         f"{n_known} primitives from {_takes_of(recordings, log)}, "
         f"{log.watched_s / 60:.1f} minutes of motion in {len(log.moving)} segments, "
         f"{log.times_real_time:.0f} x real time"
-        + (f"; written to {printable(paths)}" if paths else ""),
+        + (f"; written to {printable(str(kept))}" if kept.paths else ""),
         markup=False,
     )
     if log.already:
         console.print(f"{log.already} takes had been learned before, and are in the store already.")
-    if log.stopped and not unkept:
+    if log.stopped and not kept.problem:
         console.print(
             "Stopped: what was learned until then is written."
             + (" The same command goes on from there." if args.store is not None else "")
@@ -191,8 +187,9 @@ def _learn_from_files(args: argparse.Namespace) -> int:
             f"{log.reasons}",
             markup=False,
         )
-    if unkept:
-        say_unkept(f"{unkept}; the same command goes on from what the store holds")
+    if kept.problem:
+        goes_on = "; the same command goes on from what the store holds" if args.store else ""
+        say_unkept(f"{kept.problem}{goes_on}")
         return NOT_KEPT
     return INTERRUPTED if log.stopped else 0
 

@@ -1,4 +1,4 @@
-"""What was learned is kept, also where its store cannot be written in the end."""
+"""What was learned is kept, also where it cannot be written where it was to be."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 import sys
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from mplearn.errors import MPLearnError, StoreWriteError
 from mplearn_agents.terminal.inert import printable
@@ -16,46 +16,69 @@ if TYPE_CHECKING:
     from mplearn.store import LifelongLearner
 
 
-def close_store(life: LifelongLearner, library: PrimitiveLibrary, out: Path | None) -> str:
-    """Close what keeps a life of learning, if anything does; return why not all of it is kept.
+class Kept(NamedTuple):
+    """Where all that was learned is.
 
-    Where the store cannot be written (the disk stayed full), the library is in ``out``, or is
-    written to a folder for what is passing.
+    Attributes:
+        paths: Files that ``mplearn learn`` was given and that hold it.
+        problem: What to say where these are not all of them; empty where they are.
+    """
+
+    paths: list[Path]
+    problem: str
+
+    def __str__(self) -> str:
+        """Return the paths as words."""
+        return " and ".join(map(str, self.paths))
+
+
+def keep(args: argparse.Namespace, life: LifelongLearner, library: PrimitiveLibrary) -> Kept:
+    """Write a library, close the store, and say where what was learned is.
+
+    Where one cannot be written (the disk stayed full), the other is still; where none can be, the
+    library is written to a folder for what is passing.
 
     Args:
+        args: The options of ``mplearn learn``.
         life: Who learned.
         library: What was learned.
-        out: Where that is written; None for nowhere.
-
-    Returns:
-        What to say of it; empty where all is in the store, or none was wanted.
     """
-    from mplearn.store import Store
-
-    name = life.store.path.stem if isinstance(life.store, Store) else ""
+    paths: list[Path] = []
+    problems: list[str] = []
+    if args.out is not None:
+        try:
+            args.out.parent.mkdir(parents=True, exist_ok=True)
+            paths.append(library.save(args.out))
+        except MPLearnError as error:
+            problems.append(str(error))
+        except OSError as error:
+            problems.append(f"cannot write {args.out}: {error.strerror}")
     try:
         life.close()
+        if args.store is not None:
+            paths.append(args.store)
     except StoreWriteError as error:
-        path = out or _rescued(library, name)
-        saved = f"the library is in {path}" if path else "the library cannot be written either"
-        return f"{error}; {saved}"
-    return ""
-
-
-def written_to(args: argparse.Namespace, unkept: str) -> str:
-    """Return which of the files that ``mplearn learn`` was given hold all that was learned."""
-    paths = (args.out, None if unkept else args.store)
-    return " and ".join(str(path) for path in paths if path is not None)
+        problems.append(str(error))
+    if problems:
+        path = paths[0] if paths else _rescued(library, (args.store or args.out).stem)
+        saved = f"the library is in {path}" if path else "the library cannot be written elsewhere"
+        problems.append(saved)
+    return Kept(paths, "; ".join(problems))
 
 
 def say_unkept(why: str) -> None:
-    """Say on standard error what `close_store` returned."""
+    """Say on standard error what `Kept.problem` says."""
     print(f"mplearn: {printable(why)}", file=sys.stderr)
 
 
 def _rescued(library: PrimitiveLibrary, name: str) -> Path | None:
     """Write a library somewhere, and return where; None where nothing can be written."""
     try:
-        return library.save(Path(tempfile.mkdtemp(prefix="mplearn-")) / f"{name}.mplearn")
-    except (MPLearnError, OSError):
+        folder = Path(tempfile.mkdtemp(prefix="mplearn-"))
+    except OSError:
+        return None
+    try:
+        return library.save(folder / f"{name}.mplearn")
+    except MPLearnError:
+        folder.rmdir()
         return None

@@ -13,7 +13,7 @@ from threading import Event as Flag
 from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import MPLearnError, RecordingError
-from mplearn_agents.learning.keeping import close_store, say_unkept, written_to
+from mplearn_agents.learning.keeping import keep, say_unkept
 from mplearn_agents.learning.pauses import short_pauses
 from mplearn_agents.recordings.reading import hints_of
 from mplearn_agents.terminal.arguments import pace, positive
@@ -23,7 +23,6 @@ from mplearn_agents.terminal.interrupts import asked_to_stop
 
 if TYPE_CHECKING:
     from mplearn.learner import Event, LearnerConfig, MotionLearner
-    from mplearn.library import PrimitiveLibrary
     from mplearn.sources import Block, Source
     from mplearn.store import LifelongLearner
 
@@ -102,7 +101,7 @@ def learn_from_source(
 
     console = open_console(stderr=args.json)
     has_begun = args.store is not None and is_begun(args.store)
-    kept = " and ".join(str(path) for path in (args.out, args.store) if path is not None)
+    wanted = " and ".join(str(path) for path in (args.out, args.store) if path is not None)
     with command_line(), asked_to_stop() as stop, ExitStack() as stack:
         life = stack.enter_context(LifelongLearner.open(args.store)) if has_begun else None
         source = open_source(
@@ -117,7 +116,7 @@ def learn_from_source(
         with source:
             console.print(
                 f"learning from {printable(source.name)}; Ctrl-C ends it, and writes "
-                f"{printable(kept)}",
+                f"{printable(wanted)}",
                 markup=False,
                 highlight=False,
             )
@@ -137,9 +136,12 @@ def learn_from_source(
                     )
             except MPLearnError:
                 if log.life is not None:
-                    _save(args, log.life.snapshot())
-                    told = f"what was learned before is written to {printable(kept)}"
-                    console.print(told, markup=False)
+                    kept = keep(args, log.life, log.life.snapshot())
+                    if kept.paths:
+                        told = f"what was learned before is written to {printable(str(kept))}"
+                        console.print(told, markup=False)
+                    if kept.problem:
+                        say_unkept(kept.problem)
                 raise
             finally:
                 if log.life is not None:
@@ -235,12 +237,6 @@ def _say() -> Callable[[str], object]:
     return say
 
 
-def _save(args: argparse.Namespace, library: PrimitiveLibrary) -> None:
-    if args.out is not None:
-        args.out.parent.mkdir(parents=True, exist_ok=True)
-        library.save(args.out)
-
-
 def _report(
     console: Any, args: argparse.Namespace, source: Source, log: LiveLog, *, stopped: bool
 ) -> int:
@@ -253,11 +249,9 @@ def _report(
         told = ", ".join(f"{n} {name}" for name, n in faults.items()) or "nothing came"
         raise RecordingError(f"nothing could be learned from {source.name}: {told}")
     library = log.life.snapshot()
-    _save(args, library)
-    unkept = close_store(log.life, library, args.out)
-    paths = written_to(args, unkept)
-    if unkept:
-        say_unkept(unkept)
+    kept = keep(args, log.life, library)
+    if kept.problem:
+        say_unkept(kept.problem)
     if args.json:
         summary = {
             "event": "Summary",
@@ -267,19 +261,19 @@ def _report(
             "lost_s": log.lost_s,
             "longest_delay_s": log.delay_s,
             "stopped": stopped,
-            "library": None if args.out is None else str(args.out),
+            "library": str(args.out) if args.out in kept.paths else None,
             "store": None if args.store is None else str(args.store),
-            "unkept": unkept or None,
+            "unkept": kept.problem or None,
             **vars(source.tally),
         }
         print(json.dumps(summary), flush=True)
-        return NOT_KEPT if unkept else 0
+        return NOT_KEPT if kept.problem else 0
     console.print(primitive_table(library))
     console.print(
         f"{len(library)} primitives from {log.watched_s / 60:.1f} minutes of motion in "
         f"{log.segments} segments"
         + ("; stopped" if stopped else "")
-        + (f"{',' if stopped else ';'} written to {printable(paths)}" if paths else ""),
+        + (f"{',' if stopped else ';'} written to {printable(str(kept))}" if kept.paths else ""),
         markup=False,
     )
     if not len(library):
@@ -289,4 +283,4 @@ def _report(
         console.print(f"frames and packets that were not as they should be: {told}", markup=False)
     if log.lost_s:
         console.print(f"nothing was learned from {log.lost_s:.1f} s", markup=False)
-    return NOT_KEPT if unkept else 0
+    return NOT_KEPT if kept.problem else 0

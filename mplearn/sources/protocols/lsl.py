@@ -73,16 +73,10 @@ class LSLReceiver(Receiver):
 
 def _take(process: subprocess.Popen[bytes], inbox: Inbox) -> None:
     """Take what a process of `lsl_process` says."""
-    assert process.stdout is not None
     stream, columns = Stream((), 0.0), np.zeros(0, np.int64)
     while not inbox.closed:
-        head = process.stdout.read(HEAD.size)
-        if len(head) < HEAD.size:
-            code = process.wait()
-            why = f"signal {-code}" if code < 0 else f"code {code}"
-            raise OSError(f"the process that pulls the stream ended ({why})")
-        kind, size = HEAD.unpack(head)
-        body = process.stdout.read(size)
+        kind, size = HEAD.unpack(_read(process, HEAD.size))
+        body = _read(process, size)
         if kind == FAILED:
             raise OSError(body.decode("utf-8", "replace"))
         if kind == DESCRIBED:
@@ -95,6 +89,16 @@ def _take(process: subprocess.Popen[bytes], inbox: Inbox) -> None:
             rows[np.isinf(rows)] = np.nan
             for row, time_s in zip(rows, numbers[:n].tolist(), strict=True):
                 inbox.put(Sample(stream, row, arrived_s, time_s=time_s))
+
+
+def _read(process: subprocess.Popen[bytes], size: int) -> bytes:
+    assert process.stdout is not None
+    data = process.stdout.read(size)
+    if len(data) < size:
+        code = process.wait()
+        why = f"signal {-code}" if code < 0 else f"code {code}"
+        raise OSError(f"the process that pulls the stream ended ({why})")
+    return data
 
 
 class LSLSender(Sender):

@@ -24,11 +24,10 @@ AT_ONCE = 256  # samples
 def main() -> None:
     """Pull until the stream is lost, or nobody reads any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # who reads is asked to stop, and ends this
-    del sys.path[0]  # the folder of this file, whose names are not those of modules
+    if not sys.flags.safe_path:
+        del sys.path[0]  # the folder of this file, whose names are not those of modules
     try:
         _pull(*sys.argv[1:3])
-    except BrokenPipeError:  # nobody reads any more
-        os._exit(0)
     except Exception as error:  # a client of others may raise anything
         _say(FAILED, (str(error) or repr(error)).encode("utf-8", "replace"))
 
@@ -61,8 +60,11 @@ def _pull(what: str, value: str) -> None:
 
 
 def _say(kind: bytes, body: bytes = b"") -> None:
-    sys.stdout.buffer.write(HEAD.pack(kind, len(body)) + body)
-    sys.stdout.buffer.flush()
+    try:
+        sys.stdout.buffer.write(HEAD.pack(kind, len(body)) + body)
+        sys.stdout.buffer.flush()
+    except OSError:  # nobody reads any more; which error that is depends on the system
+        os._exit(0)
 
 
 if __name__ == "__main__":
