@@ -29,11 +29,14 @@ _NO_RECORDINGS = (
     (b"<!doctype html", "a page of the web", "the file that it links to"),
     (b"<html", "a page of the web", "the file that it links to"),
 )
+_LAST_CELL = re.compile(r"(?<=[^\s,;])[ \t,;]+([^\s,;]*)\Z")
+_WORD = re.compile(r"\b(?!nan\b)[a-z]", re.I)
 _ZIP_NAME = 30  # where an archive names the first file in it
 _ZIP, _GZIP = b"PK\x03\x04", b"\x1f\x8b\x08"
 # characters that a line, and a cell, of a large table has at least: more lines of nothing than
 # memory holds are no measurement
 _LEAST_LINE, _LEAST_CELL = 12, 1.6
+_LINES_BEFORE = 20  # of which the last numbers tell whether a file's last one is cut off
 
 
 def suffix(path: Path) -> str:
@@ -151,6 +154,8 @@ def _refuse_other_files(path: Path, data: bytes) -> None:
 def read_text(path: Path) -> str:
     r"""Return the content of a text file: UTF-8, Latin-1 of older tools, or UTF-16 of Windows.
 
+    A number in which the file ends is left out: it has not all digits, and is another one.
+
     Raises:
         RecordingError: As `read_bytes`, or the file is not text.
 
@@ -173,9 +178,41 @@ def read_text(path: Path) -> str:
                 path, f"{n_lines} lines of hardly any characters", "lines of measured values"
             )
     try:
-        return data.decode("utf-8-sig")
+        return _without_cut_number(data.decode("utf-8-sig"))
     except UnicodeDecodeError:
-        return data.decode("latin-1")
+        return _without_cut_number(data.decode("latin-1"))
+
+
+def _without_cut_number(text: str) -> str:
+    """Return a text without a last number that has fewer decimals than those of the lines before.
+
+    It is known where no line break is behind it, and all lines before end in numbers that have at
+    least two decimals more, or any if it has none; one alone may be a zero that was not
+    written, if no exponent is cut.
+    """
+    end = text.rfind("\n")
+    last = _LAST_CELL.search(text, end + 1)
+    if last is None or not last[1]:
+        return text
+    known: list[int] = []
+    named = _WORD.search(text, end + 1) is not None
+    while end > 0 and len(known) < _LINES_BEFORE:
+        begin = text.rfind("\n", 0, end) + 1
+        cell = _LAST_CELL.search(text[begin:end].rstrip("\r"))
+        if cell is not None:  # else a line of one cell, as the number of a frame
+            n_decimals = _n_decimals(cell[1])
+            if _WORD.search(text, begin, end) and not (named and n_decimals > 0):
+                break  # names of columns
+            known.append(n_decimals)
+        end = begin - 1
+    unsure = "e" not in last[1].lower()
+    cut = len(known) > 2 and _n_decimals(last[1]) < min(known) - unsure
+    return text[: last.start()] if cut else text
+
+
+def _n_decimals(cell: str) -> int:
+    """Return how many characters stand behind the decimal point, -1 for none."""
+    return len(cell.partition(".")[2]) or -1
 
 
 def _plain(data: bytes) -> bytes:

@@ -138,6 +138,23 @@ def numbers(
     return values.reshape(len(rows), n_columns)
 
 
+def without_cut_row(
+    rows: list[tuple[int, list[str]]], text: str, findings: Findings
+) -> list[tuple[int, list[str]]]:
+    """Return rows of cells, each with its line, without one in which a text ends.
+
+    Args:
+        rows: All rows.
+        text: What they stand in.
+        findings: Where to tell of the row.
+    """
+    cut = text[-1:] not in "\r\n" and len(rows) > 1 and len(rows[-1][1]) < len(rows[-2][1])
+    if not cut:
+        return rows
+    findings.warn(f"the last row, line {rows[-1][0]}, is cut off: left out")
+    return rows[:-1]
+
+
 def measured_rows(
     path: Path,
     rows: Iterable[tuple[int, list[str]]],

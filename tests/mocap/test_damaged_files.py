@@ -106,3 +106,46 @@ def test_files_of_almost_nothing(tmp_path: Path, name: str, content: bytes) -> N
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 100e6
+
+
+TEXTS = sorted({*WRITERS} - {"C3D", "Theia", "SMPL", "XDF", "joint array", "MVNX"})
+
+
+@pytest.mark.parametrize("format", TEXTS)
+def test_the_row_in_which_a_text_ends_is_left_out_and_said(
+    valid: dict[str, Path], format: str
+) -> None:
+    """A row that lacks numbers, and one whose last number lacks digits and is another one."""
+    path = valid[format]
+    whole = path.read_bytes()
+    plain = open_recording(path)
+    last = whole.rstrip().rpartition(b"\n")[2]
+    number = min(len(last) - last.rfind(separator) for separator in b" ,\t" if separator in last)
+    try:
+        for cut in (3, number - 2, number + 2, len(last) // 2, len(last) - 3):
+            path.write_bytes(whole.rstrip()[:-cut])
+            found = open_recording(path)
+            assert len(found) == len(plain) - 1, cut
+            assert found.frames == pytest.approx(plain.frames[:-1], nan_ok=True), cut
+            assert found.report is not None and found.report.warnings
+        path.write_bytes(whole.rstrip())  # a whole file may end without a line break
+        assert np.array_equal(open_recording(path).frames, plain.frames, equal_nan=True)
+    finally:
+        path.write_bytes(whole)
+
+
+@pytest.mark.parametrize("form", ["{:.18e}", "{:.1f}", "{:.6f}"])
+def test_the_last_of_numbers_of_any_form(tmp_path: Path, form: str) -> None:
+    values = np.random.default_rng(0).uniform(10.0, 90.0, (9, 4))
+    text = "a,b,c,d\n" + "\n".join(",".join(map(form.format, row)) for row in values)
+    for cut in range(len(form.format(10.0))):
+        (tmp_path / "a.csv").write_text(text[: len(text) - cut])
+        found = open_recording(tmp_path / "a.csv", hints=Hints(rate_hz=50.0))
+        read = np.array([[float(form.format(x)) for x in row] for row in values])
+        assert found.frames == pytest.approx(read[: len(found)], abs=1e-4)
+
+
+def test_a_last_zero_that_was_not_written_is_no_cut(tmp_path: Path) -> None:
+    rows = [f"{k / 100},{0.5 + k / 100}" for k in range(1, 11)]
+    (tmp_path / "a.csv").write_text("\n".join(["time,b", *rows[:-1], "0.1,0.6"]))
+    assert len(open_recording(tmp_path / "a.csv")) == 10

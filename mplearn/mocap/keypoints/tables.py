@@ -20,7 +20,7 @@ from ...recording import FloatArray, Recording
 from ..files import bad_file, head_text, read_text, stem
 from ..findings import Findings
 from ..markers.sheet import Sheet
-from ..numbers import numbers
+from ..numbers import numbers, without_cut_row
 from ..options import option
 from ..rates import rate_beside
 from ..reader import Hints, Reader
@@ -56,7 +56,8 @@ class DeepLabCutReader(Reader):
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read the animal that was seen most; see `Reader.read`."""
-        rows = _rows(path)
+        findings = Findings(self.format)
+        rows = _rows(path, findings)
         at = _coords_row([row for _, row in rows[:_LOOK]])
         if at is None or at == 0:
             raise bad_file(path, "no rows of key points", "heads scorer, bodyparts and coords")
@@ -73,7 +74,6 @@ class DeepLabCutReader(Reader):
         for k in range(1, width):
             points = columns.setdefault(animals[k], {})
             points.setdefault(parts[k] if k < len(parts) else "", {})[coords[k].lower()] = k
-        findings = Findings(self.format)
         rate_hz = _rate(path, hints, findings)
         tracks = {animal: _points(path, table, points) for animal, points in columns.items()}
         seen = {each: int(np.isfinite(track[0]).sum()) for each, track in tracks.items()}
@@ -167,7 +167,7 @@ class _Head:
 
 def _flat(path: Path, hints: Hints, findings: Findings) -> Recording:
     """Read a table with one row of names."""
-    head, lines, body = _named_rows(path)
+    head, lines, body = _named_rows(path, findings)
     coords = head.coords
     used = [*([] if head.frame is None else [head.frame]), *coords.values()]
     values = numbers(path, [[row[k] for k in used] for row in body], len(used), lines)
@@ -190,9 +190,9 @@ def _flat(path: Path, hints: Hints, findings: Findings) -> Recording:
     return _recording(path, _points(path, table, points), most, rate_hz, findings)
 
 
-def _named_rows(path: Path) -> tuple[_Head, list[int], list[list[str]]]:
+def _named_rows(path: Path, findings: Findings) -> tuple[_Head, list[int], list[list[str]]]:
     """Return what the first row says, and the numbers and cells of all others."""
-    rows = _rows(path)
+    rows = _rows(path, findings)
     head = _Head.of(rows[0][1]) if rows else None
     if head is None or not head.coords or len(rows) < 2:
         raise bad_file(path, "no rows of key points", "names of columns, then a row for each frame")
@@ -229,20 +229,24 @@ def _by_node(
 
 def _first_rows(path: Path) -> list[list[str]]:
     try:
-        return [row for _, row in _cells(path, head_text(path), _LOOK)]
+        sheet = _sheet(path, head_text(path))
+        return [row for _, row in _cells(sheet, min(_LOOK, len(sheet.lines)))]
     except RecordingError:  # quotes that do not match: no table
         return []
 
 
-def _rows(path: Path) -> list[tuple[int, list[str]]]:
-    return _cells(path, read_text(path))
+def _rows(path: Path, findings: Findings) -> list[tuple[int, list[str]]]:
+    text = read_text(path)
+    return without_cut_row(_cells(_sheet(path, text)), text, findings)
 
 
-def _cells(path: Path, text: str, most: int | None = None) -> list[tuple[int, list[str]]]:
+def _sheet(path: Path, text: str) -> Sheet:
+    return Sheet.of(path, text, separators=",;\t")
+
+
+def _cells(sheet: Sheet, stop: int | None = None) -> list[tuple[int, list[str]]]:
     """Return the cells of each line that holds any, and the line's number."""
-    sheet = Sheet.of(path, text, separators=",;\t")
-    rows = sheet.rows(0, None if most is None else min(most, len(sheet.lines)))
-    return [(n, [cell.strip() for cell in row]) for n, row in rows]
+    return [(n, [cell.strip() for cell in row]) for n, row in sheet.rows(0, stop)]
 
 
 def _coords_row(rows: list[list[str]]) -> int | None:

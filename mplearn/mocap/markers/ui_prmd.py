@@ -16,7 +16,8 @@ import numpy as np
 from ...errors import RecordingError
 from ...recording import LabelledSegment, Recording, marker_channels
 from ..files import bad_file, read_text, stem
-from ..numbers import numbers
+from ..findings import Findings
+from ..numbers import numbers, without_cut_row
 from ..placing.space import checked_markers, file_axes
 from ..reader import Hints, Reader
 
@@ -79,23 +80,29 @@ class UIPRMDReader(Reader):
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read one repetition; see `Reader.read`."""
         match = _match(path)
-        rows = [line.split(",") for line in read_text(path).splitlines() if line.strip()]
+        findings = Findings(self.format)
+        text = read_text(path)
+        rows = [(i, s.split(",")) for i, s in enumerate(text.splitlines(), 1) if s.strip()]
+        rows = without_cut_row(rows, text, findings)
         if not rows:
             raise bad_file(path, "no frames", "a row for each")
-        values = numbers(path, rows, 3 * len(PLUG_IN_GAIT_MARKERS), range(1, len(rows) + 1))
+        width = 3 * len(PLUG_IN_GAIT_MARKERS)
+        values = numbers(path, [row for _, row in rows], width, [i for i, _ in rows])
         points = values.reshape(len(rows), -1, 3)
         points[(points == 0.0).all(axis=2)] = np.nan
         unit = 0.001 if hints.unit_m is None else hints.unit_m
         points = points @ file_axes(hints.up_axis, "z", "x").T * unit
         checked_markers(path, points, PLUG_IN_GAIT_MARKERS)
         movement, person = match["movement"], match["person"]
+        rate_hz = _RATE_HZ if hints.rate_hz is None else hints.rate_hz
         return Recording(
             frames=points.reshape(len(rows), -1),
-            rate_hz=_RATE_HZ if hints.rate_hz is None else hints.rate_hz,
+            rate_hz=rate_hz,
             channels=marker_channels(PLUG_IN_GAIT_MARKERS),
             name=f"{movement}_{person}_e{match['repetition']}",
             person=person,
             labels=(LabelledSegment(0, len(rows), movement, person),),
+            report=findings.report(rate_hz, unit, hints.up_axis or "z"),
         )
 
 

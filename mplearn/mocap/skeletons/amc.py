@@ -94,7 +94,8 @@ def _frames(
 ) -> tuple[bool | None, list[tuple[str, int]], FloatArray]:
     """Return whether angles are degrees (None: not said), a frame's bones, and the table."""
     lines, places, modes = [], [], set()
-    for place, line in enumerate(read_text(path).splitlines(), start=1):
+    content = read_text(path)
+    for place, line in enumerate(content.splitlines(), start=1):
         text = line.strip()
         if text.startswith(":"):
             modes.add(text.split()[0].lower())
@@ -106,7 +107,9 @@ def _frames(
     if not starts or starts[0] != 0:
         raise bad_file(path, f"starts with {lines[0][:40] if lines else ''!r}", _EXPECTED)
     height = starts[1] if len(starts) > 1 else len(lines)
-    if len(starts) > 1 and len(lines) < starts[-1] + height:
+    open_end = len(starts) > 1 and content[-1:] not in "\r\n"
+    within = open_end and _is_part(lines[-1].split(), lines[-1 - height].split())
+    if len(starts) > 1 and (len(lines) < starts[-1] + height or within):
         findings.warn(f"the last frame, {lines[starts[-1]][:12]}, is cut off: left out")
         cut = starts.pop()
         del lines[cut:], places[cut:]
@@ -135,6 +138,11 @@ def _frames(
         layout.append((bone, n_cells))
         tables.append(numbers(path, [words[1:] for words in rows], n_cells, places[row::height]))
     return degrees, layout, np.concatenate(tables, axis=1)[keep]
+
+
+def _is_part(words: list[str], whole: list[str]) -> bool:
+    """Whether a line is cut off, in its numbers or in the name of its bone."""
+    return len(words) < len(whole) and whole[0].startswith(words[0])
 
 
 def _arranged(

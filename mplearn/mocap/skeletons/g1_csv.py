@@ -20,7 +20,7 @@ from ...recording import FloatArray, Recording
 from ..clock import even_clock
 from ..files import bad_file, head_text, read_text
 from ..findings import Findings
-from ..numbers import numbers
+from ..numbers import numbers, without_cut_row
 from ..placing.space import Space
 from ..rates import rate_beside
 from ..reader import Hints, Reader
@@ -74,13 +74,15 @@ class G1CSVReader(Reader):
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read angles, or where the robot's joints are; see `Reader.read`."""
         findings = Findings(self.format)
-        rows = [(i, s) for i, s in enumerate(read_text(path).splitlines(), 1) if s.strip()]
-        header = _cells(rows[0][1]) if rows else []
+        text = read_text(path)
+        rows = [(i, _cells(s)) for i, s in enumerate(text.splitlines(), 1) if s.strip()]
+        rows = without_cut_row(rows, text, findings)
+        header = rows[0][1] if rows else []
         named = _plain_numbers(header) is None
         rows = rows[1:] if named else rows
         if not rows:
             raise bad_file(path, "no frames", "a row for each")
-        table = numbers(path, [_cells(s) for _, s in rows], len(header), [i for i, _ in rows])
+        table = numbers(path, [row for _, row in rows], len(header), [i for i, _ in rows])
         if not named:
             before = table[:, : max(len(header) - _WIDTH, 0)]
             header = [*map(_counts, before.T), *_HEADERLESS]
