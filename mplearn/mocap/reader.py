@@ -30,7 +30,7 @@ class Hints:
         unit_m: Length of the file's unit of length [m].
         up_axis: The file's axis that points up: ``"x"``, ``"y"``, ``"z"``, or ``"-x"``, ...
         skeleton: The ASF file that belongs to an AMC file.
-        angle_unit: What the angles of a BVH or AMC file are in: ``"degrees"`` or ``"radians"``.
+        angle_unit: What the angles of a BVH, AMC or G1 file are in: ``"degrees"`` or ``"radians"``.
         mirrored: Whether the file's axes are left-handed, as those of Unity and Unreal are: then
             people would be mirrored, and one axis is turned round.
         level: Whether the camera was tilted: then people are turned so that who stands straight is

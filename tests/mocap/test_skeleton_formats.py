@@ -543,6 +543,30 @@ def test_g1_dialects_are_the_same_motion(tmp_path: Path) -> None:
     assert open_recording(tmp_path / "d.csv").frames == pytest.approx(plain.frames)
 
 
+@pytest.mark.parametrize("form", ["{}_deg", "{} (deg)", "{} [degrees]"])
+def test_g1_in_the_unit_that_names_say(tmp_path: Path, form: str) -> None:
+    """Less than seven degrees could be radians."""
+    values = g1_values()
+    values[:, 7:] *= 0.1
+    plain = open_recording(write_g1_csv(tmp_path / "a.csv", values))
+    values[:, 7:] = np.degrees(values[:, 7:])
+    header = ["x", "y", "z", "qx", "qy", "qz", "qw", *map(form.format, G1_JOINTS)]
+    other = open_recording(write_g1_csv(tmp_path / "b.csv", values, header))
+    assert other.frames == pytest.approx(plain.frames, abs=1e-9)
+    said = write_g1_csv(tmp_path / "c.csv", values)
+    other = open_recording(said, hints=Hints(angle_unit="degrees"))
+    assert other.frames == pytest.approx(plain.frames, abs=1e-9)
+
+
+def test_g1_in_degrees_without_names(tmp_path: Path) -> None:
+    values = g1_values()
+    plain = open_recording(write_g1_csv(tmp_path / "a.csv", values))
+    values[:, 7:] = np.degrees(values[:, 7:])
+    with pytest.warns(RecordingWarning, match="taken for degrees"):
+        other = open_recording(write_g1_csv(tmp_path / "b.csv", values))
+    assert other.frames == pytest.approx(plain.frames, abs=1e-8)
+
+
 def test_g1_without_some_joints_or_in_another_unit(tmp_path: Path) -> None:
     values = g1_values()
     header = ["x", "y", "z", "qx", "qy", "qz", "qw", *G1_JOINTS]

@@ -46,6 +46,34 @@ def test_millimetres_y_up_and_a_cut_file(tmp_path: Path) -> None:
     assert 0 < len(recording) < 40
 
 
+@pytest.mark.parametrize("nominal_hz", [25.0, 0.0])
+@pytest.mark.parametrize("jitter_s", [0.001, 0.004])
+def test_frames_that_were_lost_are_missing(
+    tmp_path: Path, nominal_hz: float, jitter_s: float
+) -> None:
+    """At a low rate, a gap is far less than 500 frames; the time after it is not shifted."""
+    points = person(300, 6)
+    times = 50.0 + np.arange(300) / 25.0
+    times += np.random.default_rng(0).normal(0.0, jitter_s, 300)
+    kept = np.delete(np.arange(300), [*range(100, 112), *range(200, 240)])
+    path = tmp_path / "a.xdf"
+    write_xdf(path, points[kept], rate_hz=nominal_hz or 25.0, times=times[kept])
+    if not nominal_hz:
+        path.write_bytes(path.read_bytes().replace(b"<nominal_srate>25.0", b"<nominal_srate>00.0"))
+    recording = open_recording(path)
+    assert recording.rate_hz == pytest.approx(25.0, rel=1e-3)
+    assert np.array_equal(np.flatnonzero(~np.isnan(recording.frames).any(axis=1)), kept)
+    assert recording.markers[kept] == pytest.approx(points[kept], abs=1e-6)
+
+
+def test_what_comes_late_and_is_made_up_for_is_not_lost(tmp_path: Path) -> None:
+    points = person(300, 6)
+    times = 50.0 + np.arange(300) / 25.0
+    times[100:110] = times[110]  # the network held ten frames back
+    recording = open_recording(write_xdf(tmp_path / "a.xdf", points, rate_hz=25.0, times=times))
+    assert recording.markers == pytest.approx(points, abs=1e-6)
+
+
 def test_zeros_and_nines_are_what_was_not_seen(tmp_path: Path) -> None:
     points = person(40, 6)
     holed = points.copy()

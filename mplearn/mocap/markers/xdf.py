@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from ...recording import FloatArray, IntArray, Recording
+from ...recording import BoolArray, FloatArray, IntArray, Recording
 from ..files import bad_file, read_bytes
 from ..findings import Findings
 from ..numbers import without_unseen
@@ -26,13 +26,16 @@ _POSITION = re.compile(r"(?:position|pos)?_?([xyz])", re.I)
 _AXIS = re.compile(r"[\s._:|/\-]*(?:pos(?:ition)?)?[\s._:|/\-]*[xyz]$", re.I)
 _BREAK_S = 1.0  # a stream stands still for longer: frames are missing there
 _BREAK_FRAMES = 500
+_LOST, _AROUND = 1.5, 50  # how many frames late stamps are, at least; for how many, as before
+_OFF = 0.1  # by which the usual step is off a nominal rate that is right
 
 
 class XDFReader(Reader):
     """Reads the stream of markers of an XDF file; the one with most of them, if there are several.
 
     Time stamps jitter as the network does: frames are taken as even, as pyxdf takes them, with a
-    gap where the stream stands still for a second and 500 frames.
+    gap where the stream stands still for a second and 500 frames, and where frames were lost:
+    what comes after is late for good, and not only until a delay is made up for.
     """
 
     format = "XDF"
@@ -116,7 +119,9 @@ def _even(
     steps = np.diff(times)
     usual = 1.0 / stream.rate_hz if stream.rate_hz else float(np.median(steps)) if len(steps) else 0
     broken = np.flatnonzero(
-        (steps > _BREAK_S) & (steps > _BREAK_FRAMES * usual) | (steps < -_BREAK_S)
+        (steps > _BREAK_S) & (steps > _BREAK_FRAMES * usual)
+        | (steps < -_BREAK_S)
+        | _are_lost(times, stream.rate_hz)
     )
     rate_hz = hints.rate_hz or _rate(times, broken) or stream.rate_hz
     if not 1e-3 < rate_hz < 1e5:
@@ -133,6 +138,28 @@ def _even(
     frames = np.full((len(times) + int(lost.sum()), values.shape[1]), np.nan)
     frames[np.arange(len(times)) + np.cumsum(lost)] = values
     return rate_hz, frames
+
+
+def _are_lost(times: FloatArray, nominal_hz: float) -> BoolArray:
+    """Return whether frames were lost between each sample and the next, shape (T - 1,).
+
+    Samples come late by chance, never early: in a stretch, the least late ones tell.
+
+    Args:
+        times: Time stamps, shape (T,) [s].
+        nominal_hz: The nominal rate [1/s]; 0 where that is not known.
+    """
+    steps = np.diff(times)
+    step_s = float(np.median(steps)) if len(steps) else 0.0
+    if nominal_hz and abs(step_s * nominal_hz - 1.0) > _OFF:  # wrong, or samples came in bursts
+        return np.zeros(len(steps), dtype=bool)
+    step_s = 1.0 / nominal_hz if nominal_hz else step_s
+    late = times - step_s * np.arange(len(times))
+    lost: BoolArray = (steps > (1.0 + _LOST) * step_s) & (step_s > 0.0)
+    for i in np.flatnonzero(lost) + 1:
+        shift = late[i : i + _AROUND].min() - late[max(i - _AROUND, 0) : i].min()
+        lost[i - 1] = shift > _LOST * step_s
+    return lost
 
 
 def _rate(times: FloatArray, broken: IntArray) -> float:

@@ -1,8 +1,8 @@
 """Motions of the Unitree G1 as tables: the kind that LAFAN1 was retargeted to, and SEED's.
 
 * 36 numbers a row, with a header or without: the pelvis' place [m], its orientation as a quaternion
-  (x, y, z, w), and the 29 joints in order [rad], 30 Hz; without a header there may be a frame's
-  number or time before them;
+  (x, y, z, w), and the 29 joints in order, 30 Hz; without a header there may be a frame's number or
+  time before them. Angles are radians, or degrees where names or their size say so;
 * a header ``Frame, root_translateX, ..., root_rotateX, ..., left_hip_pitch_joint_dof, ...``:
   centimetres, degrees, the pelvis' rotations about the fixed axes x, y, z in turn, 120 Hz.
 """
@@ -36,6 +36,8 @@ _QUATERNION = re.compile(rf"{_ROOT}(?:q|quat|quaternion|rot|orientation)_?([xyzw
 _ROTATION = re.compile(rf"{_ROOT}(?:rotate|rotation|euler)_?([xyz])")
 _TIMES = ("time", "time_s", "timestamp", "t")
 _RETARGETED_HZ, _SEED_HZ = 30.0, 120.0
+_UNITS = {"deg": "degrees", "degrees": "degrees", "rad": "radians", "radians": "radians"}
+_ENDINGS = re.compile(rf"(_joint|_dof|_pos|_angle|_{'|_'.join(_UNITS)})+$")
 _MOST_BEFORE = 2  # columns before a pose: a frame's number, and its time
 _EXPECTED = "the pelvis' place and orientation, and the G1's 29 joints"
 
@@ -68,8 +70,9 @@ class G1CSVReader(Reader):
             return False
         pose = row[-_WIDTH:]
         with np.errstate(over="ignore"):
-            turned = abs(float(np.linalg.norm(pose[3:7])) - 1.0) < 0.01
-        return turned and bool(np.abs(pose[7:]).max() < 2 * np.pi)
+            off = abs(float(np.linalg.norm(pose[3:7])) - 1.0)
+        reach = np.abs(pose[7:]).max()
+        return bool(off < 0.01 and reach < 2 * np.pi) or bool(off < 1e-4 and reach < 360.0)
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read angles, or where the robot's joints are; see `Reader.read`."""
@@ -94,11 +97,12 @@ class G1CSVReader(Reader):
         values[:, 3:6] = _root_angles(table, at, findings)
         joints = [name for name in G1_JOINTS if name in at]
         angles = table[:, [at[name] for name in joints]]
-        if not seed and np.nanmax(np.abs(angles), initial=0.0) > 2 * np.pi:
+        unit = hints.angle_unit or _said_unit(header) or ("degrees" if seed else None)
+        if unit is None and np.nanmax(np.abs(angles), initial=0.0) > 2 * np.pi:
             findings.warn("joint angles above a full turn: they are taken for degrees")
-            seed = True
+            unit = "degrees"
         values[:, [len(BASE) + G1_JOINTS.index(name) for name in joints]] = (
-            np.radians(angles) if seed else angles
+            np.radians(angles) if unit == "degrees" else angles
         )
         rate_hz = hints.rate_hz or (_SEED_HZ if "qw" not in at else _RETARGETED_HZ)
         if "time" in at:
@@ -141,9 +145,20 @@ def _counts(column: FloatArray) -> str:
 
 def _joint(name: str) -> str | None:
     """Return the joint of the G1 that a column is named after: ``waist_yaw``, ``..._joint_dof``."""
-    words = re.sub(r"(?<=[a-z])(?=[A-Z])|[\s.\-]+", "_", name.strip()).lower()
-    plain = re.sub(r"(_joint|_dof|_pos|_angle|_rad|_deg)+$", "", words)
+    plain = _ENDINGS.sub("", _words(name))
     return f"{plain}_joint" if f"{plain}_joint" in G1_JOINTS else None
+
+
+def _words(name: str) -> str:
+    """Return a name with its words in small letters, ``_`` between them."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])|[\s.\-()\[\]]+", "_", name.strip()).lower().strip("_")
+
+
+def _said_unit(header: list[str]) -> str | None:
+    """Return the unit that the joints' names say, ``left_knee_deg``; None for none or several."""
+    last = [_words(name).rpartition("_")[2] for name in header if _joint(name) is not None]
+    units = {_UNITS.get(word) for word in last}
+    return units.pop() if len(units) == 1 else None
 
 
 def _columns(path: Path, header: list[str], findings: Findings) -> dict[str, int]:
