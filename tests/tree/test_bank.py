@@ -74,6 +74,16 @@ def test_many_modelled_at_once_are_what_each_is_by_itself(by_rows: bool) -> None
             np.testing.assert_array_equal(getattr(bank[number], name), getattr(alone, name))
 
 
+def test_a_model_does_not_depend_on_how_points_lie_in_memory() -> None:
+    bank = banked(np.random.default_rng(3), range(20))
+    again = ExemplarBank.from_state(bank.config, bank.state(range(20)))
+    for number in range(20):
+        for name in Exemplar._fields:
+            np.testing.assert_array_equal(
+                getattr(again[number], name), getattr(bank[number], name), err_msg=name
+            )
+
+
 def test_what_cannot_be_modelled_leaves_a_bank_as_it_was() -> None:
     bank = ExemplarBank(TreeConfig(), D, np.full(D, 0.09))
     many = np.array([points(np.random.default_rng(k), bank.config) for k in range(3)])

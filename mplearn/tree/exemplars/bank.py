@@ -112,7 +112,7 @@ class ExemplarBank:
 
     def _models(self, points: FloatArray, durations: FloatArray) -> Exemplar:
         """Model many segments at once, shapes (n, P, D) and (n,), stacked; see above."""
-        points = points.astype(np.float32).astype(np.float64)
+        points = points.astype(np.float32, order="C").astype(np.float64)
         if not np.isfinite(self.config.extent_share):  # nothing asks for it
             return self._modelled(points, durations)
         n = len(points)
