@@ -74,6 +74,15 @@ def test_what_comes_late_and_is_made_up_for_is_not_lost(tmp_path: Path) -> None:
     assert recording.markers == pytest.approx(points, abs=1e-6)
 
 
+@pytest.mark.parametrize("jitter_s", [0.004, 0.01, 0.02])
+def test_jitter_is_no_loss(tmp_path: Path, jitter_s: float) -> None:
+    points = person(600, 6)
+    times = 50.0 + np.arange(600) / 100.0
+    times += np.random.default_rng(1).normal(0.0, jitter_s, 600)
+    recording = open_recording(write_xdf(tmp_path / "a.xdf", points, rate_hz=100.0, times=times))
+    assert recording.markers == pytest.approx(points, abs=1e-6)
+
+
 def test_zeros_and_nines_are_what_was_not_seen(tmp_path: Path) -> None:
     points = person(40, 6)
     holed = points.copy()

@@ -27,6 +27,7 @@ _AXIS = re.compile(r"[\s._:|/\-]*(?:pos(?:ition)?)?[\s._:|/\-]*[xyz]$", re.I)
 _BREAK_S = 1.0  # a stream stands still for longer: frames are missing there
 _BREAK_FRAMES = 500
 _LOST, _AROUND = 1.5, 50  # how many frames late stamps are, at least; for how many, as before
+_JITTERS = 3.0  # how many times the usual jitter they are later than that, at least
 _OFF = 0.1  # by which the usual step is off a nominal rate that is right
 
 
@@ -155,10 +156,12 @@ def _are_lost(times: FloatArray, nominal_hz: float) -> BoolArray:
         return np.zeros(len(steps), dtype=bool)
     step_s = 1.0 / nominal_hz if nominal_hz else step_s
     late = times - step_s * np.arange(len(times))
-    lost: BoolArray = (steps > (1.0 + _LOST) * step_s) & (step_s > 0.0)
+    jitter_s = float(np.median(np.abs(steps - step_s))) if len(steps) else 0.0
+    least_s = _LOST * step_s + _JITTERS * jitter_s
+    lost: BoolArray = (steps > step_s + least_s) & (step_s > 0.0)
     for i in np.flatnonzero(lost) + 1:
         shift = late[i : i + _AROUND].min() - late[max(i - _AROUND, 0) : i].min()
-        lost[i - 1] = shift > _LOST * step_s
+        lost[i - 1] = shift > least_s
     return lost
 
 
