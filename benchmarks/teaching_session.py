@@ -137,7 +137,7 @@ class Teacher:
 
     def listening(self) -> str | None:
         """Return where frames go, as soon as the page says that they are waited for."""
-        state = self.page.locator("#state").inner_text()
+        state = self.page.locator("#state").text_content()
         found = re.fullmatch(r"(ndjson:\S+) — waiting for frames", state)
         return found and str(found[1])
 

@@ -27,6 +27,8 @@ from mplearn.tree import Placement
 
 from .messages import Header, mention
 
+_FAR = 10.0  # farther than so many times what is allowed, it is not said how far
+
 
 def tell(events: Iterable[Event], rate_hz: float) -> Iterator[Header]:
     """Yield messages about events, in their order.
@@ -87,6 +89,8 @@ def _why(placement: Placement) -> str:
         why = "nothing is known to compare it with"
     elif placement.ratio > 1.0:
         times = f"{max(placement.ratio, 1.01):.{2 if placement.ratio < 1.1 else 1}f}"
+        if placement.ratio > _FAR:
+            times = f"more than {_FAR:.0f}"
         why = f"nearest is {mention(placement.nearest)}, {times} times as far as allowed"
     else:
         why = f"it is near {mention(placement.nearest)}, but not surely of it"

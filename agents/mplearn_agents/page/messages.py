@@ -8,6 +8,7 @@ binary (`tick`, `clip`).
 from __future__ import annotations
 
 import json
+import re
 import struct
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -22,6 +23,7 @@ Poses = NDArray[np.float32]
 
 LONGEST_REQUEST = 8192  # characters
 TICK, CLIP = 1, 2
+_BACKWARD = re.compile("[\u0590-\u08ff\u200f\u202a-\u202e\u2066-\u2069\ufb1d-\ufdff\ufe70-\ufeff]")
 _TICK = struct.Struct("<BBHHHII")  # kind, 0, bodies of person and robot, channels, first row, rows
 _CLIP = struct.Struct("<BBHIfI")  # kind, 0, bodies, number of the request, rate, motions
 
@@ -51,10 +53,13 @@ def mention(id: int | None) -> str:
 def literal(text: object) -> str:
     """Return a text as part of another, where none of it stands for a primitive.
 
+    What is written from right to left is kept apart, so that the rest stays where it was.
+
     >>> literal("{1} is a name"), mention(1)
     ('{{1} is a name', '{1}')
     """
-    return str(text).replace("{", "{{")
+    plain = str(text).replace("{", "{{")
+    return f"\u2068{plain.replace(chr(0x2069), '')}\u2069" if _BACKWARD.search(plain) else plain
 
 
 def tick(person: Poses, robot: Poses, first: int, rows: Poses) -> bytes:

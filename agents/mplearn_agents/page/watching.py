@@ -39,6 +39,7 @@ MOST_WAITING = 3_000  # blocks of the stream that may wait for the learner
 STATUS_S, KNOWLEDGE_S = 0.25, 0.2
 _WARM_UP = ("BAR", "BAL") * 4
 _TEACHERS, _STREAM = 0, 1  # who comes first
+_FORESEEN, _TOLD = 8, 3  # motions that may come next: looked at, and told
 _DELAYS = 500  # frames over which the delay is measured
 
 
@@ -296,17 +297,20 @@ class Watcher:
     def _tell_forecast(self) -> None:
         """Say what comes next, and when."""
         assert self._lifelong is not None
-        learner, coming = self._lifelong.learner, []
-        for each in learner.predict_next(3):
+        coming: dict[int | None, Header] = {}  # whatever has no primitive yet is one line of it
+        for each in self._lifelong.learner.predict_next(_FORESEEN):
             at = self._last_motion + each.duration_s * self._rate_hz
-            coming.append(
+            known = coming.setdefault(
+                each.id,
                 {
                     "id": each.id,
-                    "p": round(each.probability, 3),
+                    "p": 0.0,
                     "frame": round(at) if math.isfinite(at) and self._last_motion >= 0 else None,
-                }
+                },
             )
-        self._outbox.post({"kind": "forecast", "next": coming}, key="forecast")
+            known["p"] = round(known["p"] + each.probability, 3)
+        likeliest = sorted(coming.values(), key=lambda each: -each["p"])[:_TOLD]
+        self._outbox.post({"kind": "forecast", "next": likeliest}, key="forecast")
 
     def _tell_knowledge(self) -> None:
         """Say what is known, if that has changed; where much has, only after some more blocks."""

@@ -132,6 +132,66 @@ def test_all_fits_without_scrolling(server, new_page, size, screen):
         assert box["y"] >= 0 and box["y"] + box["height"] <= size[1]
 
 
+def test_what_is_done_is_read_whole_beside_all_figures(server, new_page):
+    """However much there is to say, whether it learns is not what is cut."""
+    server.hear(
+        {"kind": "status", "source": "lsl:" + "a stream with a long name " * 4, "paused": True}
+        | {"state": "live", "rate_hz": 100.0, "delay_ms": 53406.2, "delay_99_ms": 60000.0}
+        | {"behind_s": 325.31, "lost": 12, "faults": {"doubled": 3}, "frames": 1, "person": 1}
+    )
+    page = new_page(server.url)
+    doing = page.locator("#state .doing")
+    until(lambda: "learning is paused" in doing.text_content(), 5)
+    assert doing.evaluate("(e) => e.scrollWidth <= e.clientWidth + 1")
+    assert doing.bounding_box()["x"] > 150
+    figures = page.locator("#figures").inner_text()
+    assert "53.4 s" in figures and "325.3 s of motion" in figures
+    server.hear({"kind": "status", "source": "made up", "state": "live", "frames": 1})
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (1920, 1080)])
+def test_names_in_the_whole_graph_lie_apart(server, new_page, size):
+    names = [f"raise the arm, way {k}" for k in range(1, 13)]
+    server.hear(world.stream())
+    server.hear(world.knowledge(len(names), names))
+    page = new_page(server.url, *size)
+    texts = page.locator("#graph .node text")
+    until(lambda: texts.count() == len(names), 10)
+
+    def apart():
+        boxes = [text.bounding_box() for text in texts.all()]
+        return all(
+            a["x"] + a["width"] <= b["x"] + 2
+            or b["x"] + b["width"] <= a["x"] + 2
+            or a["y"] + 0.7 * a["height"] <= b["y"]
+            or b["y"] + 0.7 * b["height"] <= a["y"]
+            for a, b in itertools.combinations(boxes, 2)
+        )
+
+    until(apart, 20, "names that do not cover each other")
+
+
+def test_a_question_goes_when_it_is_answered(server, new_page):
+    """Who says that two are one sees the tree that he chooses from, and is asked once."""
+    server.hear(world.stream())
+    server.hear(world.knowledge(12))
+    page = new_page(server.url)
+    until(lambda: rows(page).count() == 12, 10)
+    rows(page).nth(3).click()
+    page.keyboard.press("m")
+    question = page.locator("#notes div", has_text="Choose it in tree or graph")
+    until(lambda: question.count() == 1, 5)
+    asked, tree = question.bounding_box(), page.locator("#tree").bounding_box()
+    assert asked["x"] + asked["width"] <= tree["x"]
+    rows(page).nth(11).scroll_into_view_if_needed()
+    rows(page).nth(11).click()
+    until(lambda: question.count() == 0, 5)
+    page.keyboard.press("m")
+    until(lambda: question.count() == 1, 5)
+    page.keyboard.press("Escape")
+    until(lambda: question.count() == 0, 5)
+
+
 def test_names_are_text_never_markup(server, new_page):
     server.hear(world.stream())
     server.hear(world.knowledge(len(world.HOSTILE), world.HOSTILE))

@@ -1,6 +1,6 @@
 // The card of the primitive that was chosen: what is known of it, and what a teacher can say to it.
 
-import { element } from "./side.js";
+import { apart, element } from "./side.js";
 
 const MOST = 6; // followers that are named
 
@@ -36,7 +36,7 @@ export class Card {
   }
 
   build(primitive) {
-    this.input = element("input", { value: primitive.name, maxLength: 80, title: "its name: type another (N)", ariaLabel: "name", spellcheck: false });
+    this.input = element("input", { value: primitive.name, maxLength: 80, title: `${primitive.name}: type another name (N)`, ariaLabel: "name", spellcheck: false });
     this.input.addEventListener("keydown", (e) => { if (e.key === "Enter") this.input.blur(); if (e.key === "Escape") this.input.value = primitive.name; });
     this.input.addEventListener("blur", () => this.name(this.input.value));
     this.facts = element("p", { className: "facts" });
@@ -92,7 +92,7 @@ export class Card {
       case "name": this.input.focus(); this.input.select(); break;
       case "show": choose(id); break;
       case "path": ask("path", { id }); break;
-      case "merge": pick((other) => ask("merge", { id, other }, { undo: true }), `Which one is the same as ${label(id)}? Choose it in tree or graph.`); break;
+      case "merge": pick((other) => ask("merge", { id, other }, { undo: true }), `Which one is the same as ${apart(label(id))}? Choose it in tree or graph.`); break;
       case "split": ask("split", { id }, { undo: true }); break;
       case "freeze": ask(this.page.world.primitives.get(id)?.frozen ? "unfreeze" : "freeze", { id }, { undo: true }); break;
       case "note": this.note(id); break;

@@ -6,6 +6,7 @@ const WHOLE_MOST = 40;      // primitives up to which the whole graph is shown b
 const LABELS_MOST = 44;     // edges up to which each has its probability beside it
 const NAMED_MOST = 90;      // primitives up to which each has its name below it
 const AROUND_MOST = 9;      // primitives in a column
+const APART_MOST = 60;      // primitives up to which names lie apart, and edges go around others
 
 export class Graph {
   constructor(svg, choose) {
@@ -127,18 +128,22 @@ export class Graph {
       const p = this.places.get(id);
       return { x: n === 1 ? width / 2 : margin.x + ((p.x - box.x) / box.w) * (width - 2 * margin.x), y: n === 1 ? height / 2 : margin.y + ((p.y - box.y) / box.h) * (height - 2 * margin.y - size) };
     };
-    const at = new Map(this.ids.map((id) => [id, place(id)]));
+    const letters = n > APART_MOST ? 8 : 18, at = new Map(this.ids.map((id) => [id, place(id)]));
+    const room = this.ids.map((id) => ({ at: at.get(id), w: named ? 0.6 * size * Math.min(letters, this.primitives.get(id).name.length) : 0 }));
+    if (n <= APART_MOST) apart(room, r, size, { x0: margin.x, x1: width - margin.x, y0: margin.y, y1: height - margin.y - size });
     const pairs = new Set(this.edges.map((e) => `${e[0]} ${e[1]}`));
     const { texts } = this;
     const labels = this.edges.length <= LABELS_MOST;
     for (const edge of this.edges) {
       if (!at.has(edge[0]) || !at.has(edge[1])) continue;
       const lit = edge[0] === this.marks.present, dim = this.dims(edge[0], edge[1]);
-      this.edge(at.get(edge[0]), at.get(edge[1]), r, edge, { lit, dim, bent: pairs.has(`${edge[1]} ${edge[0]}`), label: (labels || lit) && !dim, size });
+      const from = at.get(edge[0]), to = at.get(edge[1]), bent = pairs.has(`${edge[1]} ${edge[0]}`);
+      const bend = n <= APART_MOST ? clearing(from, to, bent, [...at.values()], r) : bending(from, to, bent);
+      this.edge(from, to, r, edge, { lit, dim, bend, label: (labels || lit) && !dim, size });
     }
-    for (const id of this.ids) this.node(id, at.get(id), r, size, n > 60 ? 8 : 18, named, width);
-    uncovered(texts, [...at.values()].flatMap(({ x, y }) => [
-      { x: x - r, y: y - r, w: 2 * r, h: 2 * r }, { x: x - 1.2 * size, y: y + r, w: 2.4 * size, h: 1.3 * size }]), size);
+    for (const id of this.ids) this.node(id, at.get(id), r, size, letters, named, width);
+    uncovered(texts, room.flatMap(({ at: { x, y }, w }) => [
+      { x: x - r, y: y - r, w: 2 * r, h: 2 * r }, { x: x - w / 2, y: y + r, w, h: 1.3 * size }]), size);
     if (!named) this.over(at, r, size);
   }
 
@@ -177,7 +182,7 @@ export class Graph {
     const itself = this.edges.find((e) => e[0] === id && e[1] === id);
     const top = 2.1 * size, most = Math.max(1, Math.min(AROUND_MOST, Math.floor((height - top) / (2.9 * size))));
     const r = 0.95 * size, centre = { x: width / 2, y: (height + top) / 2 - 0.6 * size };
-    const draw = (edge, from, to, bent) => this.edge(from, to, r, edge, { lit: edge[0] === this.marks.present, dim: false, bent, label: true, size, late: edge[0] === id });
+    const draw = (edge, from, to, bent) => this.edge(from, to, r, edge, { lit: edge[0] === this.marks.present, dim: false, bend: bending(from, to, bent), label: true, size, late: edge[0] === id });
     const column = (list, x, end, head) => {
       const shown = list.slice(0, most), step = Math.min((height - top) / Math.max(shown.length, 1), 5 * size);
       const text = make("text", { class: "head", x, y: 1.4 * size });
@@ -197,7 +202,7 @@ export class Graph {
     this.node(id, centre, 1.4 * r, size, 24, true, width);
   }
 
-  edge(from, to, r, [source, target, count, p], { lit, dim, bent, label, size, late = false }) {
+  edge(from, to, r, [source, target, count, p], { lit, dim, bend, label, size, late = false }) {
     const dx = to.x - from.x, dy = to.y - from.y, length = Math.hypot(dx, dy);
     const kind = `${lit ? " lit" : ""}${dim ? " dim" : ""}`;
     const weight = Math.max(0.8, 0.28 * r * (0.12 + p)), opacity = 0.25 + 0.6 * p;
@@ -208,7 +213,7 @@ export class Graph {
       tip = { x: from.x + 0.55 * r, y: from.y - 0.9 * r }; way = { x: -0.3, y: 1 }; middle = { x: from.x, y: from.y - 1.6 * s };
     } else {
       if (length < 2.2 * r) return;
-      const bend = bent ? Math.min(0.16 * length, 26) : 0.03 * length, ux = dx / length, uy = dy / length;
+      const ux = dx / length, uy = dy / length;
       const cx = (from.x + to.x) / 2 - uy * bend * 2, cy = (from.y + to.y) / 2 + ux * bend * 2;
       const out = unit(cx - from.x, cy - from.y); way = unit(to.x - cx, to.y - cy);
       const head = 2.2 + 2.2 * weight;
@@ -236,7 +241,7 @@ export class Graph {
 
   node(id, at, r, size, letters, named, width) {
     const { present, chosen, next, matched } = this.marks, primitive = this.primitives.get(id);
-    const off = (chosen != null && !this.around && this.ids.length > 12 && !this.near(id)) || (matched && !matched.has(id));
+    const off = id !== present && id !== chosen && ((chosen != null && !this.around && this.ids.length > 12 && !this.near(id)) || (matched && !matched.has(id)));
     const kind = ["node", id === present && "lit", id === chosen && "chosen", id === next && "next", primitive?.of > 0 && "provisional", off && "dim"].filter(Boolean).join(" ");
     const g = this.nodes.get(id, () => {
       const made = make("g", { "data-id": id, tabindex: 0, role: "button" });
@@ -251,6 +256,55 @@ export class Graph {
     set(text, { x: f(Math.max(half - at.x, Math.min(0, width - half - at.x))), y: f(r + 1.05 * size) });
     write(text, words);
     write(title, primitive?.name ?? "");
+  }
+}
+
+// How far an edge leaves the straight line: both ways between two are seen [px].
+function bending(from, to, bent) {
+  const length = Math.hypot(to.x - from.x, to.y - from.y);
+  return bent ? Math.min(0.16 * length, 26) : 0.03 * length;
+}
+
+// The same, but so that it goes behind no other primitive where that can be avoided.
+function clearing(from, to, bent, places, r) {
+  const plain = bending(from, to, bent), dx = to.x - from.x, dy = to.y - from.y, length = Math.hypot(dx, dy);
+  if (length < 4 * r) return plain;
+  const others = places.filter((p) => p !== from && p !== to);
+  const nearest = (bend) => {
+    let least = 1.3 * r;
+    for (const t of [0.15, 0.25, 0.35, 0.5, 0.65, 0.75, 0.85]) {
+      const off = 4 * t * (1 - t) * bend, x = from.x + t * dx - (dy / length) * off, y = from.y + t * dy + (dx / length) * off;
+      for (const p of others) least = Math.min(least, Math.hypot(p.x - x, p.y - y));
+    }
+    return least;
+  };
+  const turns = bent ? [plain, 2.2 * r, 3.5 * r] : [plain, -plain, 1.7 * r, -1.7 * r, 3 * r, -3 * r];
+  let best = plain, most = -1;
+  for (const bend of turns) {
+    const least = nearest(bend);
+    if (least > most + 0.01) { best = bend; most = least; }
+    if (most >= 1.3 * r) break;
+  }
+  return best;
+}
+
+// Move primitives so far that their names do not cover each other, where there is room.
+function apart(room, r, size, { x0, x1, y0, y1 }) {
+  const wide = ({ w }) => Math.max(2 * r, w) + 6, h = 2 * r + 1.35 * size;
+  for (let round = 0; round < 12; round++) {
+    let moved = false;
+    for (let i = 0; i < room.length; i++) {
+      for (let j = i + 1; j < room.length; j++) {
+        const a = room[i].at, b = room[j].at, dx = b.x - a.x, dy = b.y - a.y;
+        const ox = (wide(room[i]) + wide(room[j])) / 2 - Math.abs(dx), oy = h - Math.abs(dy);
+        if (ox <= 0 || oy <= 0) continue;
+        moved = true;
+        if (ox < oy) { const go = Math.sign(dx || 1) * 0.5 * ox; a.x -= go; b.x += go; }
+        else { const go = Math.sign(dy || 1) * 0.5 * oy; a.y -= go; b.y += go; }
+        for (const p of [a, b]) { p.x = Math.min(x1, Math.max(x0, p.x)); p.y = Math.min(y1, Math.max(y0, p.y)); }
+      }
+    }
+    if (!moved) return;
   }
 }
 

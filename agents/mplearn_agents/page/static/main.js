@@ -83,6 +83,7 @@ function learn({ primitives, nodes, edges, waiting, revision }) {
   for (const p of primitives) world.names.set(p.id, p.name);
   Object.assign(world, { nodes, edges, waiting, revision });
   if (world.chosen !== null && !world.primitives.has(world.chosen)) choose(null);
+  if (world.chosen !== null) stage.captions.shown = label(world.chosen);
   tree.set(nodes, world.primitives);
   graph.set(world.primitives, edges);
   side.learning(world.primitives, waiting);
@@ -100,7 +101,7 @@ function present() {
   const last = world.segments[world.segments.length - 1];
   const id = moved?.primitive ?? null;
   world.present = id !== null && world.primitives.has(id) ? id : null;
-  if (!moved) side.now({ text: world.stream ? "watching" : "waiting", lit: false, why: "" });
+  if (!moved) side.now({ text: world.stream ? "watching" : "waiting", lit: false, why: world.stream ? "no motion has ended yet" : world.status.state ?? "" });
   else if (id !== null) {
     const still = last.state === "still";
     side.now({ text: label(id), lit: true, why: still ? "and stands still since" : moved.state === "new" ? "seen often enough to be a primitive now" : "" });
@@ -123,8 +124,8 @@ function matches() {
 function status() {
   const s = world.status, p = world.processes;
   const stopped = p.learner === "stopped" || p.learner === "starting";
-  const state = stopped ? `the learner is ${p.learner}` : `${s.source ?? ""} — ${s.paused ? "learning is paused" : s.state ?? "starting"}`;
-  set(find("#state"), state);
+  set(find("#state .source"), stopped ? "" : s.source ?? "");
+  set(find("#state .doing"), stopped ? `the learner is ${p.learner}` : ` — ${s.paused ? "learning is paused" : s.state ?? "starting"}`);
   root.dataset.frames = s.frames;
   find("#state").dataset.live = !stopped && s.state === "live" && !s.paused ? "yes" : "no";
   world.paused = Boolean(s.paused);
@@ -134,14 +135,18 @@ function status() {
   figures([
     ["", s.person ? `person ${s.person}${s.people > 1 ? ` of ${s.people}` : ""}` : "nobody yet", ""],
     ["rate", s.rate_hz ? `${s.rate_hz.toFixed(0)} Hz` : "–", ""],
-    ["delay", s.delay_ms == null ? "–" : `${s.delay_ms.toFixed(0)} ms`, s.delay_99_ms == null ? "" : `99 of 100 within ${s.delay_99_ms.toFixed(0)} ms`, s.delay_ms > 100],
+    ["delay", spell(s.delay_ms), s.delay_99_ms == null ? "" : `99 of 100 within ${spell(s.delay_99_ms)}`, s.delay_ms > 100],
     ["lost", `${s.lost ?? 0}`, faults || "nothing was lost", s.lost > 0],
     ...(s.problem ? [["store", "not kept", s.problem, true]] : []),
-    ...(s.behind_s > 0.3 ? [["behind", `${s.behind_s.toFixed(1)} s`, "the learner is slower than the stream; nothing is dropped", true]] : []),
+    ...(s.behind_s > 0.3 ? [["waiting", `${s.behind_s.toFixed(1)} s of motion`, "the learner is slower than the stream; nothing is dropped", true]] : []),
     ...(p.clients > 1 ? [["", `${p.clients} look on`, ""]] : []),
   ]);
   stage.captions.person = s.person ? `person ${s.person}` : "";
+  if (!world.stream) present();
 }
+
+// Milliseconds, in words.
+function spell(ms) { return ms == null ? "–" : ms < 1000 ? `${ms.toFixed(0)} ms` : `${(ms / 1000).toFixed(1)} s`; }
 
 function figures(list) {
   const box = find("#figures");
@@ -160,7 +165,7 @@ function robot() {
   let text = "robot";
   if (state === "none") text = "no robot";
   else if (state === "stopped") text = "robot: starting again";
-  else if (r.primitive != null) text = `${label(r.primitive)}${r.left ? ` + ${r.left}` : ""}`;
+  else if (r.primitive != null) text = `${label(r.primitive)}${r.left ? `, ${r.left} more` : ""}`;
   else if (r.cannot) text = "robot: cannot perform this";
   else if (r.left) text = "robot: planning";
   stage.captions.robot = text;
@@ -173,6 +178,7 @@ function robot() {
 
 let asked = null;      // number of the request for the figure that is shown
 let picking = null;    // what to do with the next primitive that is chosen
+let question = null;   // the note that asks for it
 
 async function ask(what, values, { quiet = false, undo = false } = {}) {
   const reply = await link.ask(what, values);
@@ -202,7 +208,8 @@ function show(id) {
 function pick(take, text) {
   picking = take;
   root.classList.toggle("choosing", Boolean(take));
-  if (take) note(text, ["Cancel", () => pick(null)], 8000);
+  question?.remove();
+  question = take ? note(text, ["Cancel", () => pick(null)], Infinity) : null;
 }
 
 function note(text, action = null, lasts = 4500) {
@@ -211,7 +218,8 @@ function note(text, action = null, lasts = 4500) {
   const notes = find("#notes");
   notes.append(box);
   while (notes.childElementCount > 3) notes.firstElementChild.remove();
-  setTimeout(() => box.remove(), lasts);
+  if (lasts < Infinity) setTimeout(() => box.remove(), lasts);
+  return box;
 }
 
 // ---- keys and buttons

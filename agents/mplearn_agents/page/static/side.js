@@ -18,6 +18,7 @@ export class Side {
     this.next = find(".next");
     this.sum = find(".sum");
     this.list = find("#progress ul");
+    set(this.sum, "nothing learned yet");
     this.log = find("#log ol");
     this.items = [...Array(3)].map(() => {
       const item = element("li", { hidden: true });
@@ -85,7 +86,12 @@ export class Side {
   }
 
   // A text with the names of primitives in it; two braces are one that stands for none.
-  text(text) { return text.replace(/\{\{|\{(\d+)\}/g, (_, id) => (id === undefined ? "{" : this.label(Number(id)))); }
+  text(text) { return text.replace(/\{\{|\{(\d+)\}/g, (_, id) => (id === undefined ? "{" : apart(this.label(Number(id))))); }
+}
+
+// A name within a text: where it is written from right to left, the rest stays where it was.
+export function apart(name) {
+  return /[\u0590-\u08ff\u200f\u202a-\u202e\u2066-\u2069\ufb1d-\ufdff\ufe70-\ufeff]/.test(name) ? `\u2068${name.replaceAll("\u2069", "")}\u2069` : name;
 }
 
 export function set(node, text) { if (node.textContent !== text) node.textContent = text; }

@@ -4,7 +4,7 @@
 // ellipsoid is an ellipse (of the matrix P A P^T), that of a capsule a stroke with round ends; they
 // are drawn from the back to the front, each with two lighter shapes towards the light.
 
-const HEIGHT = 2.25;       // metres that are to be seen
+const HEIGHT = 2.5;        // metres that are to be seen: raised arms, too
 const TURN = 0.42;         // first azimuth of the camera [rad]
 const ELEVATION = 0.1;
 const BETWEEN = 30;        // ms over which a pose goes over to the next

@@ -91,8 +91,16 @@ export class Stream {
     const c = this.context, { width, height, ratio } = fitted(this.canvas, c);
     c.fillStyle = style.panel;
     c.fillRect(0, 0, width, height);
-    if (!this.width || width < 50) return;
-    const font = parseFloat(style.size), strip = Math.round(font * 2.5), left = 0;
+    const font = parseFloat(style.size);
+    if (!this.width || width < 50) {
+      c.font = `${font}px ${style.font}`;
+      c.fillStyle = style.soft;
+      c.textAlign = "left";
+      c.textBaseline = "top";
+      c.fillText("what is seen runs by here", 2, 12);
+      return;
+    }
+    const strip = Math.round(font * 2.5), left = 0;
     const perSecond = (width - left) / (PAST + COMING);
     const nowX = left + PAST * perSecond, lanesHeight = height - strip - 6;
     const now = Math.max(this.now, 0), x = (s) => nowX + (s - now) * perSecond;

@@ -13,6 +13,7 @@ export class Tree {
     this.marks = new Keyed(make("g"));
     svg.append(this.lines, this.marks.root);
     this.nodes = [];
+    this.primitives = new Map();
     svg.addEventListener("click", (e) => this.clicked(e));
     svg.addEventListener("keydown", (e) => this.key(e));
   }
@@ -87,7 +88,8 @@ export class Tree {
     const root = this.nodes.find((n) => n.parent === null);
     const width = this.scroll.clientWidth, height = this.scroll.clientHeight;
     this.lines.replaceChildren();
-    if (!root || !width) { this.marks.keep(new Set()); return; }
+    if (!width) { this.marks.keep(new Set()); return; }
+    if (!root) { this.empty(width, height); return; }
     const leaves = (id) => (children.get(id) ?? []).reduce((n, c) => n + leaves(c.id), 0) || 1;
     const named = (id) => this.primitives.get(id)?.name ?? "";
     const matches = (id) => !this.wanted || named(id).toLowerCase().includes(this.wanted) || String(id) === this.wanted;
