@@ -19,7 +19,7 @@ from mplearn.recording import Recording
 from mplearn.sources import Block, Change, Stream, open_source
 from mplearn.sources.inbox import Inbox
 from mplearn.sources.played import PlayedSource
-from mplearn.sources.protocols import lsl_process
+from mplearn.sources.protocols import lsl, lsl_process
 from mplearn.sources.protocols.lsl import LSLReceiver, described, described_info
 from mplearn.sources.received import ReceivedSource
 from mplearn.sources.sending import open_sender, send
@@ -157,6 +157,54 @@ def test_who_pulls_may_end_amid_a_message(monkeypatch: pytest.MonkeyPatch, tmp_p
     monkeypatch.setattr(lsl_process, "__file__", str(script))
     with pytest.raises(OSError, match=r"the process that pulls the stream ended \(code 7\)"):
         LSLReceiver("x").receive(Inbox())
+
+
+HANGS = "import time\ndef resolve_byprop(*a, **b): time.sleep(600)\n"
+
+
+def hanging(folder: Path) -> dict[str, str]:
+    """Return the environment of a process in which the library never returns."""
+    (folder / "pylsl.py").write_text(HANGS)
+    return dict(os.environ) | {"PYTHONPATH": str(folder), "PYTHONSAFEPATH": ""}
+
+
+def test_where_the_library_hangs_it_is_ended_and_begun_anew(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for key, value in hanging(tmp_path).items():
+        monkeypatch.setenv(key, value)
+    monkeypatch.setattr(lsl, "HANGS_S", 0.7)
+    receiver = LSLReceiver("x")
+    with pytest.raises(OSError, match=r"liblsl said nothing for 0\.7 s: it hangs"):
+        receiver.receive(Inbox())
+    assert receiver._process is not None
+    assert receiver._process.returncode == -signal.SIGKILL
+
+
+def test_a_source_whose_library_hangs_closes(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for key, value in hanging(tmp_path).items():
+        monkeypatch.setenv(key, value)
+    receiver = LSLReceiver("x")
+    source = ReceivedSource("lsl:x", receiver)
+    while receiver._process is None:
+        time.sleep(0.01)
+    time.sleep(0.3)
+    source.close()
+    assert not source._thread.is_alive()
+    assert receiver._process.returncode == -signal.SIGKILL
+
+
+def test_who_hangs_ends_with_who_started_it(tmp_path: Path) -> None:
+    command = [sys.executable, lsl_process.__file__, "name", "x", "attended"]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(command, env=hanging(tmp_path), **pipes) as process:
+        assert process.stdout is not None
+        assert process.stdin is not None
+        assert process.stdout.read(lsl_process.HEAD.size)  # it has begun to look
+        process.stdin.close()  # as where its parent is killed
+        assert process.wait(10.0) == 0
 
 
 def test_a_description_says_names_and_unit() -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
+import time
 from types import ModuleType
 from typing import Any
 from xml.etree import ElementTree
@@ -25,6 +27,8 @@ from .lines import MOST_CHANNELS
 from .lsl_process import CHUNK, DESCRIBED, FAILED, HEAD, SAMPLES
 
 EXTRA = "live"
+HANGS_S = 15.0  # a process that says nothing for so long hangs; liblsl may take 5 s for an answer
+_LOOK_S = 0.2
 TYPE = "MoCap"  # as the layer's conventions call motion capture
 
 
@@ -37,8 +41,8 @@ def open_lsl(address: str, wanted: Wanted) -> Source:
 class LSLReceiver(Receiver):
     """Pulls a stream; where it is lost, one of the same name is looked for.
 
-    It is pulled by another process: where liblsl crashes, that one ends, and the stream is
-    disconnected and connected again as by any other loss.
+    It is pulled by another process: where liblsl crashes, that one ends, and where it hangs, that
+    one is ended; the stream is disconnected and connected again as by any other loss.
 
     Args:
         name: Of the stream; the first one of type MoCap where empty.
@@ -58,12 +62,12 @@ class LSLReceiver(Receiver):
     def receive(self, inbox: Inbox) -> None:
         """Look for the stream, and take what is pulled until it is lost."""
         what = ("name", self._name) if self._name else ("type", TYPE)
-        command = [sys.executable, lsl_process.__file__, *what]
+        command = [sys.executable, lsl_process.__file__, *what, "attended"]
         with subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE
         ) as self._process:
             try:
-                _take(self._process, inbox)
+                _Pulled(self._process, inbox).take()
             finally:
                 self._process.kill()
 
@@ -71,34 +75,72 @@ class LSLReceiver(Receiver):
         """Nothing stays open."""
 
 
-def _take(process: subprocess.Popen[bytes], inbox: Inbox) -> None:
-    """Take what a process of `lsl_process` says."""
-    stream, columns = Stream((), 0.0), np.zeros(0, np.int64)
-    while not inbox.closed:
-        kind, size = HEAD.unpack(_read(process, HEAD.size))
-        body = _read(process, size)
-        if kind == FAILED:
-            raise OSError(body.decode("utf-8", "replace"))
-        if kind == DESCRIBED:
-            stream, used = described(body.decode("utf-8", "surrogateescape"))
-            columns = np.array(used)
-        elif kind == SAMPLES:
-            arrived_s, n = CHUNK.unpack_from(body)
-            numbers = np.frombuffer(body, "<f8", offset=CHUNK.size)
-            rows = numbers[n:].reshape(n, -1)[:, columns]
-            rows[np.isinf(rows)] = np.nan
-            for row, time_s in zip(rows, numbers[:n].tolist(), strict=True):
-                inbox.put(Sample(stream, row, arrived_s, time_s=time_s))
+class _Pulled:
+    """What a process of `lsl_process` says, which is ended where it says nothing any more.
 
+    Args:
+        process: The process.
+        inbox: Where samples go.
+    """
 
-def _read(process: subprocess.Popen[bytes], size: int) -> bytes:
-    assert process.stdout is not None
-    data = process.stdout.read(size)
-    if len(data) < size:
-        code = process.wait()
+    def __init__(self, process: subprocess.Popen[bytes], inbox: Inbox) -> None:
+        self._process, self._inbox = process, inbox
+        self._heard_s = time.monotonic()
+        self._over = threading.Event()
+        self._hangs = False
+
+    def take(self) -> None:
+        """Take samples until nobody reads any more.
+
+        Raises:
+            OSError: The stream, or the process, is lost.
+        """
+        attending = threading.Thread(target=self._attend, name="lsl-attending", daemon=True)
+        attending.start()
+        try:
+            self._take()
+        finally:
+            self._over.set()
+            attending.join()
+
+    def _attend(self) -> None:
+        """End the process when nobody reads, or it hangs: a read of what it says would not end."""
+        while not self._over.wait(_LOOK_S):
+            self._hangs = time.monotonic() - self._heard_s > HANGS_S
+            if self._inbox.closed or self._hangs:
+                self._process.kill()
+                return
+
+    def _take(self) -> None:
+        inbox = self._inbox
+        stream, columns = Stream((), 0.0), np.zeros(0, np.int64)
+        while not inbox.closed:
+            kind, size = HEAD.unpack(self._read(HEAD.size))
+            body = self._read(size)
+            if kind == FAILED:
+                raise OSError(body.decode("utf-8", "replace"))
+            if kind == DESCRIBED:
+                stream, used = described(body.decode("utf-8", "surrogateescape"))
+                columns = np.array(used)
+            elif kind == SAMPLES:
+                arrived_s, n = CHUNK.unpack_from(body)
+                numbers = np.frombuffer(body, "<f8", offset=CHUNK.size)
+                rows = numbers[n:].reshape(n, -1)[:, columns]
+                rows[np.isinf(rows)] = np.nan
+                for row, time_s in zip(rows, numbers[:n].tolist(), strict=True):
+                    inbox.put(Sample(stream, row, arrived_s, time_s=time_s))
+
+    def _read(self, size: int) -> bytes:
+        assert self._process.stdout is not None
+        data = self._process.stdout.read(size)
+        self._heard_s = time.monotonic()
+        if len(data) == size:
+            return data
+        code = self._process.wait()
+        if self._hangs:
+            raise OSError(f"liblsl said nothing for {HANGS_S:g} s: it hangs, and is begun anew")
         why = f"signal {-code}" if code < 0 else f"code {code}"
         raise OSError(f"the process that pulls the stream ended ({why})")
-    return data
 
 
 class LSLSender(Sender):

@@ -2,6 +2,7 @@
 
 ``python lsl_process.py PROPERTY VALUE`` looks for the first stream of which that property has that
 value, and writes to its standard output what comes of it: messages of a head, `HEAD`, and a body.
+With a third word, ``attended``, it ends where its standard input does, wherever liblsl is then.
 It is run as a file and imports nothing of mplearn, so that it is there at once.
 """
 
@@ -11,6 +12,7 @@ import os
 import signal
 import struct
 import sys
+import threading
 import time
 from typing import Any
 
@@ -26,6 +28,8 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # who reads is asked to stop, and ends this
     if not sys.flags.safe_path:
         del sys.path[0]  # the folder of this file, whose names are not those of modules
+    if sys.argv[3:] == ["attended"]:
+        threading.Thread(target=_attend, daemon=True).start()
     try:
         _pull(*sys.argv[1:3])
     except Exception as error:  # a client of others may raise anything
@@ -57,6 +61,12 @@ def _pull(what: str, value: str) -> None:
             _say(SAMPLES, CHUNK.pack(arrived_s, len(stamps)) + numbers)
     finally:
         inlet.close_stream()
+
+
+def _attend() -> None:
+    """End this process when the one that started it ends, though liblsl may never return."""
+    sys.stdin.buffer.read()
+    os._exit(0)
 
 
 def _say(kind: bytes, body: bytes = b"") -> None:
