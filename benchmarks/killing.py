@@ -15,6 +15,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import psutil
 
 from mplearn import LearnerConfig, MotionLearner
 from mplearn.errors import InvalidValueError
@@ -126,7 +127,7 @@ def made_old(path: Path) -> None:
 
 
 def forked(do: object, *args: object, killed_after_s: float | None = None) -> None:
-    """Do something in a process of its own, which is killed after some time."""
+    """Do something in a process of its own, which is killed after some processor time of its."""
     pid = os.fork()
     if pid == 0:
         try:
@@ -135,21 +136,32 @@ def forked(do: object, *args: object, killed_after_s: float | None = None) -> No
             print(f"{type(error).__name__}: {error}", flush=True)
         os._exit(0)
     if killed_after_s is not None:
-        time.sleep(killed_after_s)
-        os.kill(pid, signal.SIGKILL)
+        process = psutil.Process(pid)
+        while process.status() != psutil.STATUS_ZOMBIE:
+            if sum(process.cpu_times()[:2]) >= killed_after_s:
+                os.kill(pid, signal.SIGKILL)
+                break
+            time.sleep(0.004)
     os.waitpid(pid, 0)
 
 
-def run(times: int, folder: Path) -> int:
-    """Kill so many times; return how many frames were learned in the end."""
-    path, rng = folder / "life.db", np.random.default_rng(1)
-    frames = stream(60 + 8 * times)
+def run(times: int, folder: Path, seed: int = 1) -> int:
+    """Kill so many times, at moments drawn by a seed; return how many frames were learned."""
+    path, rng = folder / "life.db", np.random.default_rng(seed)
+    frames = stream(60 + 8 * times, seed)
     whole = LifelongLearner(learner())
     whole.learn_many(frames[:CHUNK], np.arange(CHUNK) / RATE_HZ)  # what is compiled, is by now
     whole = LifelongLearner(learner())
     for k in range(times):
         told, tell = os.pipe()
-        forked(live, path, frames, tell, k, killed_after_s=float(rng.exponential(0.5)) + 0.02)
+        forked(
+            live,
+            path,
+            frames,
+            tell,
+            k + 1000 * seed,
+            killed_after_s=float(rng.exponential(0.5)) + 0.02,
+        )
         os.close(tell)
         said = b""
         while more := os.read(told, 1 << 16):
@@ -179,10 +191,12 @@ def run(times: int, folder: Path) -> int:
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.killing", description=__doc__)
     parser.add_argument("times", type=int, nargs="?", default=200)
-    times = parser.parse_args().times
+    parser.add_argument("--seed", type=int, default=1, help="of the moments and the stream")
+    args = parser.parse_args()
+    times = args.times
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        n = run(times, Path(folder))
+        n = run(times, Path(folder), args.seed)
         took = time.perf_counter() - start
     print(
         f"killed {times} times in {took:.0f} s and {n / RATE_HZ:.0f} s of stream: each time the "

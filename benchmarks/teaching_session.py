@@ -40,6 +40,7 @@ NAMES = {
     "BAU": "bend return",
 }
 MOST_REPEATS = 20
+AT_ONCE = 25  # frames that are sent together
 PATIENCE_S = 600.0  # for what comes later on a busy machine, but comes
 ARMS, BENDS = ("BAR", "BAL"), ("BAD", "BAU")
 SEQUENCE = (*ARMS, *BENDS, *BENDS, *ARMS, *ARMS, *BENDS, *ARMS, *BENDS, *BENDS, *ARMS)
@@ -100,9 +101,9 @@ def until(check: Callable[[], Any], timeout_s: float = PATIENCE_S, what: str = "
 
 
 def drawn_seldom(page: Any) -> None:
-    """Draw a page eight times a second: without a graphics card sixty cost a core."""
+    """Draw a page four times a second: without a graphics card sixty cost a core."""
     page.add_init_script(
-        "window.requestAnimationFrame = (f) => setTimeout(() => f(performance.now()), 125)"
+        "window.requestAnimationFrame = (f) => setTimeout(() => f(performance.now()), 250)"
     )
 
 
@@ -166,8 +167,8 @@ class Teacher:
             for block in demonstrator.blocks(script):
                 frames = block.markers.reshape(len(block.markers), -1)
                 self.truth += block.truth
-                for first in range(0, len(frames), 10):
-                    part = frames[first : first + 10]
+                for first in range(0, len(frames), AT_ONCE):
+                    part = frames[first : first + AT_ONCE]
                     times = (n + np.arange(len(part))) / demonstrator.rate_hz
                     sender.send(Block(stream, part, times, np.zeros(len(part))))
                     n += len(part)

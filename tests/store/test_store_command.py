@@ -229,6 +229,30 @@ def test_where_the_disk_stays_full_the_library_is_kept_elsewhere(
     assert StoreReader(tmp_path / "life.db").life.n_frames < whole.n_frames  # what fitted is sound
 
 
+@pytest.mark.parametrize("disk", ["full", "sound"])
+def test_where_a_take_is_an_error_what_was_learned_before_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], disk: str
+) -> None:
+    if disk == "full":
+        fill_disk(tmp_path, monkeypatch)
+    takes, life = tmp_path / "takes", tmp_path / "life.db"
+    takes.mkdir()
+    command = learning(tmp_path, "file")
+    (tmp_path / "take.csv").rename(takes / "a.csv")
+    rows = (takes / "a.csv").read_text().splitlines()
+    (takes / "b.csv").write_text("\n".join([rows[0], *(f"{k / RATE_HZ},,,," for k in range(400))]))
+    argv = [command[0], str(takes), *command[2:], "--strict", "--store", str(life)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StoreWarning)
+        assert main(argv) == (3 if disk == "full" else 2)
+    told = capsys.readouterr().err
+    assert "mplearn: b: " in told
+    rescued = [*tmp_path.glob("mplearn-*/life.mplearn")]
+    assert [f"the library is in {path}" in told for path in rescued] == [True] * (disk == "full")
+    (kept,) = rescued or [life]
+    assert len(PrimitiveLibrary.load(kept)) > 0
+
+
 def test_what_could_not_be_written_is_not_said_to_be_done(
     store: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

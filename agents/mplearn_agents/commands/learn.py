@@ -143,7 +143,15 @@ def _learn_from_files(args: argparse.Namespace) -> int:
         if life is None:
             config = _configured(args, LearnerConfig(first.channels, first.rate_hz))
             life = _new_life(args, config, stack)
-        log = learn(life, recordings, console, strict=args.strict, taken=life.taken)
+        try:
+            log = learn(life, recordings, console, strict=args.strict, taken=life.taken)
+        except MPLearnError as why:
+            kept = keep(life, life.snapshot(), out=None, store=args.store)
+            if not kept.problem:
+                raise
+            say_unkept(str(why))
+            say_unkept(kept.problem)
+            return NOT_KEPT
         learner = life.learner
         for name, error in log.refused.items():
             say_left_out(console, name, error)
@@ -153,7 +161,7 @@ def _learn_from_files(args: argparse.Namespace) -> int:
             library = life.snapshot(shown_once=True)
         if not len(library) and not log.stopped:
             library = with_takes(library, [observe(each).frames for each in recordings])
-        kept = keep(args, life, library)
+        kept = keep(life, library, out=args.out, store=args.store)
     console.print(primitive_table(library))
     console.print(
         f"{n_known} primitives from {_takes_of(recordings, log)}, "

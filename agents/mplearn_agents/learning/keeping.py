@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from pathlib import Path
@@ -32,35 +31,39 @@ class Kept(NamedTuple):
         return " and ".join(map(str, self.paths))
 
 
-def keep(args: argparse.Namespace, life: LifelongLearner, library: PrimitiveLibrary) -> Kept:
+def keep(
+    life: LifelongLearner, library: PrimitiveLibrary, *, out: Path | None, store: Path | None
+) -> Kept:
     """Write a library, close the store, and say where what was learned is.
 
     Where one cannot be written (the disk stayed full), the other is still; where none can be, the
     library is written to a folder for what is passing.
 
     Args:
-        args: The options of ``mplearn learn``.
         life: Who learned.
         library: What was learned.
+        out: Where the library is to be written; None for nowhere.
+        store: Where the learner's store is; None where it has none.
     """
     paths: list[Path] = []
     problems: list[str] = []
-    if args.out is not None:
+    if out is not None:
         try:
-            args.out.parent.mkdir(parents=True, exist_ok=True)
-            paths.append(library.save(args.out))
+            out.parent.mkdir(parents=True, exist_ok=True)
+            paths.append(library.save(out))
         except MPLearnError as error:
             problems.append(str(error))
         except OSError as error:
-            problems.append(f"cannot write {args.out}: {error.strerror}")
+            problems.append(f"cannot write {out}: {error.strerror}")
     try:
         life.close()
-        if args.store is not None:
-            paths.append(args.store)
+        if store is not None:
+            paths.append(store)
     except StoreWriteError as error:
         problems.append(str(error))
     if problems:
-        path = paths[0] if paths else _rescued(library, (args.store or args.out).stem)
+        wanted = store or out
+        path = paths[0] if paths or wanted is None else _rescued(library, wanted.stem)
         saved = f"the library is in {path}" if path else "the library cannot be written elsewhere"
         problems.append(saved)
     return Kept(paths, "; ".join(problems))

@@ -134,14 +134,16 @@ def learn_from_source(
                         store=args.store,
                         log=log,
                     )
-            except MPLearnError:
+            except MPLearnError as error:
                 if log.life is not None:
-                    kept = keep(args, log.life, log.life.snapshot())
+                    kept = keep(log.life, log.life.snapshot(), out=args.out, store=args.store)
                     if kept.paths:
                         told = f"what was learned before is written to {printable(str(kept))}"
                         console.print(told, markup=False)
                     if kept.problem:
+                        say_unkept(str(error))
                         say_unkept(kept.problem)
+                        return NOT_KEPT
                 raise
             finally:
                 if log.life is not None:
@@ -249,7 +251,7 @@ def _report(
         told = ", ".join(f"{n} {name}" for name, n in faults.items()) or "nothing came"
         raise RecordingError(f"nothing could be learned from {source.name}: {told}")
     library = log.life.snapshot()
-    kept = keep(args, log.life, library)
+    kept = keep(log.life, library, out=args.out, store=args.store)
     if kept.problem:
         say_unkept(kept.problem)
     if args.json:

@@ -145,7 +145,7 @@ def test_what_is_done_is_read_whole_beside_all_figures(server, new_page):
     assert doing.evaluate("(e) => e.scrollWidth <= e.clientWidth + 1")
     assert doing.bounding_box()["x"] > 150
     figures = page.locator("#figures").inner_text()
-    assert "53.4 s" in figures and "325.3 s of motion" in figures
+    assert "53406 ms" in figures and "325.3 s of motion" in figures
     server.hear({"kind": "status", "source": "made up", "state": "live", "frames": 1})
 
 

@@ -135,7 +135,7 @@ function status() {
   figures([
     ["", s.person ? `person ${s.person}${s.people > 1 ? ` of ${s.people}` : ""}` : "nobody yet", ""],
     ["rate", s.rate_hz ? `${s.rate_hz.toFixed(0)} Hz` : "–", ""],
-    ["delay", spell(s.delay_ms), s.delay_99_ms == null ? "" : `99 of 100 within ${spell(s.delay_99_ms)}`, s.delay_ms > 100],
+    ["delay", s.delay_ms == null ? "–" : `${s.delay_ms.toFixed(0)} ms`, s.delay_99_ms == null ? "" : `99 of 100 within ${s.delay_99_ms.toFixed(0)} ms`, s.delay_ms > 100],
     ["lost", `${s.lost ?? 0}`, faults || "nothing was lost", s.lost > 0],
     ...(s.problem ? [["store", "not kept", s.problem, true]] : []),
     ...(s.behind_s > 0.3 ? [["waiting", `${s.behind_s.toFixed(1)} s of motion`, "the learner is slower than the stream; nothing is dropped", true]] : []),
@@ -144,9 +144,6 @@ function status() {
   stage.captions.person = s.person ? `person ${s.person}` : "";
   if (!world.stream) present();
 }
-
-// Milliseconds, in words.
-function spell(ms) { return ms == null ? "–" : ms < 1000 ? `${ms.toFixed(0)} ms` : `${(ms / 1000).toFixed(1)} s`; }
 
 function figures(list) {
   const box = find("#figures");
