@@ -28,8 +28,8 @@ class FrameBuffer:
 
     Example:
         >>> held = FrameBuffer(2)
-        >>> for k in range(5):
-        ...     held.append(np.array([k, 10.0 * k]))
+        >>> held.append(np.array([0.0, 0.0]))
+        >>> held.extend(np.array([[k, 10.0 * k] for k in range(1, 5)]))
         >>> held.drop_before(3)
         >>> held.take(3, 5).tolist()
         [[3.0, 30.0], [4.0, 40.0]]
@@ -53,10 +53,19 @@ class FrameBuffer:
 
     def append(self, frame: FloatArray) -> None:
         """Add one frame, shape (D,)."""
-        if self._offset + self._count == len(self._frames):
-            self._make_room()
-        self._frames[self._offset + self._count] = frame
-        self._count += 1
+        self.extend(frame[None])
+
+    def extend(self, frames: FloatArray) -> None:
+        """Add frames, shape (n, D)."""
+        while len(frames):
+            end = self._offset + self._count
+            if end == len(self._frames):
+                self._make_room()
+                continue
+            fit = frames[: len(self._frames) - end]
+            self._frames[end : end + len(fit)] = fit
+            self._count += len(fit)
+            frames = frames[len(fit) :]
 
     @property
     def held(self) -> FloatArray:
@@ -92,8 +101,7 @@ class FrameBuffer:
         width = state.frames.shape[1]
         require(width == self.n_channels, "frames", f"must be {self.n_channels} wide, not {width}")
         self.first, self._offset, self._count = state.first, 0, 0
-        for frame in state.frames:
-            self.append(frame)
+        self.extend(state.frames)
 
     def _make_room(self) -> None:
         """Move the frames to the front, into a larger array only where they fill half of this."""

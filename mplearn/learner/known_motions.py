@@ -89,6 +89,10 @@ class KnownMotions:
         """Whether the newest of so many frames of a motion is one that is looked at."""
         return (n_frames - 1) % self.every == 0
 
+    def until_look(self, n_frames: int) -> int:
+        """Return how many frames after so many of a motion come until one is looked at."""
+        return self.every - (n_frames - 1) % self.every
+
     def ending(self, tree: PrimitiveTree, frames: FloatArray) -> float:
         """Return the probability that a motion is at its end; 0.5 where it is none that is known.
 

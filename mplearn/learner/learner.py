@@ -711,15 +711,21 @@ class MotionLearner:
     def _learn(self, features: FloatArray) -> list[Event]:
         """Take features that are ready, shape (k, D)."""
         events: list[Event] = []
-        for seen in self._view.see(features):
-            self.tree.pass_time()
-            segments = self._segmenter.update(seen)
-            self._buffer.append(seen)
-            self.n_frames += 1
+        frames = self._view.see(features)
+        while len(frames):
+            looks = self._under_way.until_look(len(self._buffer))  # may change the segmenter
+            taken, segments = self._segmenter.advance(frames[:looks])
+            for left in range(taken - 1, -1, -1):
+                self.tree.pass_time()
+                if left and self.config.scaffolding:
+                    self._under_way.get_on()
+            self._buffer.extend(frames[:taken])
+            self.n_frames += taken
             for segment in segments:
                 events.extend(self._close(segment))
             if self.config.scaffolding:
                 self._scaffold(bool(segments))
+            frames = frames[taken:]
         return events
 
     def _scaffold(self, begins: bool) -> None:

@@ -3,6 +3,10 @@
 Two joints of a body share an entry of the normal matrix only if one carries the other. Factored
 from the leaves to the root, L'L = A, such a matrix fills no entry that was zero [Featherstone2008,
 6.5], so that a body of n joints on branches of d costs n d^2, not n^3.
+
+A row of the factor holds an unknown's entries with those above it, from the root down to its own:
+what one unknown shares with another above it are then the first entries of both, side by side in
+memory.
 """
 
 from __future__ import annotations
@@ -11,6 +15,8 @@ import numpy as np
 
 from ..recording import BoolArray, FloatArray, IntArray
 from .compiling import njit
+
+AT_BOUND = 1e-12  # what is nearer to a bound stands at it
 
 
 @njit(cache=True)
@@ -25,8 +31,9 @@ def bounded_solve(
 ) -> None:
     """Minimise the quadratic model between bounds by an active set.
 
-    What runs into a bound is fixed there. Once nothing does, what a bound holds against its own
-    slope is released, each unknown at most twice, so that the search ends.
+    What stands at a bound, and is drawn beyond it, is fixed there from the start; what runs into
+    one, from then on. Once nothing does, what a bound holds against its own slope is released, each
+    unknown at most twice, so that the search ends.
 
     Args:
         normal: Symmetric positive definite, its lower triangle, shape (d, d); zero but between an
@@ -49,25 +56,24 @@ def bounded_solve(
     d = len(gradient)
     fixed = ~free
     releases = np.zeros(d, dtype=np.int64)
-    loose = np.empty(d, dtype=np.int64)  # the next unknown above that is not fixed
-    step[:] = 0.0
+    loose, depth = np.empty(d, dtype=np.int64), np.empty(d, dtype=np.int64)
     factor = np.empty_like(normal)
-    solution, slope = np.empty(d), np.empty(d)
-    while True:
-        for i in range(d):
-            j = above[i]
-            loose[i] = loose[j] if j >= 0 and fixed[j] else j
+    solution, slope = np.empty(d), gradient.copy()
+    held = False
+    for i in range(d):
+        step[i] = 0.0
+        if free[i] and high[i] < AT_BOUND and gradient[i] > 0.0:
+            step[i], fixed[i], held = high[i], True, True
+        elif free[i] and low[i] > -AT_BOUND and gradient[i] < 0.0:
+            step[i], fixed[i], held = low[i], True, True
+    if held:
         slopes(normal, gradient, step, above, slope)
+    while True:
+        leave_out(fixed, above, loose, depth)
         for i in range(d):
             solution[i] = 0.0 if fixed[i] else slope[i]
-            if not fixed[i]:
-                factor[i, i] = normal[i, i]
-                j = loose[i]
-                while j >= 0:
-                    factor[i, j] = normal[i, j]
-                    j = loose[j]
-        factor_tree(factor, fixed, loose)
-        solve_tree(factor, fixed, loose, solution)
+        factor_tree(normal, fixed, loose, depth, factor)
+        solve_tree(factor, fixed, loose, depth, solution)
         hit = False
         for i in range(d):
             solution[i] += step[i]
@@ -76,10 +82,11 @@ def bounded_solve(
                 fixed[i] = True
                 hit = True
         step[:] = solution
+        worst, released = 0.0, -1
+        if hit or _at_bounds(fixed, free, releases):
+            slopes(normal, gradient, step, above, slope)
         if hit:
             continue
-        slopes(normal, gradient, step, above, slope)
-        worst, released = 0.0, -1
         for i in range(d):
             if fixed[i] and free[i] and releases[i] < 2:
                 inward = -slope[i] if step[i] >= high[i] else slope[i]
@@ -89,6 +96,37 @@ def bounded_solve(
             return
         fixed[released] = False
         releases[released] += 1
+
+
+@njit(cache=True)
+def _at_bounds(fixed: BoolArray, free: BoolArray, releases: IntArray) -> bool:
+    """Say whether a bound holds an unknown that may still be released."""
+    held = False
+    for i in range(len(fixed)):
+        held |= fixed[i] and free[i] and releases[i] < 2
+    return held
+
+
+@njit(cache=True)
+def leave_out(fixed: BoolArray, above: IntArray, loose: IntArray, depth: IntArray) -> None:
+    """Fill, for each unknown, the next one above it that is not fixed, and how many there are.
+
+    Args:
+        fixed: Unknowns that have no part, shape (d,).
+        above: The next unknown above each, shape (d,); -1 for none.
+        loose: The next above each that has a part, shape (d,); -1 for none.
+        depth: How many of those are above each, shape (d,).
+
+    Example:
+        >>> loose, depth = np.empty(3, int), np.empty(3, int)
+        >>> leave_out(np.array([False, True, False]), np.array([-1, 0, 1]), loose, depth)
+        >>> loose, depth
+        (array([-1,  0,  0]), array([0, 1, 1]))
+    """
+    for i in range(len(above)):
+        j = above[i]
+        loose[i] = loose[j] if j >= 0 and fixed[j] else j
+        depth[i] = 0 if loose[i] < 0 else depth[loose[i]] + 1
 
 
 @njit(cache=True)
@@ -114,66 +152,78 @@ def slopes(
 
 
 @njit(cache=True)
-def factor_tree(a: FloatArray, fixed: BoolArray, above: IntArray) -> None:
-    """Factor a symmetric positive definite matrix on a tree in place, L'L = A, lower triangle.
+def factor_tree(
+    normal: FloatArray, fixed: BoolArray, above: IntArray, depth: IntArray, factor: FloatArray
+) -> None:
+    """Factor a symmetric positive definite matrix on a tree, L'L = A.
 
     Args:
-        a: The matrix, shape (d, d).
+        normal: The matrix, its lower triangle, shape (d, d).
         fixed: Unknowns that have no part, shape (d,).
         above: The next unknown above each that has a part, shape (d,); -1 for none.
+        depth: How many of those are above each, shape (d,); see `leave_out`.
+        factor: Its rows, each from the root's entry to the unknown's own, shape (d, d), filled.
 
     Example:
-        >>> a = np.array([[5.0, 0.0], [2.0, 4.0]])
-        >>> factor_tree(a, np.array([False, False]), np.array([-1, 0]))
-        >>> a
+        >>> a, factor = np.array([[5.0, 0.0], [2.0, 4.0]]), np.zeros((2, 2))
+        >>> factor_tree(a, np.zeros(2, bool), np.array([-1, 0]), np.array([0, 1]), factor)
+        >>> factor
         array([[2., 0.],
                [1., 2.]])
     """
-    for k in range(len(a) - 1, -1, -1):
+    for i in range(len(normal)):
+        j = -1 if fixed[i] else i
+        while j >= 0:
+            factor[i, depth[j]] = normal[i, j]
+            j = above[j]
+    for k in range(len(normal) - 1, -1, -1):
         if fixed[k]:
             continue
-        pivot = np.sqrt(a[k, k])
-        a[k, k] = pivot
+        row, n = factor[k], depth[k]
+        pivot = np.sqrt(row[n])
+        row[n] = pivot
+        for j in range(n):
+            row[j] /= pivot
         i = above[k]
         while i >= 0:
-            a[k, i] /= pivot
-            i = above[i]
-        i = above[k]
-        while i >= 0:
-            weight = a[k, i]
-            j = i
-            while j >= 0:
-                a[i, j] -= weight * a[k, j]
-                j = above[j]
+            other = factor[i]
+            weight = row[depth[i]]
+            for j in range(depth[i] + 1):
+                other[j] -= weight * row[j]
             i = above[i]
 
 
 @njit(cache=True)
-def solve_tree(factor: FloatArray, fixed: BoolArray, above: IntArray, x: FloatArray) -> None:
+def solve_tree(
+    factor: FloatArray, fixed: BoolArray, above: IntArray, depth: IntArray, x: FloatArray
+) -> None:
     """Solve L'L x = b in place; arguments as in `factor_tree`.
 
     Example:
         >>> x = np.array([8.0])
-        >>> solve_tree(np.array([[2.0]]), np.array([False]), np.array([-1]), x)
+        >>> nothing = np.array([False])
+        >>> solve_tree(np.array([[2.0]]), nothing, np.array([-1]), np.array([0]), x)
         >>> x
         array([2.])
     """
     d = len(x)
     for k in range(d - 1, -1, -1):
         if not fixed[k]:
-            x[k] /= factor[k, k]
+            row = factor[k]
+            x[k] /= row[depth[k]]
             i = above[k]
             while i >= 0:
-                x[i] -= factor[k, i] * x[k]
+                x[i] -= row[depth[i]] * x[k]
                 i = above[i]
     for k in range(d):
         if not fixed[k]:
+            row = factor[k]
             value = x[k]
             i = above[k]
             while i >= 0:
-                value -= factor[k, i] * x[i]
+                value -= row[depth[i]] * x[i]
                 i = above[i]
-            x[k] = value / factor[k, k]
+            x[k] = value / row[depth[k]]
 
 
 @njit(cache=True)
@@ -187,28 +237,26 @@ def inverse_diagonal(normal: FloatArray, free: BoolArray, above: IntArray, out: 
         array([0.25, 0.5 ])
     """
     d = len(normal)
-    factor, fixed = normal.copy(), ~free
-    loose = np.empty(d, dtype=np.int64)
-    for i in range(d):
-        j = above[i]
-        loose[i] = loose[j] if j >= 0 and fixed[j] else j
-    factor_tree(factor, fixed, loose)
-    row = np.empty(d)
-    for k in range(d):  # the inverse's diagonal: squared rows of L^-1
-        if fixed[k]:
-            continue
-        i = k
-        while i >= 0:
-            row[i] = 0.0
-            i = loose[i]
-        row[k] = 1.0
-        out[k] = 0.0
-        i = k
-        while i >= 0:
-            row[i] /= factor[i, i]
-            out[k] += row[i] ** 2
-            j = loose[i]
-            while j >= 0:
-                row[j] -= row[i] * factor[i, j]
-                j = loose[j]
-            i = loose[i]
+    factor, fixed = np.empty_like(normal), ~free
+    loose, depth = np.empty(d, dtype=np.int64), np.empty(d, dtype=np.int64)
+    leave_out(fixed, above, loose, depth)
+    factor_tree(normal, fixed, loose, depth, factor)
+    inverse = np.zeros((d, d))  # the rows of L^-1, each from the root's entry on
+    at = np.empty(d, dtype=np.int64)  # how far each row has come
+    deepest = 0
+    for k in range(d):
+        at[k] = -1 if fixed[k] else k
+        if not fixed[k]:
+            out[k], inverse[k, depth[k]] = 0.0, 1.0
+            deepest = max(deepest, depth[k])
+    for _ in range(deepest + 1):  # all rows side by side: no entry waits for the one before it
+        for k in range(d):
+            i = at[k]
+            if i < 0:
+                continue
+            n = depth[i]
+            value = inverse[k, n] / factor[i, n]
+            out[k] += value**2  # the diagonal is that of the squared rows
+            for j in range(n):
+                inverse[k, j] -= value * factor[i, j]
+            at[k] = loose[i]

@@ -9,9 +9,11 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from ..errors import InvalidValueError
+from ..errors import FrameError, InvalidValueError
 from ..recording import FloatArray, Segment
 from ..state import Count, State
+
+AT_ONCE = 256  # frames of a recording that are handed on together
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +66,36 @@ class Segmenter(ABC):
         Raises:
             FrameError: The frame has the wrong width, or is not finite; nothing has changed then.
         """
+
+    def advance(self, frames: FloatArray) -> tuple[int, list[Segment]]:
+        """Take frames, shape (T, D), until one closes segments: as `update` in a loop.
+
+        Returns:
+            How many frames were taken, at least one, and the segments that the last of them closed.
+
+        Raises:
+            FrameError: The first frame has the wrong width, or is not finite; nothing has changed
+                then. Where a later one is, those before it are taken.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn.segmentation import make_segmenter
+            >>> lifts = np.sin(np.pi * np.arange(400) / 100.0)[:, None]  # turns each second
+            >>> segmenter = make_segmenter("zero-velocity", 1, 100.0)
+            >>> taken, cuts = segmenter.advance(lifts)
+            >>> taken < 100, cuts[0].decided_at == taken - 1
+            (True, True)
+        """
+        for taken, frame in enumerate(frames):
+            try:
+                closed = self.update(frame)
+            except FrameError:
+                if taken == 0:
+                    raise
+                return taken, []
+            if closed:
+                return taken + 1, closed
+        return len(frames), []
 
     @abstractmethod
     def flush(self) -> list[Segment]:
@@ -118,8 +150,11 @@ class Segmenter(ABC):
             (0, 400)
         """
         closed: list[Segment] = []
-        for frame in frames:
-            closed.extend(self.update(frame))
+        taken = 0
+        while taken < len(frames):
+            n, segments = self.advance(frames[taken : taken + AT_ONCE])
+            closed.extend(segments)
+            taken += n
         closed.extend(self.flush())
         return closed
 

@@ -73,48 +73,50 @@ class Places(NamedTuple):
 
 
 @njit(cache=True)
-def _step(
-    frame: FloatArray, watched: Watched, drop: float, reach_s: float, places: Places, out: Any
-) -> int:
-    """Take one frame.
+def _steps(
+    frames: FloatArray, watched: Watched, drop: float, reach_s: float, places: Places, out: Any
+) -> tuple[int, int]:
+    """Take frames until one ends a segment; see `SpeedSegmenter`.
 
     Args:
-        frame: Shape (D,).
+        frames: Shape (T, D).
         watched: As bundled by `SpeedSegmenter`.
         drop: As in the configuration.
         reach_s: As in the configuration.
         places: What is kept of the open segment.
         out: Receives the segment.
     """
-    if take_speed(frame, watched) < 0.0:
-        return -1
-    m, p = watched.state[0], watched.settings[0]
-    place, weights = watched.smooth.place, watched.smooth.weights
-    t = m.frames - 1
-    reach = places.reach[0]
-    if t == 0:
-        places.first[:] = place
-    away = distance(place, places.first, weights)
-    if away >= reach.away:
-        reach.away, reach.frame = away, t
+    for k in range(len(frames)):
+        if take_speed(frames[k], watched) < 0.0:
+            return k, -1
+        m, p = watched.state[0], watched.settings[0]
+        place, weights = watched.smooth.place, watched.smooth.weights
+        t = m.frames - 1
+        reach = places.reach[0]
+        if t == 0:
+            places.first[:] = place
+        away = distance(place, places.first, weights)
+        if away >= reach.away:
+            reach.away, reach.frame = away, t
+            places.farthest[:] = place
+        end, confidence, cause = -1, 0.0, LENGTH
+        needed = reach_s * running_speed(m) / readiness(m, p)
+        far_enough = reach.away > needed and reach.frame - m.start >= p.shortest
+        if far_enough and away < (1.0 - drop) * reach.away:
+            end, confidence, cause = reach.frame, 1.0 - needed / reach.away, RETURN
+        elif t - m.start >= p.longest:
+            end = t
+            places.farthest[:] = place
+        if end < 0:
+            continue
+        low = p.still_share * running_speed(m)
+        n = close(m, p, end, confidence, all_low(m, end, low, watched.speeds), cause, out, 0)
+        places.first[:] = places.farthest
+        reach.away = distance(place, places.first, weights)
+        reach.frame = t
         places.farthest[:] = place
-    end, confidence, cause = -1, 0.0, LENGTH
-    needed = reach_s * running_speed(m) / readiness(m, p)
-    far_enough = reach.away > needed and reach.frame - m.start >= p.shortest
-    if far_enough and away < (1.0 - drop) * reach.away:
-        end, confidence, cause = reach.frame, 1.0 - needed / reach.away, RETURN
-    elif t - m.start >= p.longest:
-        end = t
-        places.farthest[:] = place
-    if end < 0:
-        return 0
-    low = p.still_share * running_speed(m)
-    n = close(m, p, end, confidence, all_low(m, end, low, watched.speeds), cause, out, 0)
-    places.first[:] = places.farthest
-    reach.away = distance(place, places.first, weights)
-    reach.frame = t
-    places.farthest[:] = place
-    return int(n)
+        return k + 1, int(n)
+    return len(frames), 0
 
 
 class KinematicCentroid(SpeedSegmenter):
@@ -154,6 +156,6 @@ class KinematicCentroid(SpeedSegmenter):
         super()._bind()
         self._places = self._bound(Places)
 
-    def _step(self, frame: FloatArray) -> int:
+    def _steps(self, frames: FloatArray) -> tuple[int, int]:
         c = self.config
-        return int(_step(frame, self._watched, c.drop, c.reach_s, self._places, self._out))
+        return _steps(frames, self._watched, c.drop, c.reach_s, self._places, self._out)

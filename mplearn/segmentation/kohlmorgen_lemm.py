@@ -29,8 +29,8 @@ from .kohlmorgen_lemm_steps import (
     PLAIN,
     SCALES,
     States,
-    step_direction,
-    step_posture,
+    steps_direction,
+    steps_posture,
 )
 from .speed import ZeroVelocityConfig
 from .speed_segmenter import SpeedSegmenter, check_record
@@ -182,7 +182,7 @@ class KohlmorgenLemm(SpeedSegmenter):
         if config.switch_cost_s is None:
             settings["mode"] = ENVELOPE
         self._turns = turn_settings(config.turns, rate_hz, config.tolerance_s)
-        self._step_kernel = step_direction if config.density == "direction" else step_posture
+        self._kernel = steps_direction if config.density == "direction" else steps_posture
         self._reset()
 
     def _new_arrays(self) -> dict[str, Any]:
@@ -216,15 +216,13 @@ class KohlmorgenLemm(SpeedSegmenter):
         ranges = dict.fromkeys(times, (-1, frames)) | dict.fromkeys(lengths, (0.0, np.inf))
         check_record("turning", arrays["turning"][0], ranges)
 
-    def _step(self, frame: FloatArray) -> int:
-        return int(
-            self._step_kernel(
-                frame,
-                self._watched,
-                self._model,
-                self._states,
-                self._turns,
-                self._trail,
-                self._out,
-            )
+    def _steps(self, frames: FloatArray) -> tuple[int, int]:
+        return self._kernel(
+            frames,
+            self._watched,
+            self._model,
+            self._states,
+            self._turns,
+            self._trail,
+            self._out,
         )

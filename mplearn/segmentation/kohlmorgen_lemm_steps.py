@@ -105,44 +105,50 @@ def _changes(t: int, q: Any, ready: float, states: States, changes: IntArray) ->
 
 
 @njit(cache=True)
-def step_direction(
-    frame: FloatArray,
+def steps_direction(
+    frames: FloatArray,
     watched: Watched,
     model: Any,
     states: States,
     turns: Any,
     trail: Trail,
     out: Any,
-) -> int:
-    """Take one frame; densities over the direction of motion support minima and turns."""
-    s = take_speed(frame, watched)
-    if s < 0.0:
-        return -1
-    m, p, q, r = watched.state[0], watched.settings[0], model[0], turns[0]
-    smooth = watched.smooth
-    t = m.frames - 1
-    slow = q.still_direction * running_speed(m)
-    norm = math.sqrt(s * s + slow * slow)
-    x = smooth.velocity / norm if norm > 0.0 else np.zeros(frame.shape[0])
-    _observe(x, t, q, q.sigma, smooth.weights, states)
-    ready = readiness(m, p)
-    hysteresis = q.hysteresis
-    if t >= q.window - 1:
-        changes = np.empty(N_CHANGES, dtype=np.int64)
-        n = _changes(t, q, ready, states, changes)
-        for j in range(n):
-            if abs(changes[j] - q.window // 2 - m.valley_frame) <= q.tolerance:
-                hysteresis = q.hysteresis_turned
-    follow_axis(t, s, smooth, r, trail)
-    if near_turn(m.valley_frame, r, trail):
-        hysteresis = max(hysteresis, r.hysteresis)
-    start, mode = m.start, m.mode
-    n = watch(m, p, s, hysteresis, ready, watched.speeds, out)
-    if m.start != start or m.mode != mode:
-        drop_candidate(m.start, t, smooth.weights, trail)
-    elif m.mode != STILL:
-        n = look_for_turn(m, p, r, ready, smooth, watched.speeds, trail, out)
-    return int(n)
+) -> tuple[int, int]:
+    """Take frames until some end segments; see `SpeedSegmenter`.
+
+    Densities over the direction of motion support minima and turns.
+    """
+    for k in range(len(frames)):
+        s = take_speed(frames[k], watched)
+        if s < 0.0:
+            return k, -1
+        m, p, q, r = watched.state[0], watched.settings[0], model[0], turns[0]
+        smooth = watched.smooth
+        t = m.frames - 1
+        slow = q.still_direction * running_speed(m)
+        norm = math.sqrt(s * s + slow * slow)
+        x = smooth.velocity / norm if norm > 0.0 else np.zeros(frames.shape[1])
+        _observe(x, t, q, q.sigma, smooth.weights, states)
+        ready = readiness(m, p)
+        hysteresis = q.hysteresis
+        if t >= q.window - 1:
+            changes = np.empty(N_CHANGES, dtype=np.int64)
+            n = _changes(t, q, ready, states, changes)
+            for j in range(n):
+                if abs(changes[j] - q.window // 2 - m.valley_frame) <= q.tolerance:
+                    hysteresis = q.hysteresis_turned
+        follow_axis(t, s, smooth, r, trail)
+        if near_turn(m.valley_frame, r, trail):
+            hysteresis = max(hysteresis, r.hysteresis)
+        start, mode = m.start, m.mode
+        n = watch(m, p, s, hysteresis, ready, watched.speeds, out)
+        if m.start != start or m.mode != mode:
+            drop_candidate(m.start, t, smooth.weights, trail)
+        elif m.mode != STILL:
+            n = look_for_turn(m, p, r, ready, smooth, watched.speeds, trail, out)
+        if n > 0:
+            return k + 1, int(n)
+    return len(frames), 0
 
 
 @njit(cache=True)
@@ -192,48 +198,54 @@ def _replay(t: int, q: Any, sigma: float, weights: FloatArray, states: States) -
 
 
 @njit(cache=True)
-def step_posture(
-    frame: FloatArray,
+def steps_posture(
+    frames: FloatArray,
     watched: Watched,
     model: Any,
     states: States,
     turns: Any,
     trail: Trail,
     out: Any,
-) -> int:
-    """Take one frame; a change of state between densities of embedded postures is a boundary."""
-    if take_speed(frame, watched) < 0.0:
-        return -1
-    m, p, q = watched.state[0], watched.settings[0], model[0]
-    weights, history, scales = watched.smooth.weights, states.history, states.scales[0]
-    t = m.frames - 1
-    span, width = history.shape
-    if t == 0:
-        history[:] = frame
-    history[t % span] = frame
-    x = np.empty(states.windows.points.shape[0])
-    for k in range(x.shape[0] // width):
-        x[k * width : (k + 1) * width] = history[(t - k * q.delay) % span]
-    _observe(x, t, q, max(scales.sigma, 1e-150), weights, states)
-    if _update_sigma(q, t, states.windows.squared, scales):
-        _replay(t, q, scales.sigma, weights, states)
-    end, confidence, cause = -1, 0.0, LENGTH
-    if t >= q.window - 1:
-        changes = np.empty(N_CHANGES, dtype=np.int64)
-        shift = q.window // 2 + (span - 1) // 2 - p.lag
-        n = _changes(t, q, readiness(m, p), states, changes)
-        for j in range(n):  # the earliest that is settled and long enough after the last
-            if changes[j] <= t - 2 * q.window and changes[j] - shift - m.start >= p.shortest:
-                end = changes[j] - shift
-                confidence = _certainty(t, changes[j], q, states.path)
-                cause = CHANGE
-    if end < 0 and t - m.start >= p.longest:
-        end = t
-    if end < 0:
-        return 0
-    low = p.still_share * running_speed(m)
-    still = all_low(m, end, low, watched.speeds)
-    return int(close(m, p, end, confidence, still, cause, out, 0))
+) -> tuple[int, int]:
+    """Take frames until some end segments; see `SpeedSegmenter`.
+
+    A change of state between densities of embedded postures is a boundary.
+    """
+    for k in range(len(frames)):
+        frame = frames[k]
+        if take_speed(frame, watched) < 0.0:
+            return k, -1
+        m, p, q = watched.state[0], watched.settings[0], model[0]
+        weights, history, scales = watched.smooth.weights, states.history, states.scales[0]
+        t = m.frames - 1
+        span, width = history.shape
+        if t == 0:
+            history[:] = frame
+        history[t % span] = frame
+        x = np.empty(states.windows.points.shape[0])
+        for j in range(x.shape[0] // width):
+            x[j * width : (j + 1) * width] = history[(t - j * q.delay) % span]
+        _observe(x, t, q, max(scales.sigma, 1e-150), weights, states)
+        if _update_sigma(q, t, states.windows.squared, scales):
+            _replay(t, q, scales.sigma, weights, states)
+        end, confidence, cause = -1, 0.0, LENGTH
+        if t >= q.window - 1:
+            changes = np.empty(N_CHANGES, dtype=np.int64)
+            shift = q.window // 2 + (span - 1) // 2 - p.lag
+            n = _changes(t, q, readiness(m, p), states, changes)
+            for j in range(n):  # the earliest that is settled and long enough after the last
+                if changes[j] <= t - 2 * q.window and changes[j] - shift - m.start >= p.shortest:
+                    end = changes[j] - shift
+                    confidence = _certainty(t, changes[j], q, states.path)
+                    cause = CHANGE
+        if end < 0 and t - m.start >= p.longest:
+            end = t
+        if end < 0:
+            continue
+        low = p.still_share * running_speed(m)
+        still = all_low(m, end, low, watched.speeds)
+        return k + 1, int(close(m, p, end, confidence, still, cause, out, 0))
+    return len(frames), 0
 
 
 @njit(cache=True)

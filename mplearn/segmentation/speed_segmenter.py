@@ -34,8 +34,7 @@ Bundle = TypeVar("Bundle")
 class SpeedSegmenter(Segmenter):
     """A segmenter whose state is a set of arrays, and whose step is one compiled call.
 
-    A subclass advances `_arrays` in `_step`, which returns how many rows it wrote to `_out` (-1:
-    the frame is not finite, nothing has changed).
+    A subclass advances `_arrays` in `_steps`, frame by frame, until one ends segments.
 
     Args:
         n_channels: Width D of a frame.
@@ -84,8 +83,13 @@ class SpeedSegmenter(Segmenter):
         return kind(*(self._arrays[name] for name in signature(kind).parameters))
 
     @abstractmethod
-    def _step(self, frame: FloatArray) -> int:
-        """Take one frame that has the right shape."""
+    def _steps(self, frames: FloatArray) -> tuple[int, int]:
+        """Take frames of the right shape, (T, D), until one ends segments.
+
+        Returns:
+            How many were taken, and how many rows the last of them wrote to `_out`; -1 where the
+            next frame is not finite, which changes nothing.
+        """
 
     def update(self, frame: FloatArray) -> list[Segment]:
         """Take one frame, shape (D,), and return the segments that are closed by now (often none).
@@ -93,21 +97,34 @@ class SpeedSegmenter(Segmenter):
         Raises:
             FrameError: The frame has the wrong width, or is not finite; nothing has changed then.
         """
-        try:
-            frame = np.ascontiguousarray(frame, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise FrameError(f"a frame must be {self.n_channels} numbers: {error}") from None
+        frame = self._numbers(frame)
         if frame.shape != (self.n_channels,):
             raise FrameError(f"a frame must have shape ({self.n_channels},), not {frame.shape}")
-        n = self._step(frame)
-        if n == 0:
-            return []
-        if n < 0:
+        return self.advance(frame[None])[1]
+
+    def advance(self, frames: FloatArray) -> tuple[int, list[Segment]]:
+        """Take frames until one closes segments; see `Segmenter.advance`."""
+        frames = self._numbers(frames)
+        if frames.ndim != 2 or frames.shape[1] != self.n_channels:
+            raise FrameError(f"frames must have shape (T, {self.n_channels}), not {frames.shape}")
+        taken, n = self._steps(frames)
+        if n < 0 and taken == 0:
+            frame = frames[0]
             bad = np.flatnonzero(~np.isfinite(frame))
             raise FrameError(
                 f"{len(bad)} of {self.n_channels} channels are not finite (the first is channel "
                 f"{bad[0]}: {frame[bad[0]]}); fill gaps before segmenting"
             )
+        return taken, self._closed(max(n, 0))
+
+    def _numbers(self, given: FloatArray) -> FloatArray:
+        try:
+            return np.ascontiguousarray(given, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise FrameError(f"a frame must be {self.n_channels} numbers: {error}") from None
+
+    def _closed(self, n: int) -> list[Segment]:
+        """Return the first so many segments of `_out`."""
         return [
             Segment(
                 int(cut["start"]),

@@ -18,13 +18,17 @@ from .watch import watch
 
 
 @njit(cache=True)
-def _step(frame: FloatArray, watched: Watched, hysteresis: float, out: Any) -> int:
-    """Take one frame; return the number of segments written to `out`, or -1 if it is not finite."""
-    s = take_speed(frame, watched)
-    if s < 0.0:
-        return -1
-    m, p = watched.state[0], watched.settings[0]
-    return int(watch(m, p, s, hysteresis, readiness(m, p), watched.speeds, out))
+def _steps(frames: FloatArray, watched: Watched, hysteresis: float, out: Any) -> tuple[int, int]:
+    """Take frames until some end segments; see `SpeedSegmenter`."""
+    for k in range(len(frames)):
+        s = take_speed(frames[k], watched)
+        if s < 0.0:
+            return k, -1
+        m, p = watched.state[0], watched.settings[0]
+        n = watch(m, p, s, hysteresis, readiness(m, p), watched.speeds, out)
+        if n > 0:
+            return k + 1, int(n)
+    return len(frames), 0
 
 
 class ZeroVelocity(SpeedSegmenter):
@@ -55,5 +59,5 @@ class ZeroVelocity(SpeedSegmenter):
         self.config = config
         self._reset()
 
-    def _step(self, frame: FloatArray) -> int:
-        return int(_step(frame, self._watched, self.config.hysteresis, self._out))
+    def _steps(self, frames: FloatArray) -> tuple[int, int]:
+        return _steps(frames, self._watched, self.config.hysteresis, self._out)

@@ -18,8 +18,9 @@ def test_damped_least_squares_is_numpys():
     np.testing.assert_allclose(solve_damped(a, b, 0.1), expected, atol=1e-9)
 
 
+@pytest.mark.parametrize("at_bounds", [False, True])
 @pytest.mark.parametrize("dense", [True, False])
-def test_bounded_least_squares_satisfies_the_optimality_conditions(dense):
+def test_bounded_least_squares_satisfies_the_optimality_conditions(dense, at_bounds):
     rng = np.random.default_rng(6)
     for _ in range(300):
         d = int(rng.integers(2, 12))
@@ -27,6 +28,9 @@ def test_bounded_least_squares_satisfies_the_optimality_conditions(dense):
         normal, gradient = a.T @ a, rng.normal(size=d) * 3
         low, high = -rng.uniform(0, 1, d), rng.uniform(0, 1, d)
         free, step = rng.random(d) > 0.2, np.empty(d)
+        if at_bounds:  # as joints do that were at theirs before
+            side = rng.random(d)
+            low[side < 0.4], high[side > 0.7] = 0.0, 0.0
         above = np.arange(-1, d - 1) if dense else np.array([rng.integers(-1, i) for i in range(d)])
         if not dense:  # nothing but between an unknown and those above it
             on_path = np.eye(d, dtype=bool)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from known_motions import bell_motions
 
 from mplearn.errors import FrameError, InvalidValueError
-from mplearn.segmentation import SEGMENTERS, make_segmenter
+from mplearn.segmentation import SEGMENTERS, Segmenter, make_segmenter
 
 NAMES = sorted(SEGMENTERS)
 every_segmenter = pytest.mark.parametrize("name", NAMES)
@@ -59,6 +59,46 @@ def test_resumes_bit_for_bit(name, cut):
         first.update(frame)
     tail = [s for frame in FRAMES[cut:] for s in second.update(frame)]
     assert head + tail + second.flush() == whole
+
+
+class OneByOne(Segmenter):
+    """Any segmenter, which takes no more than a frame at a time."""
+
+    def __init__(self, inside):
+        self.inside = inside
+
+    def update(self, frame):
+        return self.inside.update(frame)
+
+    flush = state = load_state = scaffold = None
+
+
+OneByOne.__abstractmethods__ = frozenset()
+
+
+@every_segmenter
+@pytest.mark.parametrize("one_by_one", [False, True])
+@given(st.lists(st.integers(1, 90), min_size=1), st.integers(0, len(FRAMES)))
+@settings(max_examples=10, deadline=None)
+def test_many_frames_are_one_after_the_other(name, one_by_one, sizes, bad):
+    frames = np.insert(FRAMES, bad, np.nan, axis=0)
+    single, many = make_segmenter(name, 5, 50.0), make_segmenter(name, 5, 50.0)
+    taker = OneByOne(many) if one_by_one else many
+    at, cuts = 0, []
+    while at < len(frames):
+        block = frames[at : at + sizes[at % len(sizes)]]
+        if at == bad:
+            with pytest.raises(FrameError, match="finite"):
+                taker.advance(block)
+            at += 1
+            continue
+        taken, closed = taker.advance(block)
+        assert 0 < taken <= len(block) and (closed or taken == len(block) or at + taken == bad)
+        expected = [single.update(frame) for frame in frames[at : at + taken]]
+        assert not any(expected[:-1]) and expected[-1] == closed
+        at += taken
+        cuts += closed
+    assert cuts and many.state() == single.state()
 
 
 @every_segmenter
