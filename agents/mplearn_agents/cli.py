@@ -1,10 +1,10 @@
 """The ``mplearn`` command: one sub-command a module in `mplearn_agents.commands`.
 
 Exit codes, of all commands: 0 done; 1 what was checked is not in order (``doctor``, ``export
---check``); 2 bad input, with one line on standard error; 3 what ``learn`` learned is not all
-where it was to be, for that could not be written (where the library is instead is said); 130
-interrupted, 143 by SIGTERM (``learn`` writes what it has learned first, and says 130 of either; who
-looks at a live source ends it by either, which is no interruption).
+--check``, ``store check``); 2 bad input, with one line on standard error; 3 what ``learn`` learned
+is not all where it was to be, for that could not be written (where the library is instead is said);
+130 interrupted, 143 by SIGTERM (``learn`` writes what it has learned first, and says 130 of either;
+who looks at a live source ends it by either, which is no interruption).
 """
 
 from __future__ import annotations

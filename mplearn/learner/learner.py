@@ -398,7 +398,7 @@ class MotionLearner:
         frozen = tuple(self._snapshots.frozen.values())
         return Known(self.tree.state(), self.graph.state(), self.chain.state(), frozen)
 
-    def exchange(self, edit: LearnerEdit) -> Exchange:
+    def undo(self, edit: LearnerEdit) -> Exchange:
         """Undo what a person did, however long ago; what was learned since stays.
 
         Primitives that are gone by the edit come back with their ids, exemplars and counts. What

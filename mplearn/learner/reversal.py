@@ -79,7 +79,7 @@ class SegmentsEdit(State):
 class LearnerEdit(State):
     """What an edit changed: in the trees, in the graph, and in what segments are.
 
-    `MotionLearner.exchange` undoes it; it can do so long after, when much was learned since.
+    `MotionLearner.undo` undoes it; it can do so long after, when much was learned since.
 
     Attributes:
         people: In the trees.
@@ -99,7 +99,7 @@ class LearnerEdit(State):
         >>> before = learner.known()
         >>> change = learner.remove(2)
         >>> edit = LearnerEdit.between(before, learner.known())
-        >>> undone = learner.exchange(edit)
+        >>> undone = learner.undo(edit)
         >>> undone.back, learner.snapshot().names
         ((2,), ('P1', 'P2'))
     """

@@ -74,7 +74,7 @@ class Effect(SharedState):
     def take_back(self, learner: MotionLearner, labels: Labels) -> None:
         """Undo it; what came since stays, and so does what the rules made of it since."""
         if self.learner is not None:
-            learner.exchange(self.learner)
+            learner.undo(self.learner)
         for name in self.names:
             _put(labels.names, name.primitive, name.after, name.before)
         for note in self.notes:

@@ -145,7 +145,15 @@ def test_what_cannot_be_is_said_in_a_line(
     assert "no command that can be undone" in refused(capsys, "store", "undo", store)
     assert "exists already" in refused(capsys, "store", "backup", store, store)
     (tmp_path / "b.db").write_bytes(store.read_bytes()[:5000])
-    assert "damaged" in refused(capsys, "store", "check", tmp_path / "b.db")
+    (tmp_path / "c.db").write_bytes(b"no database")
+    assert "no store" in refused(capsys, "store", "check", tmp_path / "c.db")
+    assert main(["store", "check", str(tmp_path / "b.db")]) == 1
+    assert "b.db is damaged" in capsys.readouterr().out
+    middle = store.stat().st_size // 2
+    damaged = store.read_bytes()[:middle] + bytes(2000) + store.read_bytes()[middle + 2000 :]
+    (tmp_path / "d.db").write_bytes(damaged)
+    assert main(["store", "check", str(tmp_path / "d.db")]) == 1
+    assert "d.db is damaged" in capsys.readouterr().out
     assert "--out, or a store" in refused(capsys, "learn", tmp_path)
 
 

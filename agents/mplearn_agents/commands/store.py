@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import StoreDamagedError
 from mplearn_agents.terminal.arguments import whole
+from mplearn_agents.terminal.exit_codes import NOT_IN_ORDER
 from mplearn_agents.terminal.inert import printable
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True)
 
-    def add(name: str, help: str, do: Callable[[argparse.Namespace], None]) -> Any:
+    def add(name: str, help: str, do: Callable[[argparse.Namespace], int | None]) -> Any:
         action = actions.add_parser(
             name,
             help=help,
@@ -60,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     action.add_argument("--json", action="store_true", help="print JSON")
     action = add("backup", "write a copy, also while the store is written to", _backup)
     action.add_argument("copy", type=Path, help="the file to write; it must be new")
-    action = add("check", "find what is damaged; exit code 2 if anything is", _check)
+    action = add("check", "find what is damaged; exit code 1 if anything is", _check)
     action.add_argument(
         "--salvage",
         action="store_true",
@@ -97,9 +98,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action.add_argument("--by", default="", help="who asks, for the log")
 
 
-def run(args: argparse.Namespace) -> None:
+def run(args: argparse.Namespace) -> int | None:
     """Do what is asked."""
-    args.act(args)
+    code: int | None = args.act(args)
+    return code
 
 
 def _info(args: argparse.Namespace) -> None:
@@ -170,16 +172,22 @@ def _backup(args: argparse.Namespace) -> None:
     print(f"{printable(str(path))} written, {info(path).file_bytes / 1e6:.1f} MB")
 
 
-def _check(args: argparse.Namespace) -> None:
+def _check(args: argparse.Namespace) -> int | None:
     from mplearn.store import LifelongLearner, check
 
     if args.salvage:
         with LifelongLearner.open(args.store, salvage=True) as life:
             print(f"{len(life.snapshot())} primitives from {_length(life)} of motion are kept")
-    wrong = check(args.store)
+    try:
+        wrong = check(args.store)
+    except StoreDamagedError as error:  # it cannot be opened at all
+        print(printable(str(error)))
+        return NOT_IN_ORDER
     if wrong:
-        raise StoreDamagedError(f"{args.store} is damaged: {'; '.join(wrong)}")
+        print(printable(f"{args.store} is damaged: {'; '.join(wrong)}"))
+        return NOT_IN_ORDER
     print(f"{printable(str(args.store))} is sound")
+    return None
 
 
 def _command(args: argparse.Namespace) -> None:

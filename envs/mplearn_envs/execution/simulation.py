@@ -39,6 +39,8 @@ _WILD = 1e3  # no robot is so fast [m/s, rad/s]
 class Simulation:
     """One robot on a floor. A deep copy shares the model; one that was pickled has its own.
 
+    `reset` makes it stand.
+
     Args:
         robot: The robot.
         feedback: When the ankles correct the balance (`AnkleFeedback`): in plans in which a foot is
@@ -73,6 +75,7 @@ class Simulation:
         self.body = body
         self.model = body_model(robot, body)
         self.data = mujoco.MjData(self.model)
+        self._placed = False
         self.embody(0)
         self._corners = sole_corners(self.model)
         self._feet = np.array([self.model.body(name).id for name in robot.feet])
@@ -124,6 +127,7 @@ class Simulation:
     def load_state(self, state: FloatArray) -> None:
         """Go on from what `state` returned, bit for bit."""
         mujoco.mj_setState(self.model, self.data, state, _STATE)
+        self._placed = True
         self._update_positions()
 
     def perform(
@@ -145,8 +149,12 @@ class Simulation:
             pushes: What pushes the robot meanwhile; only one that takes steps can be pushed so.
 
         Raises:
-            InvalidValueError: The robot is pushed, and it takes no steps.
+            InvalidValueError: The robot stands nowhere yet, or it is pushed and takes no steps.
         """
+        if not self._placed:
+            raise InvalidValueError(
+                "the robot stands nowhere yet: call reset(), or load_state(state), before perform"
+            )
         if self.body.steps:
             return self._perform_watchful(plan, on_frame, frame_steps, pushes)
         if len(pushes.steps):
@@ -261,6 +269,7 @@ class Simulation:
         copied.__dict__.pop("_reflexes", None)  # they have memory of their own
         copied.data = mujoco.MjData(copied.model)
         copied.load_state(self.state())
+        copied._placed = self._placed
         return copied
 
     def __getstate__(self) -> dict[str, Any]:
@@ -270,9 +279,11 @@ class Simulation:
             "body": self.body,
             "draw": self.draw,
             "state": self.state(),
+            "placed": self._placed,
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         Simulation.__init__(self, state["robot"], state["feedback"], state["body"])
         self.embody(state["draw"])
         self.load_state(state["state"])
+        self._placed = state["placed"]

@@ -12,6 +12,7 @@ import pytest
 from planners import planner
 from standing_library import BOW, RATE_HZ, sweep
 
+from mplearn.errors import InvalidValueError
 from mplearn_envs.control.ankle_feedback import correct, make_ankle_feedback
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.mechanics import rest_reference
@@ -30,6 +31,16 @@ def bowing():
 
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+
+
+def test_nothing_is_performed_before_the_robot_stands():
+    new = Simulation(HUMANOID)
+    for each in (new, copy.deepcopy(new), pickle.loads(pickle.dumps(new))):
+        with pytest.raises(InvalidValueError, match=r"call reset\(\)"):
+            each.perform(bowing())
+    new.reset()
+    for each in (copy.deepcopy(new), pickle.loads(pickle.dumps(new))):
+        assert not each.perform(bowing()).fallen
 
 
 @pytest.fixture
