@@ -117,6 +117,13 @@ class MotionLearner:
         self._looking: Recogniser | None = None
         self._under_way = KnownMotions(width, config.rate_hz)
 
+    def __repr__(self) -> str:
+        """Return how many primitives of how many people it knows, and what it learns from."""
+        n = len(self.tree.people)
+        known = f"{len(self.tree.leaves)} primitives of {n} {'person' if n == 1 else 'people'}"
+        what = f"{len(self.config.channels)} channels at {self.config.rate_hz:g} Hz"
+        return f"MotionLearner({known}; {self.n_frames} frames of {what})"
+
     @property
     def person(self) -> int:
         """Number of the person who moves, 0, 1, ... in the order of their coming.

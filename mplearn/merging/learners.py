@@ -13,7 +13,7 @@ from .people import merged_people
 from .watching import merge_watching
 
 
-def merge_learners(learners: Sequence[MotionLearner], people: Sequence[str] = ()) -> MotionLearner:
+def merge_learners(learners: Iterable[MotionLearner], people: Sequence[str] = ()) -> MotionLearner:
     """Return a learner that knows what all of some know, as if their streams followed each other.
 
     The learners stay as they are; a stream that one is in the middle of is ended for the merged
@@ -38,7 +38,7 @@ def merge_learners(learners: Sequence[MotionLearner], people: Sequence[str] = ()
 
     Raises:
         InvalidValueError: There are no learners, or not as many names; or they have other
-            configurations; bodies may be observed by other markers.
+            configurations; bodies may be observed by other markers. Or it is no list of learners.
 
     Example:
         >>> import numpy as np
@@ -53,6 +53,12 @@ def merge_learners(learners: Sequence[MotionLearner], people: Sequence[str] = ()
         >>> len(merged.snapshot()), merged.n_frames
         (2, 2400)
     """
+    alone = isinstance(learners, MotionLearner)
+    learners = () if alone else tuple(learners)
+    if alone or not all(isinstance(each, MotionLearner) for each in learners):
+        raise InvalidValueError(
+            "what is merged is a list of learners: merge_learners([one, other])"
+        )
     for other in learners[1:]:
         _check_rules(learners[0], other)
     return merged_learner((_copied(each) for each in learners), people)

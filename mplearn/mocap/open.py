@@ -361,6 +361,11 @@ def _read(
         # numbers that no one measured overflow: what comes of them is checked, and refused
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             part = take.reader.read(file, hints or Hints(), positions=positions)
+        if not isinstance(part, Recording):
+            reader, kind = type(take.reader).__name__, type(part).__name__
+            raise RecordingError(
+                f"{file}: {reader}.read returned a value of type {kind}, not a Recording"
+            )
         if not part.labels:
             part = replace(part, labels=labels_beside(file, part))
         if part.report is None:

@@ -98,6 +98,9 @@ def test_exemplars_are_shared_however_many_are_merged(shards) -> None:
 
 
 def test_what_cannot_be_merged(shards) -> None:
+    for no_list in (shards[0], ["monday.db"]):
+        with pytest.raises(InvalidValueError, match="a list of learners"):
+            merge(no_list)
     with pytest.raises(InvalidValueError, match="at least one"):
         merge([])
     other = MotionLearner(replace(shards[0].config, longest_pause_s=3.0))
@@ -105,5 +108,6 @@ def test_what_cannot_be_merged(shards) -> None:
         merge([shards[0], other])
     alone = merge([shards[0]])
     assert alone.tree.leaves == shards[0].tree.leaves
+    assert f"({len(alone.tree.leaves)} primitives of 1 person; {alone.n_frames} fr" in repr(alone)
     empty = MotionLearner(shards[0].config)
     assert counts(merge([empty, shards[0]])) == counts(merge([shards[0], empty]))

@@ -114,6 +114,23 @@ def test_a_readers_own_format_joins_by_one_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("shouting")
+def test_a_reader_that_returns_no_recording_is_named(tmp_path: Path) -> None:
+    class Careless(ShoutReader):
+        suffixes = (".careless",)
+
+        def accepts(self, path: Path) -> bool:
+            return True
+
+        def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
+            return np.zeros((2, 1))  # type: ignore[return-value]
+
+    register_reader(Careless())
+    (tmp_path / "a.careless").write_text("1\n2\n")
+    with pytest.raises(RecordingError, match=r"Careless\.read returned a value of type ndarray"):
+        open_recording(tmp_path / "a.careless")
+
+
+@pytest.mark.usefixtures("shouting")
 def test_an_installed_package_brings_readers_of_its_own(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -79,15 +79,15 @@ class _Trial:
         self.simulation = Simulation(robot, feedback)
         self.simulation.reset()
         self.body = self.simulation.model.body(chest).id
-        self.simulation.perform(_part(plan, 0, knot))
+        self.simulation.perform(plan.part(0, knot))
         self.state = self.simulation.state()
         hold = planner.hold(plan.end, RECOVERY_S + PUSH_S)
         pushed = max(1, round(PUSH_S / plan.knot_s))
         last = len(plan.q) - 1
         if knot + pushed < last:
-            self.plans = [_part(plan, knot, knot + pushed), _part(plan, knot + pushed, last), hold]
+            self.plans = [plan.part(knot, knot + pushed), plan.part(knot + pushed, last), hold]
         else:
-            self.plans = [_part(hold, 0, pushed), _part(hold, pushed, len(hold.q) - 1)]
+            self.plans = [hold.part(0, pushed), hold.part(pushed, len(hold.q) - 1)]
 
     def largest(self, direction: FloatArray, resolution_ns: float) -> float:
         """Return the largest impulse survived [N s], up to 80."""
@@ -107,16 +107,3 @@ class _Trial:
                 simulation.data.xfrc_applied[:] = 0.0
                 return False
         return True
-
-
-def _part(plan: Plan, first: int, last: int) -> Plan:
-    """Return the part of a plan from one knot to another."""
-    n_steps = len(plan.commands) // (len(plan.q) - 1)
-    knots = slice(first, last + 1)
-    return plan._replace(
-        commands=plan.commands[first * n_steps : last * n_steps],
-        **{
-            name: getattr(plan, name)[knots]
-            for name in ("q", "error", "cog", "zmp", "zmp_margin_m", "ground", "up", "share")
-        },
-    )

@@ -128,6 +128,30 @@ class Plan(NamedTuple):
         """Whether a foot is in the air or the weight moves."""
         return bool((self.up >= 0).any() or np.ptp(self.cog[:, :2], axis=0).max() > 1e-3)
 
+    def part(self, first: int, last: int) -> Plan:
+        """Return it from one reference posture to another; `end` stays that of the whole.
+
+        Args:
+            first: The posture at which the part begins, from 0 to K - 1.
+            last: That at which it ends, from ``first + 1`` to K.
+
+        Example:
+            >>> from mplearn_envs.mechanics import rest_reference
+            >>> from mplearn_envs.planning import Planner
+            >>> from mplearn_envs.robot import humanoid
+            >>> plan = Planner(humanoid()).hold(rest_reference(humanoid()), 1.0)
+            >>> round(plan.part(10, 35).duration_s, 3)
+            0.5
+        """
+        n_steps = len(self.commands) // (len(self.q) - 1)
+        return self._replace(
+            commands=self.commands[first * n_steps : last * n_steps],
+            **{name: getattr(self, name)[first : last + 1] for name in _SERIES},
+        )
+
+
+_SERIES = ("q", "error", "cog", "zmp", "zmp_margin_m", "ground", "up", "share", "heel")
+
 
 def joined(plans: Sequence[Plan]) -> Plan:
     """Return plans one after another as one, seen from where the first one begins.
@@ -149,15 +173,7 @@ def joined(plans: Sequence[Plan]) -> Plan:
 
     return moved[-1]._replace(
         commands=np.concatenate([plan.commands for plan in moved]),
-        q=series("q"),
-        error=series("error"),
-        cog=series("cog"),
-        zmp=series("zmp"),
-        zmp_margin_m=series("zmp_margin_m"),
-        ground=series("ground"),
-        up=series("up"),
-        share=series("share"),
-        heel=series("heel"),
+        **{name: series(name) for name in _SERIES},
     )
 
 

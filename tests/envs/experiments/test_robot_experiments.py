@@ -63,3 +63,5 @@ def test_pushes_are_survived_up_to_a_limit():
     impulses = [float(cell) for cell in row[2:]]
     assert all(5.0 < impulse < 60.0 for impulse in impulses)
     assert abs(impulses[2] - impulses[3]) < 1e-9  # left and right
+    for row in push_table(feedback=("always",), resolution_ns=20.0).rows:  # amid a squat, too
+        assert all(5.0 < float(cell) < 60.0 for cell in row[2:])
