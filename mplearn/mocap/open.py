@@ -360,12 +360,8 @@ def _read(
     for file in take.files:
         # numbers that no one measured overflow: what comes of them is checked, and refused
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            part = take.reader.read(file, hints or Hints(), positions=positions)
-        if not isinstance(part, Recording):
-            reader, kind = type(take.reader).__name__, type(part).__name__
-            raise RecordingError(
-                f"{file}: {reader}.read returned a value of type {kind}, not a Recording"
-            )
+            read = take.reader.read(file, hints or Hints(), positions=positions)
+        part = _recording(read, file, take.reader)
         if not part.labels:
             part = replace(part, labels=labels_beside(file, part))
         if part.report is None:
@@ -379,6 +375,14 @@ def _read(
     else:
         recording = told_of_lean(recording)
     return recording if rate_hz is None else resample(recording, rate_hz)
+
+
+def _recording(read: object, file: Path, reader: Reader) -> Recording:
+    """Return what a reader has read, which may be someone else's."""
+    if isinstance(read, Recording):
+        return read
+    kind, name = type(read).__name__, type(reader).__name__
+    raise RecordingError(f"{file}: {name}.read returned a value of type {kind}, not a Recording")
 
 
 def _say(recording: Recording, path: Path) -> None:

@@ -88,7 +88,8 @@ class Simulation:
         """
         self.draw = draw
         self._drawn = embody(self.model, self.robot, self.body, draw)
-        self.__dict__.pop("_settled", None)
+        if not self.body.certain:  # another body settles elsewhere
+            self.__dict__.pop("_settled", None)
 
     def draw_pushes(self, count: int, duration_s: float) -> Pushes:
         """Return what pushes the robot that was drawn in a macro step; see `draw_pushes`.

@@ -43,6 +43,17 @@ def test_nothing_is_performed_before_the_robot_stands():
         assert not each.perform(bowing()).fallen
 
 
+def test_a_body_that_is_certain_settles_once(monkeypatch):
+    new = Simulation(HUMANOID)
+    new.reset()
+    began = new.state()
+    monkeypatch.setattr(mujoco, "mj_step", lambda *_: pytest.fail("it settles again"))
+    for draw in (1, 2):
+        new.embody(draw)
+        new.reset()
+        assert (new.state() == began).all()
+
+
 @pytest.fixture
 def simulation():
     simulation = Simulation(HUMANOID)
