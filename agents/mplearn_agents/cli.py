@@ -14,7 +14,9 @@ import importlib
 import os
 import pkgutil
 import re
+import shutil
 import sys
+import textwrap
 from collections.abc import Sequence
 from types import ModuleType
 from typing import Any, NoReturn
@@ -120,13 +122,18 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
             name,
             help=module.HELP,
             description=module.HELP,
-            epilog=f"example:\n  {module.EXAMPLE}\n\n{_CODES}",
+            epilog=f"example:\n  {module.EXAMPLE}\n\n{_codes()}",
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         if named in (None, name):
             module.add_arguments(command)
             command.set_defaults(run=module.run, build_parser=build_parser)
     return parser
+
+
+def _codes() -> str:
+    """Return the exit codes in lines that fit the terminal, as argparse writes the rest."""
+    return textwrap.fill(_CODES, shutil.get_terminal_size().columns - 2)
 
 
 def command_modules() -> dict[str, ModuleType]:

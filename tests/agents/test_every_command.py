@@ -22,6 +22,7 @@ from mplearn_agents.cli import build_parser, command_modules, main
 from mplearn_agents.terminal import console as consoles
 from mplearn_agents.terminal.console import InertConsole
 from mplearn_agents.terminal.inert import InertStream, inert_output, printable
+from mplearn_agents.terminal.tables import primitive_table
 from mplearn_envs.data.library_source import LibrarySource
 
 COMMANDS = sorted(command_modules())
@@ -219,6 +220,43 @@ def test_tables_are_turned_rather_than_cut(width):
         for k in range(12):
             assert f"{row + k + 0.123456789:.9f}" in text
     assert max(map(len, text.splitlines())) <= width
+
+
+@pytest.mark.parametrize("width", [40, 66, 80, 100, 400])
+def test_texts_are_wrapped_between_words_before_a_table_is_turned(width, library):
+    """As long as it is a table every cell is there, word for word, and its numbers in one line."""
+    file = io.StringIO()
+    console = InertConsole(file=file, width=width, force_terminal=True, color_system=None)
+    table = primitive_table(library)
+    console.print(table)
+    lines = file.getvalue().splitlines()
+    assert max(map(len, lines)) <= width
+    assert (width >= 80) == any("\u2503 id" in line for line in lines)
+    if width < 80:
+        return
+    rows = []
+    for line in lines:
+        if line.startswith("\u2502"):
+            cells = [cell.strip() for cell in line.strip("\u2502").split("\u2502")]
+            rows += [[]] if cells[0] else []
+            rows[-1].append(cells)
+    assert len(rows) == len(library)
+    for primitive, found in zip(library.primitives, rows, strict=True):
+        id, name, n, duration, active = (
+            " ".join(c for c in part if c) for part in zip(*found, strict=True)
+        )
+        assert (id, name, n) == (str(primitive.id), primitive.name, str(primitive.n_exemplars))
+        assert duration == f"{primitive.mean_duration_s:.2f} s" and len(active.split(", ")) == 3
+        assert all(found[0][k] for k in (0, 2, 3)) and len(found) <= 3
+
+
+@pytest.mark.parametrize("columns", ["60", "80"])
+def test_exit_codes_in_help_fit_the_terminal(columns, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", columns)
+    out = said(capsys, "learn", "--help")[1]
+    told = out[out.index("exit codes: ") :]
+    assert max(map(len, told.splitlines())) <= int(columns)
+    assert " ".join(told.split()) == cli._CODES
 
 
 def test_nothing_is_cut_where_the_output_is_no_terminal(monkeypatch):

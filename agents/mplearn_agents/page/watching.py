@@ -11,6 +11,7 @@ import threading
 import time
 import warnings
 from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -24,6 +25,7 @@ from mplearn.learner import LearnerConfig, MotionLearner, learnable_rate
 from mplearn.library import PrimitiveLibrary
 from mplearn.sources import Block, Change, Observe, Source, open_source
 from mplearn.store import LifelongLearner, Store
+from mplearn.tree import PrimitiveTree, TreeConfig
 from mplearn_agents.learning.pauses import short_pauses
 
 from .figures import CLIP_HZ, motions_of
@@ -38,6 +40,7 @@ from .watched_figure import WatchedFigure
 MOST_WAITING = 3_000  # blocks of the stream that may wait for the learner
 STATUS_S, KNOWLEDGE_S = 0.25, 0.2
 _WARM_UP = ("BAR", "BAL") * 4
+_KINDS = 14  # more primitives than are compared one by one
 _TEACHERS, _STREAM = 0, 1  # who comes first
 _FORESEEN, _TOLD = 8, 3  # motions that may come next: looked at, and told
 _DELAYS = 500  # frames over which the delay is measured
@@ -445,6 +448,7 @@ class Watcher:
 
 def _warm_up() -> None:
     """Learn from a demonstrator for a moment, so that all is compiled before the stream begins."""
+    _warm_up_tree()
     demonstration = demonstrate(_WARM_UP, seed=0)
     recording = demonstration.recording
     learner = MotionLearner(LearnerConfig(recording.channels, recording.rate_hz))
@@ -454,6 +458,23 @@ def _warm_up() -> None:
     knowledge(library, learner.tree)
     motions_of(library, library.ids[0])
     WatchedFigure(recording.channels, recording.rate_hz).take(recording.frames)
+
+
+def _warm_up_tree() -> None:
+    """Let a small tree do what a tree does once it knows more, and what teachers ask of it."""
+    rng = np.random.default_rng(0)
+    tree = PrimitiveTree(TreeConfig(max_exemplars=4), 2, 50.0)
+    t = np.linspace(0.0, 1.0, 30)[:, None]
+    rises, turns = rng.normal(size=(2, _KINDS, 2))
+    for n, kind in enumerate((*range(_KINDS), *range(_KINDS), *[0] * 12)):
+        once = rises[kind] * np.sin(np.pi * t) ** 2 + turns[kind] * np.sin(2.0 * np.pi * t) ** 2
+        if n >= 2 * _KINDS and n % 2:
+            once += 0.2 * t**2  # two manners, which could be two motions
+        tree.insert(once + 0.01 * rng.normal(size=once.shape))
+    for id in tree.leaves[:2]:
+        with suppress(InvalidValueError):
+            tree.split(id)
+    tree.merge(*tree.leaves[:2])
 
 
 def _memory_mb() -> float:

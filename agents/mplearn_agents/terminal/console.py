@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
+from copy import copy
+from dataclasses import replace
 
 from rich.console import Console, ConsoleOptions, RenderableType
+from rich.measure import Measurement
 from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
@@ -12,13 +16,15 @@ from rich.text import Text
 from mplearn_agents.terminal.inert import printable
 
 _ENDLESS = 100_000  # columns where no terminal cuts or wraps
+_LEAST_SHARE = 0.4  # of its width that a text in a table keeps: three lines at most, nearly always
 
 
 class InertConsole(Console):
     """A console on which text is text, and tables are never cut.
 
-    A table that is wider than the terminal is turned: a block of lines for each of its rows. Where
-    the output is no terminal, nothing is wrapped.
+    A table that is wider than the terminal has its texts in lines of words, where that does it, or
+    else is turned: a block of lines for each of its rows. Where the output is no terminal, nothing
+    is wrapped.
     """
 
     def render(
@@ -28,7 +34,7 @@ class InertConsole(Console):
         if isinstance(renderable, Table) and self.is_terminal:
             options = options or self.options
             if natural_width(self, renderable) > options.max_width:
-                renderable = turned(renderable)
+                renderable = narrowed(self, renderable, options.max_width) or turned(renderable)
         encoding = self.encoding
         for text, style, control in super().render(renderable, options):
             if not control:
@@ -50,6 +56,40 @@ def natural_width(console: Console, table: Table) -> int:
     """Return how many columns a table takes if no cell is wrapped."""
     wide = console.options.update(width=_ENDLESS, max_width=_ENDLESS)
     return table.__rich_measure__(console, wide).maximum
+
+
+def narrowed(console: Console, table: Table, width: int) -> Table | None:
+    """Return a table whose texts are wrapped between words, so that it fits.
+
+    Args:
+        console: Where it is printed.
+        table: The table.
+        width: Columns that there are.
+
+    Returns:
+        The table; None where a text would be less than `_LEAST_SHARE` as wide as it is, or narrower
+        than its longest word. The widest is wrapped first.
+    """
+    wide = console.options.update(width=_ENDLESS, max_width=_ENDLESS)
+    widths, least = {}, {}
+    for at, column in enumerate(table.columns):
+        if column.justify == "left":
+            cells = (column.header, *column.cells)
+            sizes = [Measurement.get(console, wide, cell) for cell in cells]
+            widths[at] = max(size.maximum for size in sizes)
+            longest_word = max(size.minimum for size in sizes)
+            least[at] = max(longest_word, math.ceil(_LEAST_SHARE * widths[at]))
+    for _ in range(natural_width(console, table) - width):
+        free = [at for at in widths if widths[at] > least[at]]
+        if not free:
+            return None
+        widths[max(free, key=widths.__getitem__)] -= 1
+    out = copy(table)
+    out.columns = [
+        replace(column, width=widths.get(at), no_wrap=at not in widths)
+        for at, column in enumerate(table.columns)
+    ]
+    return out
 
 
 def turned(table: Table) -> Table:
