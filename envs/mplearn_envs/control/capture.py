@@ -42,6 +42,8 @@ class Reach(NamedTuple):
         apart: How far aside it is past it [m].
         across: How far beyond the other one a foot can land that crosses it there [m]; at 0 none
             does.
+        inwards: How far on its own side of the DCM a foot lands that crosses [m]: what is left
+            drives the robot to the side of the other one, which is free to step.
     """
 
     ahead: float
@@ -53,6 +55,7 @@ class Reach(NamedTuple):
     clear: float = 0.26
     apart: float = 0.13
     across: float = 0.0
+    inwards: float = 0.0
 
 
 class Step(NamedTuple):
@@ -163,7 +166,7 @@ def landing_place(
         x = min(max(x, -reach.behind), reach.ahead)
         y = min(max(y, reach.narrow), reach.wide)
     else:
-        y = min(max(y, -reach.across), reach.narrow)
+        y = min(max(y + reach.inwards, -reach.across), reach.narrow)
         if way == IN_FRONT:
             x = min(max(x, reach.clear), reach.ahead)
         else:

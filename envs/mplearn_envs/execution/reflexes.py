@@ -54,7 +54,7 @@ _PAST_M = 0.02  # between soles that pass each other
 _CROSS_M = 0.06  # as much more a foot is ahead of the other one so that legs can cross
 _DROP_M = 0.35  # who steps may be so much lower
 _TUNED: dict[str, Any] = {  # on pushes at the chest of the humanoid
-    "reach": Reach(0.5, 0.4, 0.16, 0.62, 2.2, 0.24, across=0.1),
+    "reach": Reach(0.5, 0.4, 0.16, 0.62, 2.2, 0.24, across=0.1, inwards=0.05),
     "decides_s": 0.1,
     "gain": 4.0,
     "lift_m": 0.035,

@@ -156,6 +156,20 @@ def test_who_stands_on_one_foot_and_falls_beyond_it_crosses_it(corners, side, an
     assert either.way == BESIDE
 
 
+@pytest.mark.parametrize("side", [0, 1])
+def test_who_crosses_lands_on_the_side_of_the_foot_that_crosses(corners, side):
+    """So that what is left drives the robot to where the other foot can step."""
+    own = 1.0 if side == 0 else -1.0
+    dcm, stands = FEET[1 - side, :2] + np.array([-0.17, 0.02 * own]), FEET[1 - side]
+    places = [
+        landing_place(corners, stands, side, dcm, RATE, 0.3, CROSSING._replace(inwards=x), BEHIND)
+        for x in (0.0, 0.05)
+    ]
+    (straight, _), (inwards, missing) = places
+    assert own * (inwards[1] - straight[1]) == pytest.approx(0.05)
+    assert inwards[0] == straight[0] and missing < 0.02
+
+
 def test_a_foot_on_its_way_is_sooner_there(corners):
     dcm = np.array([0.2, 0.0])
     on_its_way = choose_step(corners, FEET, dcm, RATE, REACH, 0, 0.1)
