@@ -19,6 +19,7 @@ from .synonyms import (
     SKIN_SIDED,
 )
 
+_SIDES = frozenset(("l", "r", "left", "right"))
 CUT = 4  # letters that some files keep of a label
 _PELVIS = frozenset(("iliac_front", "iliac_back", "trochanter"))
 _LIMBS = frozenset(("elbow", "hip", "knee"))  # called by others where joints are called as bones
@@ -69,14 +70,21 @@ def read_label(label: str) -> list[Label]:
     return list(dict.fromkeys(ways))
 
 
-def without_shared_prefix(labels: tuple[str, ...]) -> tuple[str, ...]:
-    """Return labels without what all begin with, as ``Skeleton_001_`` of Motive; a side stays."""
-    start = shared_start(labels)
-    words = set(re.split(f"[{re.escape(WORD_MARKS)}]+", start.lower()))
-    named = [label[len(start) :] for label in labels]
-    if words & {"l", "r", "left", "right"}:
-        return labels
-    return tuple(named) if all(name[:1].isalpha() for name in named) else labels
+def without_shared_ends(labels: tuple[str, ...]) -> tuple[str, ...]:
+    """Return labels without what all begin and end with; a side stays.
+
+    As ``Skeleton_001_`` of Motive, or the name of a trial behind each label.
+    """
+    for start, end in ((shared_start(labels), ""), ("", _shared_end(labels))):
+        words = set(re.split(f"[{re.escape(WORD_MARKS)}]+", (start + end).lower()))
+        named = tuple(label[len(start) : len(label) - len(end)] for label in labels)
+        if not words & _SIDES and all(name[:1].isalpha() for name in named):
+            labels = named
+    return labels
+
+
+def _shared_end(labels: tuple[str, ...]) -> str:
+    return shared_start([label[::-1] for label in labels])[::-1]
 
 
 def landmarks_of(labels: tuple[str, ...], naming: Naming) -> dict[str, tuple[str, ...]]:

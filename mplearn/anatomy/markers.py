@@ -19,7 +19,7 @@ from ..mocap.options import option
 from ..recording import FloatArray, Recording
 from .body_map import BodyMap
 from .facing import check_facing
-from .labels import landmarks_of, naming_of, without_shared_prefix
+from .labels import landmarks_of, naming_of, without_shared_ends
 
 SOME_FRAMES = 120  # of a recording are looked at
 TRUNK, FEWEST_ON_TRUNK = ("pelvis", "abdomen", "chest", "clavicle_l", "clavicle_r"), 4
@@ -63,7 +63,7 @@ def recognise_markers(recording: Recording, names: Mapping[str, str] | None = No
         if known is not None:
             return _map(labels, known, known_set=True)
     heights = _heights(labels, some)
-    plain = without_shared_prefix(rest)
+    plain = without_shared_ends(rest)
     naming = naming_of(plain)
     read = landmarks_of(plain, naming)
     pairs = zip(rest, plain, strict=True)
@@ -103,7 +103,7 @@ def recognise_markers(recording: Recording, names: Mapping[str, str] | None = No
 def _of_known_set(labels: tuple[str, ...]) -> dict[str, str] | None:
     """Return the names that a known set has for its markers, or None if they are of none."""
     try:
-        plain = without_shared_prefix(labels)
+        plain = without_shared_ends(labels)
         markers = find_marker_set(plain)
     except BodyError:
         return None

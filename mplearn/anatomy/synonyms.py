@@ -44,7 +44,7 @@ SKIN_SIDED = {
     "iliac_front": "asi asis ias fwt waistfront asisstudy sias hipfront siasis asia",
     "iliac_back": "psi psis ips bwt waistback psisstudy sips hipback",
     "iliac_crest": "ic iliaccrest crest ilcr waist waistside iliac cristailiaca ilc",
-    "trochanter": "troc trochanter ftc gt gtr gtroch greatertrochanter trc tro gtro fgt",
+    "trochanter": "troc trochanter ftc gt gtr gtroch greatertrochanter trc tro gtro fgt grtroch",
     "thigh_outer": "thi thigh thap bar1 thighupper thigh1 thighlateral thighlat tht",
     "thigh_front": "thighfront thad thighfrontlow quad",
     "knee_outer": (
@@ -72,7 +72,7 @@ SKIN_SIDED = {
     "heel_back": "hee heel fcc cal calc calcaneus ca heelback calcstudy hel",
     "metatarsal1": (
         "mt1 fm1 fm toein toemed toemedial met1 metatarsal1 d1m fmh forefootin mth1 "
-        "toesmed 1meta toem"
+        "toesmed 1meta toem mtp1"
     ),
     "metatarsal2": (
         "toe fm2 sm forefoot2 met2 metatarsal2 mt2 d2m met mth2 forefoot toestudy "
@@ -80,9 +80,16 @@ SKIN_SIDED = {
     ),
     "metatarsal5": (
         "mt5 fm5 vm toeout toelat toelateral met5 metatarsal5 d5m 5meta 5metastudy "
-        "forefoot5 forefootout vmh mth5 toeslat smalltoe"
+        "forefoot5 forefootout vmh mth5 toeslat smalltoe mtp5"
     ),
     "toe_tip": "toetip hlx hallux bigtoe footindex hal hx toe1 tip",
+    # joints that were computed, beside the markers
+    "shoulder": "sjc shoulderjc shouldercenter shouldercentre vshoulderjc",
+    "elbow": "ejc elbowjc elbowcenter elbowcentre velbowjc",
+    "wrist": "wjc wristjc wristcenter wristcentre vwristjc",
+    "hip": "hjc hipjc hipcenter hipcentre vhipjc",
+    "knee": "kjc kneejc kneecenter kneecentre vkneejc",
+    "ankle": "ajc anklejc anklecenter anklecentre vanklejc",
 }
 
 # and without

@@ -14,7 +14,7 @@ from ..recording import Recording, marker_channels
 from .body_map import BodyMap
 from .bones import with_bones
 from .facing import MirroredError
-from .labels import names_skin, without_shared_prefix
+from .labels import names_skin, without_shared_ends
 from .markers import recognise_markers
 from .skeletons import recognise_skeleton
 
@@ -72,7 +72,7 @@ def recognise(recording: Recording, *, names: Mapping[str, str] | None = None) -
     """
     if recording.skeleton is not None and recording.is_markers:
         return recognise_skeleton(recording, names)
-    on_skin = recording.is_markers and names_skin(without_shared_prefix(recording.marker_names))
+    on_skin = recording.is_markers and names_skin(without_shared_ends(recording.marker_names))
     hanging = None if names or on_skin else with_bones(recording)
     if hanging is None:
         return recognise_markers(recording, names)

@@ -1,4 +1,4 @@
-"""Files as they come: plain or gzipped, bytes or text, and the error that names them."""
+"""Files as they come: plain, gzipped or alone in a zip archive, and the error that names them."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ import codecs
 import gzip
 import re
 import stat
+import zipfile
 import zlib
 from collections.abc import Callable
 from io import BufferedIOBase
 from pathlib import Path
+from typing import cast
 
 from ..errors import RecordingError
 
@@ -33,6 +35,15 @@ _LAST_CELL = re.compile(r"(?<=[^\s,;])[ \t,;]+([^\s,;]*)\Z")
 _WORD = re.compile(r"\b(?!nan\b)[a-z]", re.I)
 _ZIP_NAME = 30  # where an archive names the first file in it
 _ZIP, _GZIP = b"PK\x03\x04", b"\x1f\x8b\x08"
+# what lies beside a recording in an archive, and is none
+_BESIDE = re.compile(
+    r"(?:^|/)(?:__MACOSX/|\.|desktop\.ini$|thumbs\.db$|(?:read ?me|licen[cs]e)[^/]*$)"
+    r"|\.(?:pdf|md|html?|rtf|docx?|png|jpe?g|gif|mp4|avi|mov|fbx|blend)$",
+    re.I,
+)
+_WORKBOOK = "[Content_Types].xml"  # of programs for offices
+_MOST_NAMED = 6
+_ZIP_DAMAGE = (zipfile.BadZipFile, NotImplementedError, RuntimeError, ValueError, KeyError)
 # characters that a line, and a cell, of a large table has at least: more lines of nothing than
 # memory holds are no measurement
 _LEAST_LINE, _LEAST_CELL = 12, 1.6
@@ -40,8 +51,15 @@ _LINES_BEFORE = 20  # of which the last numbers tell whether a file's last one i
 
 
 def suffix(path: Path) -> str:
-    """Return the suffix that names the format, lower case: ``86_01.amc.gz`` -> ``.amc``."""
-    return Path(_ungzipped(path)).suffix.lower()
+    """Return the suffix that names the format, lower case: ``86_01.amc.gz`` -> ``.amc``.
+
+    Of a zip archive it is that of the only recording in it.
+    """
+    ending = Path(_ungzipped(path)).suffix.lower()
+    if ending != ".zip":
+        return ending
+    inside = _only_recording(path)
+    return Path(inside).suffix.lower() if inside else ending
 
 
 def stem(path: Path) -> str:
@@ -92,7 +110,7 @@ def head(path: Path, n_bytes: int = 8192) -> bytes:
     try:
         with _opened(path) as file:
             return file.read(n_bytes)
-    except (OSError, EOFError, zlib.error):
+    except (OSError, EOFError, zlib.error, *_ZIP_DAMAGE):
         return b""
 
 
@@ -103,12 +121,12 @@ def head_text(path: Path, n_bytes: int = 8192) -> str:
 
 
 def read_bytes(path: Path) -> bytes:
-    """Return the content of a file, unpacked where it is gzipped, whatever its name.
+    """Return the content of a file, unpacked where it is gzipped, or alone in a zip archive.
 
     Raises:
-        RecordingError: The file is missing, empty, unreadable, no regular file, a gzip file that
+        RecordingError: The file is missing, empty, unreadable, no regular file, a packed file that
             is damaged or expands beyond what measured motion does, or what was saved instead of a
-            recording: a pointer to it, a page of the web, an archive.
+            recording: a pointer to it, a page of the web, an archive of several.
     """
     if not is_file(path):
         raise bad_file(path, "no such file", "a readable file")
@@ -120,9 +138,10 @@ def read_bytes(path: Path) -> bytes:
             limit = max(_SMALL_BYTES, _MOST_PACKED * limit)
         with _opened(path) as file:
             data = file.read(limit + 1)
-    except (OSError, EOFError, zlib.error) as error:
+    except (OSError, EOFError, zlib.error, *_ZIP_DAMAGE) as error:
         if packed and not (isinstance(error, OSError) and error.errno):
-            raise bad_file(path, f"damaged ({error})", "a whole gzip file") from error
+            whole = "gzip file" if _starts(path) == _GZIP else "zip archive"
+            raise bad_file(path, f"damaged ({error})", f"a whole {whole}") from error
         reason = getattr(error, "strerror", None) or error
         raise bad_file(path, f"cannot be read ({reason})", "a readable file") from error
     if packed and len(data) > limit:
@@ -148,7 +167,14 @@ def _refuse_other_files(path: Path, data: bytes) -> None:
             path, "it is a library of primitives, not a recording", "a recording of motion"
         )
     if data.startswith(_ZIP) and suffix(path) != ".npz":
-        raise bad_file(path, "it is a zip archive", "the file that is packed in it")
+        inside = _recordings_in(path)
+        if _WORKBOOK in inside:
+            raise bad_file(path, "it is a file of an office program", "a table saved as CSV")
+        shown = ", ".join(inside[:_MOST_NAMED]) + (", ..." if len(inside) > _MOST_NAMED else "")
+        found = f"it is a zip archive of {len(inside)} files ({shown})"
+        if not inside:
+            found = "it is a zip archive without a recording, or damaged"
+        raise bad_file(path, found, "one recording in it, or the files unpacked")
 
 
 def read_text(path: Path) -> str:
@@ -232,13 +258,42 @@ def _plain(data: bytes) -> bytes:
 
 
 def _opened(path: Path) -> BufferedIOBase:
-    return gzip.open(path) if _is_packed(path) else path.open("rb")
+    if _starts(path) == _GZIP:
+        return gzip.open(path)
+    inside = _only_recording(path) if _is_packed(path) else ""
+    if not inside:
+        return path.open("rb")
+    with zipfile.ZipFile(path) as archive:  # keeps the file open as long as what is in it
+        return cast("BufferedIOBase", archive.open(inside))
 
 
 def _is_packed(path: Path) -> bool:
-    """Whether a file is gzipped: browsers unpack what they load, and leave its name."""
+    """Whether a file is gzipped, as browsers unpack and leave its name, or alone in an archive."""
+    start = _starts(path)
+    return start == _GZIP or (start == _ZIP[: len(_GZIP)] and bool(_only_recording(path)))
+
+
+def _starts(path: Path) -> bytes:
     with path.open("rb") as file:
-        return file.read(len(_GZIP)) == _GZIP
+        return file.read(len(_GZIP))
+
+
+def _only_recording(path: Path) -> str:
+    """Return the name of the file that is alone in a zip archive; empty for none, and for more."""
+    inside = _recordings_in(path)
+    return inside[0] if len(inside) == 1 else ""
+
+
+def _recordings_in(path: Path) -> list[str]:
+    """Return the files in a zip archive that may be recordings; none where it is no archive."""
+    if Path(_ungzipped(path)).suffix.lower() == ".npz" or not is_file(path):
+        return []  # an archive of arrays is one recording
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+    except (OSError, *_ZIP_DAMAGE):
+        return []
+    return [name for name in names if not name.endswith("/") and not _BESIDE.search(name)]
 
 
 def _ungzipped(path: Path) -> str:

@@ -36,6 +36,23 @@ _HELEN_HAYES = {
         "Toe": "metatarsal2",
     }.items()
 }
+_JOINT_CENTRES = {"C7": "c7"} | {
+    f"{side}{label}": f"{place}_{side}"
+    for side in "lr"
+    for label, place in {
+        "ASIS": "iliac_front",
+        "PSIS": "iliac_back",
+        "HJC": "hip",
+        "KJC": "knee",
+        "AJC": "ankle",
+        "SJC": "shoulder",
+        "EJC": "elbow",
+        "WJC": "wrist",
+        "HEEL": "heel_back",
+        "MTP1": "metatarsal1",
+        "MTP5": "metatarsal5",
+    }.items()
+}
 _CAST = {"SJN": "jugular_notch", "SXS": "xiphoid", "CV7": "c7", "TV10": "t10"} | {
     f"{side}_{label}": f"{place}_{side.lower()}"
     for side in "LR"
@@ -209,6 +226,7 @@ SETS = {
     "helen_hayes": _HELEN_HAYES,
     "cut": {label[:4]: place for label, place in _HELEN_HAYES.items() if "Medial" not in label},
     "cast": _CAST,
+    "joint centres": _JOINT_CENTRES,
     "sports": _SPORTS,
     "opencap": _OPENCAP,
     "openpose": _OPENPOSE,

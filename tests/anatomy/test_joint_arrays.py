@@ -30,6 +30,7 @@ PLACES = {
     "heel": ("heel_back",),
     "foot_index": ("toe_tip",),
     "foot": ("ball",),
+    "toe": ("ball",),
     "index": ("knuckle_index",),
     "pinky": ("knuckle_little",),
     "thumb": ("thumb_side",),
@@ -90,6 +91,19 @@ def test_joints_in_another_order_are_refused(
         np.save(tmp_path / "a.npy", np.random.default_rng(seed).permutation(points, axis=1))
         with pytest.raises(RecordingError, match="would not be a person's"):
             open_recording(tmp_path / "a.npy", hints=Hints(rate_hz=RATE_HZ))
+
+
+def test_coco_with_feet_alone(
+    tmp_path: Path, truth: Truth, landmarks: dict[str, np.ndarray]
+) -> None:
+    """Body and feet without hands and face: as many as Xsens has segments."""
+    points = joints("COCO-WholeBody", landmarks)
+    assert points.shape[1] == 23
+    np.save(tmp_path / "a.npy", points)
+    take = open_recording(tmp_path / "a.npy", hints=Hints(rate_hz=RATE_HZ))
+    assert take.markers == pytest.approx(points)
+    angles, off_mm = truth.errors(recognise(take).apply(take))
+    assert np.median(angles) < 3.0 and np.median(off_mm) < 15.0
 
 
 def test_an_archive_with_batch_confidence_and_rate(

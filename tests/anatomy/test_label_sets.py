@@ -75,6 +75,16 @@ def test_what_all_labels_begin_with_says_nothing(truth, name, prefix):
     assert set(found.points) <= set(labels)
 
 
+@pytest.mark.parametrize("suffix", ["_walk01", ".Trial 3", " (m)"])
+@pytest.mark.parametrize("name", ["cast", "opencap"])
+def test_what_all_labels_end_with_says_nothing(truth, name, suffix):
+    recording = labelled(name, truth.body, truth.postures, 25.0)
+    labels = tuple(f"{label}{suffix}" for label in recording.marker_names)
+    found = recognise(replace(recording, channels=marker_channels(labels)))
+    assert found.places == recognise(recording).places
+    assert set(found.points) <= set(labels)
+
+
 def test_of_two_people_one_is_used_and_said(truth):
     recording = labelled("cast", truth.body, truth.postures, 25.0)
     names = recording.marker_names

@@ -575,6 +575,8 @@ def write_xdf(
     times: np.ndarray | None = None,
     typed: bool = True,
     units: str = "meters",
+    names: tuple[str, ...] | None = None,
+    stream: str = "cameras",
     extra: bytes = b"",
 ) -> Path:
     """``typed``: channels by marker and type, as the layer's conventions have it, or by label."""
@@ -582,13 +584,14 @@ def write_xdf(
     times = 100.0 + np.arange(len(points)) / rate_hz if times is None else times
     channels = ""
     for i in range(points.shape[1]):
+        name = f"M{i}" if names is None else names[i]
         for axis in "XYZ":
-            channels += f"<channel><label>M{i}_{axis}</label>"
+            channels += f"<channel><label>{name}_{axis}</label>"
             if typed:
-                channels += f"<marker>M{i}</marker><type>Position{axis}</type>"
+                channels += f"<marker>{name}</marker><type>Position{axis}</type>"
             channels += f"<unit>{units}</unit></channel>"
     header = (
-        "<?xml version='1.0'?><info><name>cameras</name><type>MoCap</type>"
+        f"<?xml version='1.0'?><info><name>{stream}</name><type>MoCap</type>"
         f"<channel_count>{3 * points.shape[1]}</channel_count>"
         f"<nominal_srate>{rate_hz}</nominal_srate><channel_format>float32</channel_format>"
         f"<desc><channels>{channels}</channels></desc></info>"

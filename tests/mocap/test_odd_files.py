@@ -917,6 +917,7 @@ def test_what_was_saved_instead_of_a_recording_is_called_so(
 def test_a_zip_archive_is_called_so(tmp_path: Path) -> None:
     with ZipFile(tmp_path / "a.bvh", "w") as archive:
         archive.writestr("a.bvh", "HIERARCHY")
+        archive.writestr("b.bvh", "HIERARCHY")
     with pytest.raises(RecordingError, match="zip archive"):
         open_recording(tmp_path / "a.bvh")
 

@@ -261,6 +261,20 @@ def test_smpl_joints_turn_as_the_models_do(tmp_path: Path, n_joints: int) -> Non
     assert (np.cross(ahead, left)[:, 2] > 0).all()  # left is left of ahead
 
 
+@pytest.mark.parametrize(
+    ("length_s", "rate_hz"),
+    [(2.0, 120.0), (1.9917, 120.0), (4.0, 60.0), (8.008, 29.97), (7.0, 34.286)],
+)
+def test_smpl_of_a_length_instead_of_a_rate(
+    tmp_path: Path, length_s: float, rate_hz: float
+) -> None:
+    """Frames counted from the first to the last, or to the end of the last."""
+    arrays = {"poses": smpl_poses(240), "trans": np.zeros((240, 3)), "mocap_framerate": None}
+    path = write_smpl(tmp_path / "a.npz", **arrays, mocap_time_length=np.array(length_s))
+    recording = open_recording(path)
+    assert recording.rate_hz == pytest.approx(rate_hz, rel=1e-4)
+
+
 def test_smpl_angles_are_the_poses(tmp_path: Path) -> None:
     poses = smpl_poses(30, 52, seed=4)
     trans = np.tile([0.0, 0.0, 0.9], (30, 1))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import gzip
+from contextlib import suppress
 from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 import pytest
@@ -50,6 +52,57 @@ def test_packed_or_not_whatever_the_name(tmp_path: Path, format: str) -> None:
     path.write_bytes(gzip.compress(content))
     for each in (plain, path):
         assert np.array_equal(open_recording(each).frames, wanted.frames, equal_nan=True)
+
+
+@pytest.mark.parametrize("format", ["BVH", "C3D", "CSV", "SMPL", "XDF", "TRC"])
+@pytest.mark.parametrize("name", ["takes/{}", "{}"])
+def test_alone_in_a_zip_archive(tmp_path: Path, format: str, name: str) -> None:
+    path = write(tmp_path, format)
+    wanted = open_recording(path)
+    of_its_name = [path] if format != "SMPL" else []  # which is that of an archive, too
+    for packed in (tmp_path / "Export 3.zip", *of_its_name):
+        with ZipFile(tmp_path / "packed", "w", ZIP_DEFLATED) as archive:
+            for beside in ("__MACOSX/._a.bvh", "README.txt", "licence.md", "pictures/a.PNG"):
+                archive.writestr(beside, "text")
+            archive.mkdir("takes")
+            archive.writestr(name.format(path.name), path.read_bytes())
+        (tmp_path / "packed").replace(packed)
+        found = open_recording(packed)
+        assert found.channels == wanted.channels
+        assert np.array_equal(found.frames, wanted.frames, equal_nan=True)
+    assert [take.name for take in open_recordings(tmp_path)] == ["Export 3", path.stem]
+
+
+def test_what_is_in_an_archive_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.zip"
+    with ZipFile(path, "w") as archive:
+        for name in ("walk.bvh", "run.bvh"):
+            archive.writestr(name, write(tmp_path, "BVH").read_bytes())
+    with pytest.raises(RecordingError, match=r"2 files \(walk.bvh, run.bvh\)"):
+        open_recording(path)
+    with ZipFile(path, "w") as archive:
+        archive.writestr("[Content_Types].xml", "<xml/>")
+        archive.writestr("xl/workbook.xml", "<xml/>")
+    with pytest.raises(RecordingError, match="office program; expected a table saved as CSV"):
+        open_recording(path)
+
+
+def test_a_bad_archive_is_refused(tmp_path: Path) -> None:
+    path, rng = tmp_path / "a.zip", np.random.default_rng(0)
+    with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+        archive.writestr("a.bvh", write(tmp_path, "BVH").read_bytes())
+    whole = path.read_bytes()
+    for _ in range(200):
+        data = bytearray(whole)
+        for at in rng.integers(0, len(data), 4):
+            data[at] = rng.integers(256)
+        path.write_bytes(data[: rng.integers(len(data) // 2, len(data) + 1)])
+        with suppress(RecordingError):
+            open_recording(path)
+    with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+        archive.writestr("a.bvh", bytes(30_000_000))
+    with pytest.raises(RecordingError, match="expands to more than"):
+        open_recording(path)
 
 
 @pytest.mark.parametrize(

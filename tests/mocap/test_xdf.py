@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,12 @@ import pytest
 import pyxdf
 from mocap_writers import person, write_xdf
 
+from mplearn.body import marker_set
 from mplearn.errors import RecordingError, RecordingWarning
-from mplearn.mocap import open_recording
+from mplearn.mocap import Hints, open_recording, open_recordings
+
+UPPER = tuple(f"up{k}" for k in range(8))
+LOWER = tuple(f"low{k}" for k in range(5))
 
 
 @pytest.mark.parametrize("typed", [True, False])
@@ -106,3 +111,86 @@ def test_without_markers(tmp_path: Path) -> None:
         other.write_bytes(broken)
         with pytest.raises(RecordingError, match=r"b\.xdf.*expected"):
             open_recording(other)
+
+
+def _beside(path: Path, other: Path, number: int) -> Path:
+    """Put the stream of another file into a file, under another number."""
+    path.write_bytes(path.read_bytes() + _renumbered(other.read_bytes(), number))
+    return path
+
+
+def _renumbered(data: bytes, number: int) -> bytes:
+    """Return the chunks of stream 7, as that of another number, without the file's header."""
+    out, at = b"", 4
+    while at < len(data):
+        width = data[at]
+        length = int.from_bytes(data[at + 1 : at + 1 + width], "little")
+        start, end = at + 1 + width, at + 1 + width + length
+        chunk = data[start:end]
+        if chunk[2:6] == struct.pack("<I", 7):
+            out += data[at:start] + chunk[:2] + struct.pack("<I", number) + chunk[6:]
+        at = end
+    return out
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.013, -0.6, 1.7])
+def test_two_streams_of_one_body_are_joined_by_their_stamps(tmp_path: Path, late_s: float) -> None:
+    """The second has its own clock of frames, in millimetres, and jitters."""
+    t = np.arange(400)[:, None, None] / 100.0
+    places = person(1, 8)[:, :, None][0].swapaxes(0, 1)
+
+    def at(times: np.ndarray) -> np.ndarray:
+        return places + 0.1 * np.sin(2.0 * times + np.arange(3))
+
+    rng = np.random.default_rng(1)
+    upper = write_xdf(tmp_path / "a.xdf", at(t), names=UPPER, times=100.0 + t[:, 0, 0])
+    stamps = 100.0 + late_s + t[:, 0, 0]
+    lower = write_xdf(
+        tmp_path / "b.xdf", 1000.0 * at(t + late_s)[:, :5], names=LOWER, stream="legs",
+        units="millimeters", times=stamps + rng.normal(0.0, 5e-4, 400),
+    )  # fmt: skip
+    recording = open_recording(_beside(upper, lower, 9), hints=Hints(unit_m=1.0, up_axis="z"))
+    assert recording.marker_names == UPPER + LOWER
+    assert recording.markers[:, :8] == pytest.approx(at(t), abs=1e-6)
+    own = recording.markers[:, 8:]
+    seen = ~np.isnan(own).any(axis=(1, 2))
+    inside = (t[:, 0, 0] > late_s + 0.02) & (t[:, 0, 0] < late_s + 3.97)
+    assert seen[inside].all() and not seen[~inside][5:-5].any()
+    assert own[inside] == pytest.approx(at(t)[inside, :5], abs=2e-4)
+
+
+def test_streams_of_several_people_are_people(tmp_path: Path) -> None:
+    names = marker_set("plug_in_gait39").names
+    people = [person(100, len(names)), person(100, len(names)) + np.array([1.0, 0.5, 0.0])]
+    paths = [
+        write_xdf(tmp_path / f"{who}.xdf", points, names=names, stream=who)
+        for who, points in zip(("Anna", "Ben"), people, strict=True)
+    ]
+    found = open_recordings(_beside(*paths, 9), hints=Hints(unit_m=1.0, up_axis="z"))
+    assert [each.person for each in found] == ["Anna", "Ben"]
+    for each, points in zip(found, people, strict=True):
+        assert each.markers == pytest.approx(points, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("stream", "rate_hz", "start_s", "moved", "says"),
+    [
+        ("filtered", 100.0, 100.0, 0.002, "what another one does"),
+        ("later", 100.0, 500.0, 1.0, "at another time, or rate: 'later'"),
+        ("slow", 25.0, 100.0, 1.0, "at another time, or rate: 'slow'"),
+    ],
+)
+def test_other_streams_are_told(
+    tmp_path: Path, stream: str, rate_hz: float, start_s: float, moved: float, says: str
+) -> None:
+    points = person(100, 12)
+    path = write_xdf(tmp_path / "a.xdf", points)
+    times = start_s + np.arange(100) / rate_hz
+    other = write_xdf(
+        tmp_path / "b.xdf", points + moved, rate_hz=rate_hz, times=times, stream=stream
+    )
+    with pytest.warns(RecordingWarning, match=says):
+        recording = open_recording(_beside(path, other, 9), hints=Hints(unit_m=1.0, up_axis="z"))
+    assert recording.markers == pytest.approx(points, abs=1e-6)
+    assert recording.report is not None
+    assert f"stream {stream!r}" in recording.report.left_out

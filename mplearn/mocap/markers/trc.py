@@ -97,7 +97,8 @@ class _Header:
     def compare(self, path: Path, name: str, count: int, what: str, findings: Findings) -> None:
         """Warn where a count in the header is another than what is there."""
         said = self.values.get(name.lower(), "")
-        if said.isascii() and said.isdecimal() and said.lstrip("0") == str(count):
+        whole = re.fullmatch(r"0*(\d+)(?:\.0*)?", said, re.ASCII)  # or as a float
+        if whole and whole[1] == str(count):
             return
         findings.warn(f"{name} is {said[:20] or 'missing'}, but {count} {what} are there and read")
 

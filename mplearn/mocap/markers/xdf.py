@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 
+from ...errors import RecordingError
 from ...recording import BoolArray, FloatArray, IntArray, Recording
 from ..files import bad_file, read_bytes
 from ..findings import Findings
 from ..numbers import without_unseen
 from ..options import option
 from ..placing.placed_markers import placed_markers
-from ..placing.size import named_unit
+from ..placing.size import named_unit, spread_of
 from ..placing.space import Space
 from ..reader import Hints, Reader
 from .columns import meaning_of
@@ -28,11 +31,19 @@ _BREAK_S = 1.0  # a stream stands still for longer: frames are missing there
 _BREAK_FRAMES = 500
 _LOST, _AROUND = 1.5, 50  # how many frames late stamps are, at least; for how many, as before
 _JITTERS = 3.0  # how many times the usual jitter they are later than that, at least
+_SAME_RATE = 0.02  # by which rates of streams of one body may differ
+_TOGETHER = 0.5  # of the time of the first stream, which others that go with it must cover
+_COPIED = 0.05  # of a body's size: nobody stands so near to somebody else
+_SHARED = 0.3  # of the markers of a stream: where others have as many of them, it is another person
 _OFF = 0.1  # by which the usual step is off a nominal rate that is right
 
 
 class XDFReader(Reader):
-    """Reads the stream of markers of an XDF file; the one with most of them, if there are several.
+    """Reads the streams of markers of an XDF file.
+
+    Streams of other markers at about the same rate are one body's, by their time stamps; of streams
+    with the same markers each is a person's (`each_person`). The one with most markers counts as
+    the first; what was recorded at another time, or rate, is left out.
 
     Time stamps jitter as the network does: frames are taken as even, as pyxdf takes them, with a
     gap where the stream stands still for a second and 500 frames, and where frames were lost:
@@ -56,23 +67,135 @@ class XDFReader(Reader):
                 f"no markers in {len(streams)} streams of numbers",
                 "a stream of motion capture, with channels x, y, z for each marker",
             )
-        markers, stream = found[0]
-        findings.leave_out(f"stream {s.name!r}" for s in streams if s is not stream)
-        if len(found) > 1:
-            findings.warn(f"{len(found)} streams hold markers; {stream.name!r} is read")
-        columns = [i for axes in markers.values() for i in axes]
-        values = stream.values(columns)
-        stream.raw.clear()
-        values[~np.isfinite(values)] = np.nan
-        rate_hz, values = _even(path, stream, values, hints, findings)
-        points = values.reshape(len(values), -1, 3)
-        points = without_unseen(points)
+        first = _seen(path, *found[0], hints, findings)
+        others = []
+        for markers, stream in found[1:]:
+            try:
+                others.append(_seen(path, markers, stream, hints, findings))
+            except RecordingError as error:
+                findings.warn(f"stream {stream.name!r} is left out: {error}")
+        read = _joined(first, others, findings)
+        findings.leave_out(
+            f"stream {s.name!r}" for s in streams if all(s is not each.stream for each in read)
+        )
+        points = np.concatenate([each.on(first) for each in read], axis=1)
+        called = _told_apart(read)
         seen = (~np.isnan(points).any(axis=2)).sum(axis=0)
-        kept, names = chosen_names(path, list(markers), seen, findings)
-        unit = described_unit(stream.info, stream.n_channels, columns)
-        space = Space(unit or 1.0, says_unit=unit is not None)
+        kept, names = chosen_names(path, called, seen, findings)
+        space = Space(first.unit_m or 1.0, says_unit=first.unit_m is not None)
         points = points if len(kept) == points.shape[1] else points[:, kept]
-        return placed_markers(path, points, names, rate_hz, space, hints, findings)
+        return placed_markers(path, points, names, first.rate_hz, space, hints, findings)
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """Markers of a stream, at an even rate.
+
+    Attributes:
+        stream: The stream.
+        names: Names of its M markers.
+        points: Where they are, shape (T, M, 3), in the stream's unit; NaN where missing.
+        rate_hz: Frames per second [1/s].
+        start_s: Time of the first frame, by the clock that all streams of a file share [s].
+        unit_m: The unit that the stream says [m]; None for none.
+    """
+
+    stream: Stream
+    names: list[str]
+    points: FloatArray
+    rate_hz: float
+    start_s: float
+    unit_m: float | None
+
+    @property
+    def end_s(self) -> float:
+        """Time of the last frame [s]."""
+        return self.start_s + (len(self.points) - 1) / self.rate_hz
+
+    def on(self, first: _Seen) -> FloatArray:
+        """Return its points at another's frames, and in its unit; interpolated linearly."""
+        if self is first:
+            return self.points
+        begin = (first.start_s - self.start_s) * self.rate_hz
+        at = begin + np.arange(len(first.points)) * (self.rate_hz / first.rate_hz)
+        before = np.clip(np.floor(at).astype(np.int64), 0, max(len(self.points) - 2, 0))
+        after = np.minimum(before + 1, len(self.points) - 1)
+        share = (at - before)[:, None, None]
+        moved: FloatArray = (1.0 - share) * self.points[before] + share * self.points[after]
+        moved[(at < -0.5) | (at > len(self.points) - 0.5)] = np.nan
+        moved *= (self.unit_m or 1.0) / (first.unit_m or 1.0)
+        return moved
+
+
+def _seen(
+    path: Path,
+    markers: dict[str, tuple[int, int, int]],
+    stream: Stream,
+    hints: Hints,
+    findings: Findings,
+) -> _Seen:
+    """Return the markers of a stream, at an even rate; the stream's values are let go."""
+    columns = [i for axes in markers.values() for i in axes]
+    values = stream.values(columns)
+    stream.raw.clear()
+    values[~np.isfinite(values)] = np.nan
+    rate_hz, values = _even(path, stream, values, hints, findings)
+    points = without_unseen(values.reshape(len(values), -1, 3))
+    unit_m = described_unit(stream.info, stream.n_channels, columns)
+    return _Seen(stream, list(markers), points, rate_hz, _start(stream, rate_hz), unit_m)
+
+
+def _start(stream: Stream, rate_hz: float) -> float:
+    """Return when the first frame of a stream was, by all of its first second: stamps jitter."""
+    times = np.array(stream.times[: max(1, round(rate_hz))])
+    return float(np.median(times - np.arange(len(times)) / rate_hz))
+
+
+def _joined(first: _Seen, others: Sequence[_Seen], findings: Findings) -> list[_Seen]:
+    """Return the streams that go with the first one, itself before them, and tell the others."""
+    read, away = [first], []
+    for each in others:
+        same_rate = abs(each.rate_hz / first.rate_hz - 1.0) < _SAME_RATE
+        together_s = min(each.end_s, first.end_s) - max(each.start_s, first.start_s)
+        whole_s = first.end_s - first.start_s
+        if not same_rate or together_s <= _TOGETHER * whole_s:
+            away.append(each)
+        elif any(_is_copy(each, other) for other in read):
+            findings.warn(f"stream {each.stream.name!r} holds what another one does: left out")
+        else:
+            read.append(each)
+    if len(read) > 1:
+        listed = ", ".join(repr(each.stream.name) for each in read)
+        findings.note(f"{len(read)} streams of markers, joined by their time stamps: {listed}")
+    if away:
+        listed = ", ".join(repr(each.stream.name) for each in away)
+        findings.warn(f"other streams hold markers at another time, or rate: {listed}")
+    return read
+
+
+def _is_copy(one: _Seen, other: _Seen) -> bool:
+    """Say whether two streams hold the same markers in the same places, as filtered ones do."""
+    shared = [name for name in one.names if name in other.names]
+    if 2 * len(shared) < len(one.names):
+        return False
+    here = one.on(other)[:, [one.names.index(name) for name in shared]]
+    there = other.points[:, [other.names.index(name) for name in shared]]
+    apart = np.linalg.norm(here - there, axis=2)
+    size = spread_of(there)
+    return bool(np.isfinite(apart).any() and np.nanmedian(apart) < _COPIED * size)
+
+
+def _told_apart(read: Sequence[_Seen]) -> list[str]:
+    """Return the names of all markers, after their streams where several have the same ones."""
+    once = Counter(name.lower() for each in read for name in set(each.names))
+    shared = sum(number - 1 for number in once.values())
+    if shared <= _SHARED * min(len(each.names) for each in read):
+        return [name for each in read for name in each.names]
+    streams = [each.stream.name or f"stream {k}" for k, each in enumerate(read)]
+    if len(set(streams)) < len(streams):
+        streams = [f"{stream} {k}" for k, stream in enumerate(streams)]
+    pairs = zip(streams, read, strict=True)
+    return [f"{stream.replace(':', ' ')}:{name}" for stream, each in pairs for name in each.names]
 
 
 def described_markers(

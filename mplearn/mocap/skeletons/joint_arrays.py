@@ -42,6 +42,7 @@ def _chain(side: str, *joints: str) -> str:
 
 _ARM, _LEG = ("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")
 _HAND = ("clavicle", *_ARM, "hand", "handtip", "thumb")
+_ARM_OF_XSENS = ("collar", *_ARM)
 _COCO = f"{_FACE} {_both(*_ARM, *_LEG)}"
 _OPENPOSE_BODY = f"nose neck {_chain('right', *_ARM)} {_chain('left', *_ARM)}"
 _UP = ("ankle", "knee", "hip")
@@ -117,6 +118,11 @@ LAYOUTS = {
         f"{_chain('right', *_UP)} {_chain('left', *_LEG)} {_chain('right', *_ARM[::-1])} "
         f"{_chain('left', *_ARM)} thorax head"
     ),
+    "Xsens": (
+        f"pelvis {_NO} {_NO} {_NO} spine neck head {_chain('right', *_ARM_OF_XSENS)} "
+        f"{_chain('left', *_ARM_OF_XSENS)} {_chain('right', *_LEG, 'toe')} "
+        f"{_chain('left', *_LEG, 'toe')}"
+    ),
     "CrowdPose": f"{_both(*_ARM, *_LEG)} head thorax",
 }
 """Joints of a body by layout, in order; those called ``-`` are left out."""
@@ -130,6 +136,7 @@ _BY_NUMBER = {
     20: ("first Kinect",),
     21: ("KIT-ML",),
     22: ("SMPL", "LAFAN1"),
+    23: ("COCO-WholeBody", "Xsens"),
     25: ("OpenPose", "Kinect"),
     26: ("Halpe",),
     28: ("MPI-INF-3DHP",),
@@ -183,7 +190,7 @@ class JointArrayReader(Reader):
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read the joints; see `Reader.read`."""
         findings = Findings(self.format)
-        said_hz = None
+        archive = None
         if suffix(path) == ".npy":
             points = finite(path, "the array", read_npy(path))
         else:
@@ -191,7 +198,7 @@ class JointArrayReader(Reader):
             name = _name_of_joints(archive)
             if name is None:
                 raise bad_file(path, f"arrays {', '.join(archive.names[:8])}", "one of joints")
-            points, said_hz = archive.numbers(name), archive.rate_hz()
+            points = archive.numbers(name)
         usual_hz = None
         if not points.size:
             raise bad_file(path, "0 frames", "at least one")
@@ -200,6 +207,7 @@ class JointArrayReader(Reader):
             findings.note(f"{points.shape[1]} features of motion, at {usual_hz:g} Hz as is usual")
             points = joints_of_features(path, points)
         people = _as_people(path, points)
+        said_hz = None if archive is None else archive.rate_hz(len(people[0]))
         rate_hz = hints.rate_hz or said_hz or rate_beside(path, findings) or usual_hz
         if rate_hz is None:
             raise bad_file(path, "no rate", f"one in its name, or {option('rate_hz')}")

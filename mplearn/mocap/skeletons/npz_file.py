@@ -25,6 +25,11 @@ RATES = (
 )
 """Names of arrays that say the rate [1/s]."""
 
+LENGTHS = ("mocap_time_length", "time_length", "duration", "duration_s")
+"""Names of arrays that say how long the take is [s]."""
+
+_USUAL_HZ = (24, 25, 29.97, 30, 50, 59.94, 60, 90, 100, 119.88, 120, 125, 150, 200, 240, 250, 300)
+_ROUNDED = 3e-4  # of a length that is said
 _EXPECTED = "plain arrays of NumPy (.npy, or .npz)"
 _MOST_PACKED = 60  # times; measured numbers pack to a half or so
 _SMALL_BYTES = 4_000_000
@@ -66,23 +71,36 @@ class Arrays(ABC):
         """
         return finite(self.path, name, self.read(name))
 
-    def rate_hz(self) -> float | None:
+    def rate_hz(self, n_frames: int) -> float | None:
         """Return the rate that an array says [1/s]; None where there is none of its names.
 
+        Where only the length of the take is said it is that of so many frames in it: a usual rate,
+        if there is one between counting to the last frame and to the end of it.
+
         Raises:
-            RecordingError: It is no rate.
+            RecordingError: It is no rate, or no length.
         """
         name = self.first_of(RATES)
-        if name is None:
+        if name is not None:
+            return self._positive(name, "frames a second")
+        name = self.first_of(LENGTHS)
+        if name is None or n_frames < 2:
             return None
+        length_s = self._positive(name, "seconds")
+        low, high = (n_frames - 1) / length_s, n_frames / length_s
+        usual = [hz for hz in _USUAL_HZ if low * (1 - _ROUNDED) <= hz <= high * (1 + _ROUNDED)]
+        return max(usual, default=high)
+
+    def _positive(self, name: str, expected: str) -> float:
+        """Return the number that an array holds."""
         value = self.read(name)
         try:
-            rate_hz = float(value.item())  # or as text
+            number = float(value.item())  # or as text
         except (ValueError, TypeError):
-            rate_hz = np.nan
-        if not 0 < rate_hz < 1e6:
-            raise bad_file(self.path, f"{name} is {value.tolist()}"[:80], "frames a second")
-        return rate_hz
+            number = np.nan
+        if not 0 < number < 1e6:
+            raise bad_file(self.path, f"{name} is {value.tolist()}"[:80], expected)
+        return number
 
 
 class HeldArrays(Arrays):

@@ -102,7 +102,7 @@ class SMPLReader(Reader):
         whole = suffix(path) == ".npy"
         archive = _motion_x(path) if whole else NPZFile(path)
         vectors = _vectors(archive, findings)
-        rate_hz = hints.rate_hz or archive.rate_hz() or rate_beside(path, findings)
+        rate_hz = hints.rate_hz or archive.rate_hz(len(vectors)) or rate_beside(path, findings)
         if rate_hz is None and whole:
             rate_hz = _MOTION_X_HZ
             findings.note(f"{rate_hz:g} Hz, as is usual in Motion-X")
