@@ -250,6 +250,15 @@ def test_texts_are_wrapped_between_words_before_a_table_is_turned(width, library
         assert all(found[0][k] for k in (0, 2, 3)) and len(found) <= 3
 
 
+def test_a_library_that_resets_colours_at_the_end_prints_nothing(capsys):
+    """Numba's colorama writes to the stream that was there when it was imported."""
+    with inert_output():
+        stream = sys.stdout
+    stream.write("\x1b[0m")
+    stream.write("a name\x1b[0m\n")
+    assert capsys.readouterr().out == "a name\\x1b[0m\n"
+
+
 @pytest.mark.parametrize("columns", ["60", "80"])
 def test_exit_codes_in_help_fit_the_terminal(columns, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", columns)

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
 
+_RESET = "\x1b[0m"
 _UNUSUAL = re.compile(r"[^ -~]")
 
 
@@ -43,6 +44,8 @@ class InertStream:
 
     def write(self, text: str) -> int:
         """Write a text, spelling out what is not printable."""
+        if text == _RESET:  # colorama's, when Python ends: nothing was coloured through this
+            return len(text)
         stream = self.rich_proxied_file
         encoding = stream.encoding or "utf-8"
         plain = printable(text, "\n").encode(encoding, "backslashreplace").decode(encoding)
