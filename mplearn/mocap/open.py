@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import RecordingError, RecordingWarning
 from ..recording import ReadReport, Recording
 from .files import bad_file, is_file, is_folder, stem
+from .folders import folders_in, no_files
 from .keypoints.tables import DeepLabCutReader, KeyPointsReader, SLEAPReader
 from .labels import labels_beside
 from .markers.c3d import C3DReader
@@ -199,8 +200,10 @@ def open_takes(
         [('quick', 50.0), ('slow', 50.0)]
     """
     found: list[Recording] = []
-    unreadable: dict[str, RecordingError] = {}
     takes = _takes(Path(path))
+    unreadable = no_files(Path(path)) if is_folder(Path(path)) else {}
+    if strict and unreadable:
+        raise next(iter(unreadable.values()))
     for name, take in takes.items():
         try:
             found.extend(each_person(_read(take, rate_hz, positions, hints)))
@@ -301,19 +304,20 @@ def find_takes(path: str | os.PathLike[str]) -> FoundTakes:
         [('anna/slow', 'anna'), ('ben/slow', 'ben')]
     """
     path = Path(path)
-    folders = [path]
-    if is_folder(path):
-        folders += sorted(Path(at) / each for at, inside, _ in os.walk(path) for each in inside)
+    folders, closed = folders_in(path) if is_folder(path) else ((path,), {})
     found: list[TakeFiles] = []
-    unreadable: dict[str, RecordingError] = {}
+    unreadable = {_named(path, folder): error for folder, error in closed.items()}
     for folder in folders:
         parts = folder.relative_to(path).parts
         try:
+            if is_folder(folder):
+                problems = no_files(folder)
+                unreadable |= {"/".join((*parts, name)): e for name, e in problems.items()}
             takes = _takes(folder)
         except NothingReadableError:
             continue
         except RecordingError as error:
-            unreadable["/".join(parts) or str(path)] = error
+            unreadable[_named(path, folder)] = error
             continue
         for name, take in takes.items():
             person = take.person or (parts[0] if parts else "")
@@ -321,6 +325,11 @@ def find_takes(path: str | os.PathLike[str]) -> FoundTakes:
     if not found:
         raise next(iter(unreadable.values()), _nothing_readable(path))
     return FoundTakes(tuple(sorted(found, key=lambda take: take.name)), unreadable)
+
+
+def _named(path: Path, folder: Path) -> str:
+    """Return what a folder in a path is called."""
+    return "/".join(folder.relative_to(path).parts) or str(path)
 
 
 def _nothing_readable(path: Path) -> RecordingError:
@@ -337,8 +346,12 @@ def _takes(path: Path) -> dict[str, TakeFiles]:
     if not is_folder(path):
         raise bad_file(path, "no such file or folder", "a recording or a folder of recordings")
     files: dict[Reader, list[Path]] = {}
-    for file in sorted(path.iterdir()):
-        fitting = reader_of(file)
+    try:
+        within = sorted(path.iterdir())
+    except OSError as error:
+        raise bad_file(path, f"{error.strerror}", "a folder that may be read") from error
+    for file in within:
+        fitting = reader_of(file) if os.access(file, os.R_OK) else None
         if fitting is not None:
             files.setdefault(fitting, []).append(file)
     found = [

@@ -1,0 +1,96 @@
+"""Folders of recordings: which there are, each once, and what in them is no file to be read."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+from ..errors import RecordingError
+from .files import bad_file, is_file, is_folder, suffix
+from .registry import suffixes
+
+
+class FoundFolders(NamedTuple):
+    """A folder, and all folders in it.
+
+    Attributes:
+        folders: In order, each under one name.
+        closed: Why not, for those that cannot be looked into.
+    """
+
+    folders: tuple[Path, ...]
+    closed: dict[Path, RecordingError]
+
+
+def folders_in(path: Path) -> FoundFolders:
+    """Find a folder and all in it, those that links lead to, too.
+
+    To where several ways lead it is found once: where it lies, or else through the first link, by
+    name; so links that lead back to a folder above are no loops, and nothing is learned twice.
+
+    Example:
+        >>> for name in ("walks/anna", "walks/ben"):
+        ...     Path(name).mkdir(parents=True, exist_ok=True)
+        >>> [folder.as_posix() for folder in folders_in(Path("walks")).folders]
+        ['walks', 'walks/anna', 'walks/ben']
+    """
+    found: list[Path] = []
+    closed: dict[Path, RecordingError] = {}
+    seen: set[tuple[int, int]] = set()
+
+    def refuse(error: OSError) -> None:
+        folder = Path(error.filename)
+        closed[folder] = bad_file(folder, f"{error.strerror}", "a folder that may be read")
+
+    starts = [path]
+    while starts:
+        links: list[Path] = []
+        for start in sorted(starts):
+            for at, inside, _ in os.walk(start, onerror=refuse):
+                known = Path(at).stat()
+                if (known.st_dev, known.st_ino) in seen:
+                    inside.clear()
+                    continue
+                seen.add((known.st_dev, known.st_ino))
+                found.append(Path(at))
+                linked = [name for name in inside if Path(at, name).is_symlink()]
+                links += [Path(at, name) for name in linked]
+                inside[:] = [name for name in inside if name not in linked]
+        starts = links
+    return FoundFolders(tuple(sorted(found)), closed)
+
+
+def no_files(folder: Path) -> dict[str, RecordingError]:
+    """Return why not, by name, for what a folder holds that is called as recordings are.
+
+    Links that lead nowhere, pipes and devices, and files that may not be read.
+
+    Example:
+        >>> import os
+        >>> Path("linked").mkdir(exist_ok=True)
+        >>> Path("linked", "walk.csv").unlink(missing_ok=True)
+        >>> os.symlink("elsewhere.csv", Path("linked", "walk.csv"))
+        >>> print(no_files(Path("linked"))["walk.csv"])
+        linked/walk.csv: a link to elsewhere.csv, where nothing is; expected a recording
+    """
+    found = {}
+    for each in sorted(folder.iterdir()):
+        if suffix(each) in suffixes():
+            problem = _problem(each)
+        else:  # what a name without a suffix links to may be a folder
+            problem = "" if suffix(each) or not each.is_symlink() else _problem(each)
+        if problem:
+            found[each.name] = bad_file(each, problem, "a recording")
+    return found
+
+
+def _problem(path: Path) -> str:
+    """Return why a path cannot be read; empty where it can, or is a folder."""
+    if is_folder(path):
+        return ""
+    if is_file(path):
+        return "" if os.access(path, os.R_OK) else "a file that may not be read"
+    if path.is_symlink():
+        return f"a link to {path.readlink()}, where nothing is"
+    return "a pipe or a device"
