@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -23,6 +24,9 @@ _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NU
 class Executor(Protocol):
     """Does work that needs nothing but its arguments, in any order.
 
+    One that loses all that it was given where a worker dies has an attribute ``jobs``, how much it
+    does at once: it is not given more than that.
+
     Example:
         >>> from mplearn.corpus import Here
         >>> executor: Executor = Here()
@@ -35,6 +39,16 @@ class Executor(Protocol):
 
     def close(self) -> None:
         """Let the workers go."""
+
+
+def room(executor: Executor) -> int:
+    """Return how much an executor is given at once, so that what waits outlives its workers.
+
+    Example:
+        >>> room(Processes(jobs=2)), room(Here()) > 1000
+        (2, True)
+    """
+    return int(getattr(executor, "jobs", sys.maxsize))
 
 
 class Here:
@@ -64,8 +78,8 @@ class Here:
 class Processes:
     """Does the work in processes of this machine, each started anew (spawn), of one thread.
 
-    A process that dies takes what the others are doing with it; what is submitted after that is
-    done by new ones.
+    A process that dies takes all that was submitted with it; what is submitted after that is done
+    by new ones. So no more than they do at once should be (`room`).
 
     Args:
         jobs: How many.

@@ -26,7 +26,7 @@ from ..mocap import TakeFiles, find_takes
 from ..state import from_plain, to_plain
 from ..store import learner_of
 from .dealing import SHARD_TAKES, Shard, deal
-from .executors import Executor, Here, Processes
+from .executors import Executor, Here, Processes, room
 from .progress import Progress
 from .reading import Reading, probe
 from .shard import ShardJournal, ShardReport, ShardTask, learn_shard
@@ -352,7 +352,7 @@ class _Run:
         waiting = list(reversed(range(len(tasks))))
         while waiting or running:
             self._look_at_stop()
-            while waiting and not self._stop.is_set():
+            while waiting and len(running) < room(self._executor) and not self._stop.is_set():
                 k = waiting.pop()
                 future = self._executor.submit(work, *tasks[k])
                 running[future] = k

@@ -16,7 +16,7 @@ from ..library import PrimitiveLibrary
 from ..mocap import TakeFiles, find_takes
 from ..recording import are_markers
 from ..tables import RecognisedSegment, SegmentTable, recognise_recording
-from .executors import Executor, Here, Processes
+from .executors import Executor, Here, Processes, room
 from .reading import Reading
 from .shard import DEATHS
 
@@ -113,18 +113,25 @@ def _all(
     executor: Executor,
     show: Callable[[int, int], object],
 ) -> _Chunk:
-    """Have all takes recognised; those of a chunk that ended its worker one by one."""
+    """Have all takes recognised; those that were lost with a worker at last, with nothing beside.
+
+    Whoever works beside one that dies is lost with it: alone it is known who was the cause.
+    """
     waiting = [takes[k : k + _CHUNK] for k in range(0, len(takes), _CHUNK)][::-1]
+    lost: list[Sequence[TakeFiles]] = []
     running: dict[Future[_Chunk], Sequence[TakeFiles]] = {}
     tries: Counter[str] = Counter()
     whole = _Chunk({}, {})
-    while waiting or running:
-        while waiting:
+    while waiting or running or lost:
+        while waiting and len(running) < room(executor):
             chunk = waiting.pop()
             future = executor.submit(recognise_takes, library, chunk, reading)
             running[future] = chunk
             if future.done():
                 break
+        if not running:
+            chunk = lost.pop()
+            running[executor.submit(recognise_takes, library, chunk, reading)] = chunk
         for future in wait(running, return_when=FIRST_COMPLETED).done:
             chunk = running.pop(future)
             error = future.exception()
@@ -139,7 +146,7 @@ def _all(
                 name = chunk[0].name
                 tries[name] += 1
                 if tries[name] < DEATHS:
-                    waiting.append(chunk)
+                    lost.append(chunk)
                 else:
                     why = f"{type(error).__name__}: {error}"
                     whole.refused[name] = f"recognising it was tried {DEATHS} times: {why}"

@@ -4,8 +4,9 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from frail_workers import Frail
 
-from mplearn.corpus import RayTasks, learn_corpus, recognise_corpus
+from mplearn.corpus import RayTasks, learn_corpus, recognise_corpus, recognising
 from mplearn.library import PrimitiveLibrary
 from mplearn.store import StoreReader
 from mplearn.tables import read_segments
@@ -67,6 +68,23 @@ def test_a_folder_is_recognised_by_processes_as_by_one(
     assert [row.take for row in read_segments(tmp_path / "d.csv")].count("d") > 0
     known = [row for row in alone.table if row.primitive is not None]
     assert len(known) > 0.7 * len(alone.table)
+
+
+@pytest.mark.parametrize("fatal", ["", "ben/a"])
+def test_what_is_recognised_beside_a_worker_that_dies_is_not_lost(
+    fatal: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    learn_corpus(folder, tmp_path / "s", jobs=0).learner.snapshot().save(tmp_path / "a.mplearn")
+    alone = recognise_corpus(tmp_path / "a.mplearn", folder, jobs=0)
+    monkeypatch.setattr(recognising, "_CHUNK", 2)
+    frail = Frail(jobs=2, fatal=fatal and f"/{fatal}.csv")
+    found = recognise_corpus(tmp_path / "a.mplearn", folder, executor=frail)
+    frail.close()
+    assert frail.most == 2
+    assert frail.deaths >= 3
+    assert sorted(found.refused) == sorted({"ben/broken", fatal} - {""})
+    assert list(found.table) == [row for row in alone.table if row.take != fatal]
+    assert all("2 times" in why for take, why in found.refused.items() if take == fatal)
 
 
 def test_a_cluster_needs_ray(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

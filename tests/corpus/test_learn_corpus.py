@@ -18,6 +18,7 @@ from typing import Any
 import psutil
 import pytest
 from corpus_folder import write_take
+from frail_workers import Frail
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -381,6 +382,17 @@ def test_nothing_to_learn_is_said(tmp_path: Path) -> None:
         learn_corpus(tmp_path / "takes", tmp_path / "s", jobs=0)
     with pytest.raises(InvalidValueError, match="jobs"):
         learn_corpus(tmp_path / "takes", tmp_path / "s", jobs=-1)
+
+
+def test_workers_that_die_again_and_again_end_nothing(
+    folder: Path, alone: bytes, tmp_path: Path
+) -> None:
+    frail = Frail(jobs=2)
+    corpus = learn_corpus(folder, tmp_path / "s", executor=frail)
+    frail.close()
+    assert frail.most == 2
+    assert frail.deaths >= 3
+    assert saved(corpus, tmp_path) == alone
 
 
 def test_workers_that_die_at_once_end_it(folder: Path, tmp_path: Path) -> None:
