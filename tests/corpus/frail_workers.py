@@ -42,7 +42,10 @@ class Frail:
                 continue
             first, work, args = given[0]
             if not self._fatal or self._fatal not in str(args):
-                first.set_result(work(*args))
+                try:
+                    first.set_result(work(*args))
+                except Exception as error:  # of the work: the worker lives
+                    first.set_exception(error)
                 given = given[1:]
             self.deaths += bool(given)
             for future, _, _ in given:
