@@ -65,7 +65,7 @@ class ReceivedSource(Source):
         self._heard, self._heard_s = False, time.monotonic()
         self._read_s = self._heard_s  # when something was there to be read, were we not held up
         self._looked_s = self._heard_s
-        self._late = self._over = False
+        self._late = self._over = self._unnamed = False
         self._thread = threading.Thread(target=self._receive, name=name, daemon=True)
         self._thread.start()
 
@@ -109,6 +109,7 @@ class ReceivedSource(Source):
                     out += self._behind(now_s - item.arrived_s)
                 samples.append(item)
                 self._connected, self._heard, self._heard_s = True, True, item.arrived_s
+                self._unnamed = False
                 self._read_s = now_s
                 continue
             out += self._sequencer.take(samples, now_s)
@@ -126,6 +127,9 @@ class ReceivedSource(Source):
             self.tally.damaged += news.count
         elif news.kind == "names":  # frames came before it was said what they hold
             self.tally.unnamed += news.count
+            if self._unnamed:
+                return []  # said once, counted each
+            self._unnamed = True
         out: list[Block | Change] = []
         if news.kind == "disconnected":
             out += self._sequencer.finish()

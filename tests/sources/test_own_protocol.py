@@ -166,6 +166,21 @@ def test_a_line_that_cannot_be_read_costs_nothing_else(line: bytes) -> None:
     assert texts_of(items, "damaged") or texts_of(items, "names")
 
 
+def test_frames_before_their_header_are_said_once_and_counted() -> None:
+    header = b'{"mplearn": 1, "channels": ["a"], "rate_hz": 100}\n'
+    lines = [b'{"n": %d, "v": [5]}\n' % n for n in range(9)]
+    with open_source("udp:0") as source:
+        host, port = host_and_port(source.name[4:], 0)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+            for data in (*lines[:6], header, *lines[6:]):
+                out.sendto(data, (host, port))
+                time.sleep(0.005)
+        items = gather(source, lambda: None, 3)
+    assert len(frames_of(items)) == 3
+    assert source.tally.unnamed == 6
+    assert len(texts_of(items, "names")) == 1
+
+
 def test_a_sender_that_comes_back_goes_on(session: Recording) -> None:
     with open_source("ndjson:0") as source:
         items = []
