@@ -1,10 +1,10 @@
 """Where the cycles of rhythmic motion turn, found with look-ahead, and how cuts lie in them.
 
 The truth knows what no on-line segmenter may: the whole motion. Steps turn where one ankle is
-farthest ahead of the other, which is about where a foot strikes; other motion where its main
-oscillation, the first principal component of the posture, is at an extreme. Only what repeats
-counts: a bout ends where a half of a cycle lasts much longer, or leads much farther, than the one
-a cycle before.
+farthest ahead of the other, which is about where a foot strikes, if it was lifted past the other on
+its way; other motion where its main oscillation, the first principal component of the posture, is
+at an extreme. Only what repeats counts: a bout ends where a half of a cycle lasts much longer, or
+leads much farther, than the one a cycle before.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import butter, find_peaks, sosfiltfilt
 
-from ..recording import FloatArray, IntArray
+from ..recording import BoolArray, FloatArray, IntArray
 
 BAND_HZ = (0.2, 4.0)
 """Cycles are sought from a fifth to four in a second [1/s]."""
@@ -24,6 +24,7 @@ STEP_M = 0.1
 """Least prominence of an extreme of one ankle ahead of the other: half of a short step [m]."""
 
 LEVEL = 0.6  # of how far ahead: an ankle is no higher above the other where a step turns
+LIFT_M = 0.025  # of the ankle that comes ahead over the other, on its way, at the least [m]
 PROMINENCE = 0.35  # of the oscillation's usual height, for other motion
 LEAST_CYCLES = 1.5  # of a bout of labelled motion
 LEAST_STRIDES = 2.0  # of a bout of steps, which nobody says are steps
@@ -69,8 +70,9 @@ class CutScore:
 def find_steps(ahead: FloatArray, above: FloatArray, rate_hz: float) -> list[Bout]:
     """Return the bouts of walking and running.
 
-    Where a knee is raised, or a person jogs on the spot, an ankle rises about as far as it goes
-    ahead or back: these are no steps.
+    Where a knee is raised, a person kicks or jogs on the spot, an ankle rises about as far as it
+    goes ahead or back; where the trunk turns over feet that stand, none leaves the floor; in a
+    boxer's stance none passes the other: these are no steps.
 
     Args:
         ahead: How far the left ankle is ahead of the right one, shape (T,) [m].
@@ -80,11 +82,16 @@ def find_steps(ahead: FloatArray, above: FloatArray, rate_hz: float) -> list[Bou
     band = _band(ahead, rate_hz)
     if band is None:
         return []
-    return [
-        bout
-        for bout in _bouts("steps", band, STEP_M, LEAST_STRIDES, rate_hz)
-        if np.abs(above[bout.turns]).mean() <= LEVEL * np.abs(ahead[bout.turns]).mean()
-    ]
+    turns, heights = _turns(band, STEP_M)
+    level = np.abs(above[turns]) <= LEVEL * np.abs(ahead[turns])
+    steps = level[:-1] & level[1:] & (ahead[turns[:-1]] * ahead[turns[1:]] < 0)
+    for i in np.flatnonzero(steps):
+        start, end = turns[i : i + 2]
+        swings = (
+            np.sign(ahead[end]) * above[start:end]
+        )  # the ankle that comes ahead, over the other
+        steps[i] = swings.max() >= LIFT_M
+    return _bouts("steps", turns, heights, LEAST_STRIDES, rate_hz, steps)
 
 
 def find_oscillation(label: str, posture: FloatArray, rate_hz: float) -> list[Bout]:
@@ -100,7 +107,9 @@ def find_oscillation(label: str, posture: FloatArray, rate_hz: float) -> list[Bo
         return []
     main = band @ np.linalg.svd(band, full_matrices=False)[2][0]
     height = 2 * np.sqrt(2) * float(main.std())
-    return _bouts(label, main, PROMINENCE * height, LEAST_CYCLES, rate_hz) if height > 0 else []
+    if height <= 0:
+        return []
+    return _bouts(label, *_turns(main, PROMINENCE * height), LEAST_CYCLES, rate_hz)
 
 
 def shifted(bout: Bout, frames: int) -> Bout:
@@ -152,18 +161,26 @@ def _band(motion: FloatArray, rate_hz: float) -> FloatArray | None:
 
 
 def _bouts(
-    label: str, motion: FloatArray, prominence: float, least: float, rate_hz: float
+    label: str,
+    turns: IntArray,
+    heights: FloatArray,
+    least: float,
+    rate_hz: float,
+    counted: BoolArray | None = None,
 ) -> list[Bout]:
-    turns, heights = _turns(motion, prominence)
+    """Return the bouts of at least so many cycles among turns, n; halves that count, (n - 1,)."""
     lasts, leads = np.diff(turns), np.abs(np.diff(heights))
+    whole = lasts <= _LONGEST_S * rate_hz
+    if counted is not None:
+        whole &= counted
     found: list[Bout] = []
     start = 0
     for i in range(len(lasts) + 1):
-        if i < len(lasts) and lasts[i] <= _LONGEST_S * rate_hz and _repeats(lasts, leads, start, i):
+        if i < len(lasts) and whole[i] and _repeats(lasts, leads, start, i):
             continue
         if 0.5 * (i - start) >= least:
             found.append(Bout(label, turns[start : i + 1]))
-        start = i if i < len(lasts) and lasts[i] <= _LONGEST_S * rate_hz else i + 1
+        start = i if i < len(lasts) and whole[i] else i + 1
     return found
 
 

@@ -17,11 +17,17 @@ def swing(seconds, hz, amplitude=0.3):
     return amplitude * np.cos(2 * np.pi * hz * t)
 
 
+def lifted(ahead, height=0.08):
+    """The ankle that comes ahead is up on its way."""
+    speed = np.gradient(ahead)
+    return height * speed / np.abs(speed).max()
+
+
 @pytest.mark.parametrize("hz", [0.4, 0.9, 1.7])
 def test_steps_turn_where_a_cosine_does(hz):
     rng = np.random.default_rng(0)
     ahead = swing(20, hz) + rng.normal(0, 0.005, 1200) + 0.1
-    (bout,) = find_steps(ahead, 0 * ahead, RATE_HZ)
+    (bout,) = find_steps(ahead, lifted(swing(20, hz)), RATE_HZ)
     phase = 2 * hz * bout.turns / RATE_HZ  # turns lie at whole numbers
     inner = phase[1:-1]
     assert np.abs(inner - np.round(inner)).max() < 0.1
@@ -32,7 +38,8 @@ def test_steps_turn_where_a_cosine_does(hz):
 def test_only_what_repeats_is_a_bout():
     still = np.zeros(300)
     ahead = np.concatenate([still, swing(6, 1.0), still, swing(6, 0.5), still])
-    bouts = find_steps(ahead, 0 * ahead, RATE_HZ)
+    lift = np.concatenate([still, lifted(swing(6, 1.0)), still, lifted(swing(6, 0.5)), still])
+    bouts = find_steps(ahead, lift, RATE_HZ)
     assert len(bouts) == 2
     assert 290 <= bouts[0].turns[0] <= 320 and 640 <= bouts[0].turns[-1] <= 690
     assert find_steps(swing(10, 1.0, amplitude=0.02), np.zeros(600), RATE_HZ) == []
@@ -44,6 +51,23 @@ def test_raised_knees_are_no_steps():
     ahead = swing(10, 0.8)
     assert len(find_steps(ahead, 0.4 * ahead, RATE_HZ)) == 1  # running: the foot behind is up
     assert find_steps(ahead, 1.1 * ahead, RATE_HZ) == []
+
+
+def test_where_no_foot_leaves_the_floor_or_passes_the_other_are_no_steps():
+    ahead = swing(10, 0.8)
+    assert len(find_steps(ahead, lifted(ahead), RATE_HZ)) == 1
+    assert find_steps(ahead, lifted(ahead, height=0.01), RATE_HZ) == []  # the trunk turns
+    assert find_steps(ahead, -lifted(ahead), RATE_HZ) == []  # the ankle that stays goes up
+    assert find_steps(ahead + 0.5, lifted(ahead), RATE_HZ) == []  # a boxer's stance
+
+
+def test_a_kick_ends_a_bout_of_steps():
+    ahead = swing(12, 1.0)
+    above = lifted(ahead)
+    kick = slice(round(5.9 * RATE_HZ), round(6.1 * RATE_HZ))
+    above[kick] = 0.8
+    first, second = find_steps(ahead, above, RATE_HZ)
+    assert first.turns[-1] < kick.start and kick.stop <= second.turns[0]
 
 
 def test_the_main_oscillation_is_found_in_any_direction():

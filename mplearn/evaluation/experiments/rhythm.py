@@ -23,13 +23,13 @@ RATES_HZ = (60.0, 30.0)
 SHORTEST_S = 1.5  # of a labelled stretch in which cycles are sought
 NOTE = (
     "Truth is found with look-ahead. Steps turn where one ankle is farthest ahead of the other, "
-    "about where a foot strikes, wherever in a take that repeats, more forth than up, by at least "
-    "10 cm; labelled stretches without steps turn at the extremes of their main oscillation (first "
-    "principal component from 0.2 to 4 Hz). A bout holds at least 1.5 cycles that are alike, 2 of "
-    "steps. Cuts a cycle: all boundaries of the segmenter, those at a bout's ends count half; "
-    "wanted are 2, one at each turn. Spread of the phase: root mean square distance from the mean "
-    "phase of a half of the cycle. Missed: bouts with fewer than 0.8 cuts a cycle. Median over "
-    "bouts."
+    "about where a foot strikes, wherever in a take that repeats, by at least 10 cm, each lifted "
+    "past the other by at least 2.5 cm; labelled stretches without steps turn at the extremes of "
+    "their main oscillation (first principal component from 0.2 to 4 Hz). A bout holds at least "
+    "1.5 cycles that are alike, 2 of steps. Cuts a cycle: all boundaries of the segmenter, those "
+    "at a bout's ends count half; wanted are 2, one at each turn. Spread of the phase: root mean "
+    "square distance from the mean phase of a half of the cycle. Missed: bouts with fewer than 0.8 "
+    "cuts a cycle. Median over bouts."
 )
 
 
