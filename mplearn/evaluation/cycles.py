@@ -30,7 +30,7 @@ LEAST_CYCLES = 1.5  # of a bout of labelled motion
 LEAST_STRIDES = 2.0  # of a bout of steps, which nobody says are steps
 _LONGEST_S = 2.5  # half of a cycle
 _LONGER, _FARTHER = 1.7, 2.0  # than a cycle before, at most
-_EDGE_S = 0.1  # cuts this near to an end of a bout belong half to it
+_EDGE = 0.25  # of the half of a cycle at an end of a bout: cuts this near belong half to it
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +117,7 @@ def shifted(bout: Bout, frames: int) -> Bout:
     return Bout(bout.label, bout.turns + frames)
 
 
-def score_cuts(bout: Bout, cuts: Iterable[int], rate_hz: float) -> CutScore:
+def score_cuts(bout: Bout, cuts: Iterable[int]) -> CutScore:
     """Return how cuts lie in the cycles of a bout.
 
     A phase is linear between turns. The cuts are divided into halves of the cycle, so that cuts at
@@ -126,13 +126,12 @@ def score_cuts(bout: Bout, cuts: Iterable[int], rate_hz: float) -> CutScore:
     Args:
         bout: The bout.
         cuts: Frames of all boundaries of the take.
-        rate_hz: Frames per second [1/s].
     """
-    edge = _EDGE_S * rate_hz
     first, last = bout.turns[0], bout.turns[-1]
+    near_first, near_last = _EDGE * np.diff(bout.turns)[[0, -1]]
     found = np.asarray(sorted(cuts), dtype=np.float64)
-    found = found[(found >= first - edge) & (found <= last + edge)]
-    inner = int(((found > first + edge) & (found < last - edge)).sum())
+    found = found[(found >= first - near_first) & (found <= last + near_last)]
+    inner = int(((found > first + near_first) & (found < last - near_last)).sum())
     per_cycle = (inner + 0.5 * (len(found) - inner)) / bout.n_cycles
     if len(found) < 3:
         return CutScore(bout, per_cycle, float("nan"))

@@ -82,27 +82,27 @@ def test_the_main_oscillation_is_found_in_any_direction():
 def test_cuts_at_one_phase_have_no_spread(phase, halves, frames):
     bout = Bout("walk", np.arange(halves + 1) * frames * 10)
     at = [round((k + phase) * frames * 10) for k in range(halves)]
-    score = score_cuts(bout, at, rate_hz=1.0)
+    score = score_cuts(bout, at)
     assert score.spread == pytest.approx(0.0, abs=0.5 / frames)
     assert abs(score.per_cycle - 2.0) <= 2.0 / halves + 1e-9
 
 
 def test_cuts_by_hand():
     bout = Bout("walk", np.arange(9) * 50)  # four cycles
-    every_turn = score_cuts(bout, bout.turns, RATE_HZ)
+    every_turn = score_cuts(bout, bout.turns)
     assert every_turn.per_cycle == pytest.approx(2.0)
     assert every_turn.spread == pytest.approx(0.0)
-    once = score_cuts(bout, [30, 130, 230, 330, 900], RATE_HZ)
+    once = score_cuts(bout, [30, 130, 230, 330, 900])
     assert (once.per_cycle, once.spread) == (1.0, pytest.approx(0.0))
-    late = score_cuts(bout, [35, 125, 235, 325], RATE_HZ)  # 0.05 of a cycle off each way
+    late = score_cuts(bout, [35, 125, 235, 325])  # 0.05 of a cycle off each way
     assert late.spread == pytest.approx(0.05)
-    none = score_cuts(bout, [], RATE_HZ)
+    none = score_cuts(bout, [])
     assert none.per_cycle == 0.0 and none.spread != none.spread
 
 
 @given(st.lists(st.integers(0, 400), min_size=40, max_size=80, unique=True))
 def test_cuts_anywhere_are_spread(cuts):
-    score = score_cuts(Bout("walk", np.arange(9) * 50), cuts, RATE_HZ)
+    score = score_cuts(Bout("walk", np.arange(9) * 50), cuts)
     assert 0.0 <= score.spread <= 0.26  # uniform in a half of a cycle: 0.5 / sqrt(12) = 0.144
 
 

@@ -120,7 +120,7 @@ def segmenter_table(takes: Iterable[Recording]) -> Table:
             cuts = cut(seen, take.rate_hz)
             took_s += time.perf_counter() - begin
             n_cuts += len(cuts)
-            scores += [score_cuts(bout, cuts, take.rate_hz) for bout in bouts]
+            scores += [score_cuts(bout, cuts) for bout in bouts]
             changes += _changes(take, cuts)
         minutes = sum(take.duration_s for take, _, _ in motions) / 60
         spreads = [score.spread for score in scores if score.spread == score.spread]

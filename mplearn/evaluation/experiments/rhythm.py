@@ -27,9 +27,9 @@ NOTE = (
     "past the other by at least 2.5 cm; labelled stretches without steps turn at the extremes of "
     "their main oscillation (first principal component from 0.2 to 4 Hz). A bout holds at least "
     "1.5 cycles that are alike, 2 of steps. Cuts a cycle: all boundaries of the segmenter, those "
-    "at a bout's ends count half; wanted are 2, one at each turn. Spread of the phase: root mean "
-    "square distance from the mean phase of a half of the cycle. Missed: bouts with fewer than 0.8 "
-    "cuts a cycle. Median over bouts."
+    "within an eighth of a cycle of a bout's ends count half; wanted are 2, one at each turn. "
+    "Spread of the phase: root mean square distance from the mean phase of a half of the cycle. "
+    "Missed: bouts with fewer than 0.8 cuts a cycle. Median over bouts."
 )
 
 
@@ -122,7 +122,7 @@ def _scores(take: Recording) -> list[CutScore]:
     seen = view.see(features.frames)
     segmenter = make_segmenter("kohlmorgen-lemm", seen.shape[1], take.rate_hz)
     cuts = [segment.end for segment in segmenter.segment(seen)][:-1]
-    return [score_cuts(bout, cuts, take.rate_hz) for bout in bouts_of(take, seen, view.channels)]
+    return [score_cuts(bout, cuts) for bout in bouts_of(take, seen, view.channels)]
 
 
 def _cells(scores: Sequence[CutScore]) -> tuple[str, ...]:
