@@ -106,9 +106,10 @@ class TreeConfig:
             that it fits best; among ten that wait or are known, for among few this may be chance. 0
             for `pair_share` alone.
         sequence_extent: And below this share of how far each is from standing still.
-        ignore_fragments: Whether nothing becomes a primitive that is an execution of a sure one
-            together with the segment right before or after it: a motion that is cut in two where
-            someone hesitated is not two motions.
+        ignore_fragments: Whether nothing becomes a primitive that is, together with the segment
+            right before or after it, an execution of a sure one, or nearer by far to the only other
+            one that it is like: a motion that is cut in two where someone hesitated is not two
+            motions.
         confirmed: Members from which on a primitive is sure; with fewer it is provisional.
         patience: A provisional primitive that nothing has joined after so many further segments is
             forgotten; after four times as many as there are primitives, if that is more.

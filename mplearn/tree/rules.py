@@ -7,11 +7,13 @@ motion merged.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from itertools import permutations
 
 import numpy as np
 
 from ..recording import BoolArray, FloatArray, IntArray
+from .distance import Exemplar
 from .exemplars.normalisation import normalised
 from .exemplars.spread import moments
 from .nodes.clustering import (
@@ -32,6 +34,7 @@ _AMONG = 10  # what waits and what is known: among few anything is somebody's ne
 _BY_FAR = 1.2  # how many times as far the next is
 _PLAYED_BACK = 0.05  # over the scale: nobody hesitates again so exactly
 _SURELY = 1 - 1e-9  # whatever a mean is rounded to
+_NEARER = 0.8  # of how far a part is from a whole: what it is a part of, at the most
 _UNKNOWN = 3.0  # leaves that the scale of all motion counts for beside that of those
 
 
@@ -57,6 +60,10 @@ def form_primitives(structure: Structure, node: Node, when: int) -> Change:
             break
         places = [loose[i] for i in groups[0]]
         members = [node.members[i] for i in places]
+        fragments = _fragments(structure, node, members)
+        if fragments:
+            node.settled |= fragments
+            continue
         same = None if config.local else _leaf_of(structure, members, limit)
         if same is not None:
             change = change.then(structure.take_in(same, members))
@@ -180,17 +187,52 @@ def settle_fragments(structure: Structure, number: int, longest: int) -> None:
     root, memory, pair = structure.root, structure.memory, {number - 1, number}
     if pair.isdisjoint(root.members) or not pair <= memory.frames.keys():
         return
-    frames = np.concatenate([memory.frames[each] for each in sorted(pair)])
-    if len(frames) > longest:
+    if sum(map(structure.length_of, pair)) > longest:
         return
-    bank, form = memory.bank, structure.config.normalisation
-    whole = bank.model(normalised(frames, form), len(frames))
-    best = next(iter(structure.index.search(whole, bank)), None)
+    best = next(iter(structure.index.search(_joined(structure, pair), memory.bank)), None)
     if best is None or best.ratio > 1:
         return
     home = structure.nodes[best.node]
     if home.is_leaf and home.n_placed >= structure.config.confirmed:
         root.settled |= pair.intersection(root.members)
+
+
+def _fragments(structure: Structure, node: Node, members: Sequence[int]) -> set[int]:
+    """Return what waits and is only a part of what another segment is a whole execution of.
+
+    Together with what came right before or after it, it is nearer to that one by far. Two that are
+    alike are few to tell; where there are more, the others outvote a part, and what is played back
+    counts nevertheless.
+
+    Args:
+        structure: The tree.
+        node: Where they wait.
+        members: Numbers of the segments that are about to become a node.
+    """
+    found: set[int] = set()
+    if (
+        not structure.config.ignore_fragments
+        or node.id != ROOT
+        or len(members) != 2
+        or not node.settled.isdisjoint(members)
+    ):
+        return found
+    bank, frames = structure.memory.bank, structure.memory.frames
+    for number, other in permutations(members):
+        nearer = _NEARER * bank.distances(bank[number], [other])[0]
+        for pair in ({number - 1, number}, {number, number + 1}):
+            if other not in pair and pair <= frames.keys():
+                whole = _joined(structure, pair)
+                if bank.distances(whole, [other])[0] < nearer:
+                    found |= pair.intersection(node.members)
+    return found
+
+
+def _joined(structure: Structure, pair: Collection[int]) -> Exemplar:
+    """Return a model of two segments, one right after the other, as one."""
+    frames = np.concatenate([structure.memory.frames[number] for number in sorted(pair)])
+    seen = normalised(frames, structure.config.normalisation)
+    return structure.memory.bank.model(seen, len(frames))
 
 
 def _leaf_of(structure: Structure, members: Sequence[int], limit: float) -> Node | None:

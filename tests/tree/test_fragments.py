@@ -100,3 +100,38 @@ def test_what_is_a_part_is_told_on_by_state_and_merging() -> None:
     again.load_state(tree.state())
     assert again.node(0).settled == tree.node(0).settled
     assert waiting(merge_trees([tree, other]).tree) == set()
+
+
+def ramp(rng: np.random.Generator) -> FloatArray:
+    """A motion whose second part goes on as the whole does, only less far, shape (T, D)."""
+    there = 0.5 - 0.5 * np.cos(np.linspace(0, np.pi, T))
+    return there[:, None] * SHAPES[6, :, 0] + TIME @ rng.normal(0, 0.02, (D, 3)).T
+
+
+@pytest.mark.parametrize("at", [12, 14, 16, 18])
+def test_a_part_and_a_whole_are_no_two_executions(at: int) -> None:
+    born: dict[bool, list[set[int]]] = {True: [], False: []}
+    for config in (TreeConfig(), KEPT):
+        rng = np.random.default_rng(at)
+        tree = PrimitiveTree(config, D, RATE_HZ)
+        shown = [tree.insert(motion(kind, rng)) for kind in range(3)]
+        whole = ramp(rng)
+        shown += [tree.insert(whole[:at]), tree.insert(whole[at:], goes_on=True)]
+        for _ in range(2):
+            shown += [tree.insert(motion(kind, rng)) for kind in range(3, 6)]
+            shown.append(tree.insert(ramp(rng)))
+        for placement in shown:
+            moved = {number for number, node in placement.moved if node in placement.born}
+            born[config.ignore_fragments] += [moved | {placement.number}] * bool(placement.born)
+    assert {4, 8} in born[False]  # the second part and the first whole
+    assert {4, 8} not in born[True]
+    assert any({8, 12} <= each for each in born[True])  # the two wholes
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_motions_that_nobody_cuts_in_two_are_learned_as_if_nobody_ever_did(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    tree, kept = (PrimitiveTree(config, D, RATE_HZ) for config in (TreeConfig(), KEPT))
+    for kind in rng.integers(0, 6, 40):
+        frames = motion(int(kind), rng)
+        assert tree.insert(frames, goes_on=True) == kept.insert(frames, goes_on=True)
