@@ -35,7 +35,7 @@ from .registry import reader_for, reader_of, register_reader, suffixes
 from .resample import resample
 from .skeletons.amc import AMCReader
 from .skeletons.bvh import BVHReader
-from .skeletons.g1_csv import G1CSVReader
+from .skeletons.g1_csv import G1ArrayReader, G1CSVReader
 from .skeletons.joint_arrays import JointArrayReader
 from .skeletons.mvnx import MVNXReader
 from .skeletons.opensim import OpenSimReader
@@ -56,6 +56,7 @@ for _reader in (
     MVNXReader(),
     SMPLReader(),
     JointArrayReader(),
+    G1ArrayReader(),
     C3DReader(),
     TheiaReader(),
     XDFReader(),

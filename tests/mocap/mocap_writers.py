@@ -561,6 +561,11 @@ def write_g1_csv(
     return path
 
 
+def write_g1_array(path: Path, values: np.ndarray | None = None) -> Path:
+    np.save(path, g1_values() if values is None else values)
+    return path
+
+
 def xdf_chunk(tag: int, content: bytes) -> bytes:
     length = len(content) + 2
     width = 1 if length < 256 else 4
@@ -674,6 +679,7 @@ WRITERS: dict[str, tuple[str, Writer]] = {
     "G1 CSV": ("take.csv", write_g1_csv),
     "MVNX": ("take.mvnx", write_mvnx),
     "SMPL": ("take.npz", write_smpl),
+    "G1 array": ("take_100hz.npy", write_g1_array),
     "joint array": ("take_100hz.npy", write_joint_array),
     "Motive CSV": ("take.csv", write_motive),
     "Nexus CSV": ("take.csv", write_nexus),

@@ -34,8 +34,8 @@ from mplearn.mocap import (
 from mplearn.recording import Recording
 
 FORMATS = sorted(WRITERS)
-WITHOUT_ROWS = {"C3D", "Theia", "MVNX", "SMPL", "XDF", "joint array"}
-SKELETAL = {"AMC", "BVH", "G1 CSV", "MVNX", "SMPL"}
+WITHOUT_ROWS = {"C3D", "Theia", "MVNX", "SMPL", "XDF", "joint array", "G1 array"}
+SKELETAL = {"AMC", "BVH", "G1 CSV", "G1 array", "MVNX", "SMPL"}
 # in body lengths, of anything: no person in metres
 FROM_THE_BODY = {"DeepLabCut", "SLEAP", "key points"}
 RATES_HZ = {

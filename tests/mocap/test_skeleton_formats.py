@@ -608,6 +608,32 @@ def test_g1_joints_spelled_otherwise(tmp_path: Path) -> None:
     camel = ["".join(map(str.title, name.split("_")[:-1])) for name in G1_JOINTS]
     recording = open_recording(write_g1_csv(tmp_path / "b.csv", header=[*base, *camel]))
     assert np.array_equal(recording.frames, plain.frames)
+    base = ["base_pos_x", "base_pos_y", "base_pos_z", *(f"base_rot_{c}" for c in "xyzw")]
+    header = [*base, *(f"joint_{name.removesuffix('_joint')}" for name in G1_JOINTS)]
+    recording = open_recording(write_g1_csv(tmp_path / "c.csv", header=header))
+    assert np.array_equal(recording.frames, plain.frames)
+
+
+@pytest.mark.parametrize(("name", "mark"), [("a.tsv", "\t"), ("a.txt", " "), ("a.txt", "\t")])
+def test_g1_between_tabs_and_blanks(tmp_path: Path, name: str, mark: str) -> None:
+    path = write_g1_csv(tmp_path / "a.csv")
+    (tmp_path / name).write_text(path.read_text().replace(",", mark))
+    assert np.array_equal(open_recording(tmp_path / name).frames, open_recording(path).frames)
+
+
+def test_g1_as_arrays(tmp_path: Path) -> None:
+    values = g1_values()
+    plain = open_recording(write_g1_csv(tmp_path / "a.csv", values))
+    np.save(tmp_path / "b_50hz.npy", values)
+    parts = {"root_pos": values[:, :3], "root_rot": values[:, 3:7], "dof_pos": values[:, 7:]}
+    np.savez(tmp_path / "c.npz", fps=50, **parts, link_body_list=np.array(["pelvis"]))
+    for name in ("b_50hz.npy", "c.npz"):
+        recording = open_recording(tmp_path / name)
+        assert (recording.channels, recording.rate_hz) == (plain.channels, 50.0)
+        assert recording.frames == pytest.approx(plain.frames, abs=1e-7)
+    np.savez(tmp_path / "d.npz", **parts | {"dof_pos": values[:, 7:30]})
+    with pytest.raises(RecordingError, match=r"\(12, 23\)"):
+        open_recording(tmp_path / "d.npz")
 
 
 def test_g1_with_quaternions_w_first(tmp_path: Path) -> None:

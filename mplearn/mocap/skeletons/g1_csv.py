@@ -5,6 +5,9 @@
   time before them. Angles are radians, or degrees where names or their size say so;
 * a header ``Frame, root_translateX, ..., root_rotateX, ..., left_hip_pitch_joint_dof, ...``:
   centimetres, degrees, the pelvis' rotations about the fixed axes x, y, z in turn, 120 Hz.
+
+Arrays (``.npy``) of the 36 numbers are read, too, and archives of ``root_pos``, ``root_rot`` and
+``dof_pos``, as tools that retarget motions write them.
 """
 
 from __future__ import annotations
@@ -15,16 +18,18 @@ from pathlib import Path
 
 import numpy as np
 
+from ...errors import RecordingError
 from ...maths.rotations import euler_to_matrix, matrix_to_euler, quaternion_to_matrix
 from ...recording import FloatArray, Recording
 from ..clock import even_clock
-from ..files import bad_file, head_text, read_text
+from ..files import bad_file, head_text, read_text, suffix
 from ..findings import Findings
 from ..numbers import numbers, without_cut_row
 from ..placing.space import Space
 from ..rates import rate_beside
 from ..reader import Hints, Reader
 from .g1 import BASE, G1_JOINTS, g1_joints
+from .npz_file import NPZFile, finite, npy_shape, read_npy
 from .skeletal import Column, SkeletalMotion, skeletal_recording
 from .stature import unit_of_places
 
@@ -37,7 +42,9 @@ _ROTATION = re.compile(rf"{_ROOT}(?:rotate|rotation|euler)_?([xyz])")
 _TIMES = ("time", "time_s", "timestamp", "t")
 _RETARGETED_HZ, _SEED_HZ = 30.0, 120.0
 _UNITS = {"deg": "degrees", "degrees": "degrees", "rad": "radians", "radians": "radians"}
+_BEGINNINGS = re.compile(r"^(?:joint|dof|pos)_")
 _ENDINGS = re.compile(rf"(_joint|_dof|_pos|_angle|_{'|_'.join(_UNITS)})+$")
+_ARRAYS = ("root_pos", "root_rot", "dof_pos")  # of an archive
 _MOST_BEFORE = 2  # columns before a pose: a frame's number, and its time
 _EXPECTED = "the pelvis' place and orientation, and the G1's 29 joints"
 
@@ -55,7 +62,7 @@ class G1CSVReader(Reader):
     """
 
     format = "G1 CSV"
-    suffixes = (".csv",)
+    suffixes = (".csv", ".tsv", ".txt")
 
     def accepts(self, path: Path) -> bool:
         """Whether the first row names half of the G1's joints, or holds 36 numbers as it would."""
@@ -68,11 +75,7 @@ class G1CSVReader(Reader):
         row = _plain_numbers(cells)
         if row is None or not _WIDTH <= len(row) <= _WIDTH + _MOST_BEFORE:
             return False
-        pose = row[-_WIDTH:]
-        with np.errstate(over="ignore"):
-            off = abs(float(np.linalg.norm(pose[3:7])) - 1.0)
-        reach = np.abs(pose[7:]).max()
-        return bool(off < 0.01 and reach < 2 * np.pi) or bool(off < 1e-4 and reach < 360.0)
+        return _is_pose(row[-_WIDTH:])
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read angles, or where the robot's joints are; see `Reader.read`."""
@@ -89,36 +92,110 @@ class G1CSVReader(Reader):
         if not named:
             before = table[:, : max(len(header) - _WIDTH, 0)]
             header = [*map(_counts, before.T), *_HEADERLESS]
-        at = _columns(path, header, findings)
-        seed = "qw" not in at
-        unit_m = unit_of_places(path, table[:, at["z"]], 0.01 if seed else 1.0, hints, findings)
-        values = np.zeros((len(table), len(BASE) + len(G1_JOINTS)))
-        values[:, :3] = table[:, [at[axis] for axis in "xyz"]] * unit_m
-        values[:, 3:6] = _root_angles(table, at, findings)
-        joints = [name for name in G1_JOINTS if name in at]
-        angles = table[:, [at[name] for name in joints]]
-        unit = hints.angle_unit or _said_unit(header) or ("degrees" if seed else None)
-        if unit is None and np.nanmax(np.abs(angles), initial=0.0) > 2 * np.pi:
-            findings.warn("joint angles above a full turn: they are taken for degrees")
-            unit = "degrees"
-        values[:, [len(BASE) + G1_JOINTS.index(name) for name in joints]] = (
-            np.radians(angles) if unit == "degrees" else angles
-        )
-        rate_hz = hints.rate_hz or (_SEED_HZ if "qw" not in at else _RETARGETED_HZ)
-        if "time" in at:
-            clock = even_clock(path, table[:, at["time"]])
-            values, rate_hz = clock.even(values), hints.rate_hz or clock.rate_hz
-        elif hints.rate_hz is None and (beside := rate_beside(path, findings)):
-            rate_hz = beside
-        elif hints.rate_hz is None:
-            findings.note(f"{rate_hz:g} Hz, usual in such tables, which do not say it")
-        motion = SkeletalMotion(
-            g1_joints(), _COLUMNS, values, rate_hz, Space(1.0, "z", "x", says_up=True)
-        )
-        metres = replace(hints, unit_m=1.0)  # the robot's bones are known, whatever the file's unit
-        recording = skeletal_recording(path, motion, metres, findings, positions=positions)
-        assert recording.report is not None
-        return replace(recording, report=replace(recording.report, unit_m=unit_m))
+        return _recording(path, table, header, None, hints, findings, positions=positions)
+
+
+class G1ArrayReader(Reader):
+    """Reads motions of the Unitree G1 from arrays: see the module's docstring."""
+
+    format = "G1 array"
+    suffixes = (".npy", ".npz")
+
+    def accepts(self, path: Path) -> bool:
+        """Whether it is an array of 36 numbers a row, as they would be, or an archive of such."""
+        try:
+            if suffix(path) == ".npz":
+                return set(_ARRAYS) <= set(NPZFile(path).names)
+            shape = npy_shape(path)
+            return shape[1:] == (_WIDTH,) and shape[0] > 0 and _is_pose(_array(path)[0])
+        except RecordingError:
+            return False
+
+    def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
+        """Read angles, or where the robot's joints are; see `Reader.read`."""
+        findings = Findings(self.format)
+        said_hz = None
+        if suffix(path) == ".npz":
+            archive = NPZFile(path)
+            parts = [archive.numbers(name) for name in _ARRAYS]
+            shapes = [each.shape for each in parts]
+            wanted = [(len(parts[0]), n) for n in (3, 4, len(G1_JOINTS))] if shapes[0] else []
+            if shapes != wanted or not shapes[0][0]:
+                raise bad_file(path, f"{', '.join(_ARRAYS)} of shapes {shapes}", _EXPECTED)
+            table, said_hz = np.concatenate(parts, axis=1), archive.rate_hz(len(parts[0]))
+        else:
+            table = _array(path)
+        header = list(_HEADERLESS)
+        return _recording(path, table, header, said_hz, hints, findings, positions=positions)
+
+
+def _array(path: Path) -> FloatArray:
+    """Return the rows of an array of poses, shape (T, 36)."""
+    table = finite(path, "the array", read_npy(path))
+    if table.ndim != 2 or table.shape[1] != _WIDTH or not len(table):
+        raise bad_file(path, f"an array of shape {table.shape}", _EXPECTED)
+    return table
+
+
+def _is_pose(pose: FloatArray) -> bool:
+    """Whether 36 numbers can be a pose: the quaternion is one, and no angle is too large."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = abs(float(np.linalg.norm(pose[3:7])) - 1.0)
+    reach = np.abs(pose[7:]).max()
+    return bool(off < 0.01 and reach < 2 * np.pi) or bool(off < 1e-4 and reach < 360.0)
+
+
+def _recording(
+    path: Path,
+    table: FloatArray,
+    header: list[str],
+    said_hz: float | None,
+    hints: Hints,
+    findings: Findings,
+    *,
+    positions: bool,
+) -> Recording:
+    """Return the motion in a table.
+
+    Args:
+        path: The file.
+        table: Its numbers, shape (T, C).
+        header: Names of the C columns.
+        said_hz: The rate that it says [1/s]; None for none.
+        hints: What it does not say.
+        findings: Where to tell what was taken for what.
+        positions: See `Reader.read`.
+    """
+    at = _columns(path, header, findings)
+    seed = "qw" not in at
+    unit_m = unit_of_places(path, table[:, at["z"]], 0.01 if seed else 1.0, hints, findings)
+    values = np.zeros((len(table), len(BASE) + len(G1_JOINTS)))
+    values[:, :3] = table[:, [at[axis] for axis in "xyz"]] * unit_m
+    values[:, 3:6] = _root_angles(table, at, findings)
+    joints = [name for name in G1_JOINTS if name in at]
+    angles = table[:, [at[name] for name in joints]]
+    unit = hints.angle_unit or _said_unit(header) or ("degrees" if seed else None)
+    if unit is None and np.nanmax(np.abs(angles), initial=0.0) > 2 * np.pi:
+        findings.warn("joint angles above a full turn: they are taken for degrees")
+        unit = "degrees"
+    values[:, [len(BASE) + G1_JOINTS.index(name) for name in joints]] = (
+        np.radians(angles) if unit == "degrees" else angles
+    )
+    rate_hz = hints.rate_hz or said_hz or (_SEED_HZ if seed else _RETARGETED_HZ)
+    if "time" in at:
+        clock = even_clock(path, table[:, at["time"]])
+        values, rate_hz = clock.even(values), hints.rate_hz or clock.rate_hz
+    elif hints.rate_hz is None and not said_hz and (beside := rate_beside(path, findings)):
+        rate_hz = beside
+    elif hints.rate_hz is None and not said_hz:
+        findings.note(f"{rate_hz:g} Hz, usual in such tables, which do not say it")
+    motion = SkeletalMotion(
+        g1_joints(), _COLUMNS, values, rate_hz, Space(1.0, "z", "x", says_up=True)
+    )
+    metres = replace(hints, unit_m=1.0)  # the robot's bones are known, whatever the file's unit
+    recording = skeletal_recording(path, motion, metres, findings, positions=positions)
+    assert recording.report is not None
+    return replace(recording, report=replace(recording.report, unit_m=unit_m))
 
 
 def _cells(line: str) -> list[str]:
@@ -145,7 +222,7 @@ def _counts(column: FloatArray) -> str:
 
 def _joint(name: str) -> str | None:
     """Return the joint of the G1 that a column is named after: ``waist_yaw``, ``..._joint_dof``."""
-    plain = _ENDINGS.sub("", _words(name))
+    plain = _BEGINNINGS.sub("", _ENDINGS.sub("", _words(name)))
     return f"{plain}_joint" if f"{plain}_joint" in G1_JOINTS else None
 
 
