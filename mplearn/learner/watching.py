@@ -153,10 +153,11 @@ class Watching:
     def load_state(self, states: Sequence[WatchState], channels: tuple[str, ...]) -> None:
         """Resume from what `state` returned, in a stream that has these columns."""
         watches = []
+        fresh = {watch.channels: watch for watch in self.watches if not watch.people}
         for k, state in enumerate(states):
             with within(f"watches[{k}]"):
                 require(are_markers(state.channels), "channels", "must be columns of markers")
-                watch = Watch.by(state.channels, self.rate_hz)
+                watch = fresh.pop(state.channels, None) or Watch.by(state.channels, self.rate_hz)
                 with within("observer"):
                     watch.observer.load_state(state.observer)
                 watch.people.extend(state.people)

@@ -14,6 +14,7 @@ from .shapes.offsets import offsets_of
 from .shapes.shape_table import ShapeTable
 
 _ROUNDS = 3  # links and people's offsets are found in turn
+_NO_PAIRS = np.zeros((0, 2), dtype=np.int64)
 
 
 class Known(NamedTuple):
@@ -66,9 +67,11 @@ def solve(table: ShapeTable, known: Known, n_people: int, config: PeopleConfig) 
         direct, image = table.distances(levels, known.slots, config.posture)
         unit = unit_of(direct[np.ix_(known.firm, known.firm)], known.people[known.firm], config)
         if not np.isfinite(unit):
-            groups = _agglomerate(direct, direct, known.together, ~known.together, 0.0, 1.0, 0.0)
+            groups = _together(known.together)
             break
-        before, groups = groups, agglomerate(direct / unit, image / unit, known, config)
+        direct /= unit
+        image /= unit
+        before, groups = groups, agglomerate(direct, image, known, config)
         if np.array_equal(before, groups):
             break
         offsets = offsets_of(postures, known.people, n_people, groups, config.offset_prior)
@@ -125,40 +128,64 @@ def agglomerate(
     Returns:
         The group of each leaf, named by its first one, shape (n,).
     """
-    own = known.people[:, None] == known.people
-    barred = own & (direct > config.link_own) | known.apart
-    at = np.flatnonzero(known.firm | ~_covered(direct, own, known.firm))
-    pairs = np.ix_(at, at)
+    at = np.flatnonzero(known.firm | ~_covered(direct, known.people, known.firm))
+    totals, barred = _laid_out(direct, image, at, known.people, known.apart, config.link_own)
+    told = np.argwhere(known.together[np.ix_(at, at)]) if known.together.any() else _NO_PAIRS
     groups = np.arange(len(direct))
-    groups[at] = at[
-        _agglomerate(
-            direct[pairs],
-            image[pairs],
-            known.together[pairs],
-            barred[pairs],
-            config.link,
-            config.reach,
-            config.sided,
-        )
-    ]
+    groups[at] = at[_agglomerate(totals, barred, told, config.link, config.reach, config.sided)]
     return groups
 
 
-def _covered(direct: FloatArray, own: BoolArray, firm: BoolArray) -> BoolArray:
+def _together(pairs: BoolArray) -> IntArray:
+    """Return the group of each leaf where only what a person said joins any."""
+    n = len(pairs)
+    return _agglomerate(np.zeros((n, n, 2)), ~pairs, np.argwhere(pairs), 0.0, 1.0, 0.0)
+
+
+@njit(cache=True)
+def _covered(direct: FloatArray, people: IntArray, firm: BoolArray) -> BoolArray:
     """Return what waits though its person has the leaf that it is nearest to by now."""
-    if not firm.any():
-        return np.zeros(len(direct), dtype=np.bool_)
+    covered = np.zeros(len(firm), dtype=np.bool_)
     leaves = np.flatnonzero(firm)
-    nearest = leaves[direct[:, leaves].argmin(axis=1)]
-    return np.asarray(~firm & own[np.arange(len(direct)), nearest])
+    if not len(leaves):
+        return covered
+    for i in np.flatnonzero(~firm):
+        nearest = leaves[0]
+        for j in leaves:
+            if direct[i, j] < direct[i, nearest]:
+                nearest = j
+        covered[i] = people[nearest] == people[i]
+    return covered
+
+
+@njit(cache=True)
+def _laid_out(
+    direct: FloatArray,
+    image: FloatArray,
+    at: IntArray,
+    people: IntArray,
+    apart: BoolArray,
+    link_own: float,
+) -> tuple[FloatArray, BoolArray]:
+    """Return both distances of each pair of some leaves, (n, n, 2), and which must not join.
+
+    They lie side by side, for a join writes a column of both.
+    """
+    n = len(at)
+    totals, barred = np.empty((n, n, 2)), np.empty((n, n), dtype=np.bool_)
+    for i, a in enumerate(at):
+        for j, b in enumerate(at):
+            totals[i, j, 0], totals[i, j, 1] = direct[a, b], image[a, b]
+            own = people[a] == people[b]
+            barred[i, j] = (own and direct[a, b] > link_own) or apart[a, b]
+    return totals, barred
 
 
 @njit(cache=True)
 def _agglomerate(
-    matrix: FloatArray,
-    image: FloatArray,
-    together: BoolArray,
+    totals: FloatArray,
     barred: BoolArray,
+    pinned: IntArray,
     link: float,
     reach: float,
     sided: float,
@@ -166,19 +193,16 @@ def _agglomerate(
     """Join the pair of least doubt until all doubts exceed ``link``; never mirror images.
 
     Each row remembers its best pair, and looks anew only where what its doubts follow from has
-    changed: the pairs of few rows do with each join.
+    changed: the pairs of few rows do with each join. Both matrices are used up; ``pinned``, shape
+    (k, 2), are joined first.
     """
-    n = len(matrix)
+    n = len(totals)
     groups = np.arange(n)
-    totals = np.empty((n, n, 2))  # side by side, for a join writes a column of both
-    totals[:, :, 0], totals[:, :, 1] = matrix, image
     sizes, nearer = np.ones(n), np.empty(n)
-    barred = barred.copy()
     alive = np.arange(n)
     nearest, second = np.full(n, np.inf), np.full(n, np.inf)
     doubts, partners = np.full(n, np.inf), np.full(n, -1)
     stale, changed = np.ones(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
-    pinned = np.argwhere(together)
     for at in range(len(pinned)):
         i, j = groups[pinned[at, 0]], groups[pinned[at, 1]]
         if i != j:

@@ -92,13 +92,16 @@ def from_json(data: bytes) -> Any:
         StateError: It is no JSON.
     """
     try:
-        return json.loads(data, parse_constant=_refuse)
+        return _DECODER.decode(data.decode())
     except (ValueError, RecursionError) as error:
         raise StateError(f"is not JSON ({error})") from error
 
 
 def _refuse(constant: str) -> float:
     raise ValueError(f"{constant} is not JSON")
+
+
+_DECODER = json.JSONDecoder(parse_constant=_refuse)
 
 
 def _array(blob: bytes | memoryview, offset: int, narrow: str, dtype: str, shape: list[int]) -> Any:

@@ -42,8 +42,8 @@ class ShapeTable:
         """Take many shapes at once, which is quicker; return their slots."""
         if not shapes:
             return []
-        while len(self._free) < len(shapes):
-            self._grow(shapes[0])
+        if len(self._free) < len(shapes):
+            self._grow(shapes[0], len(shapes) - len(self._free))
         slots = [self._free.pop() for _ in shapes]
         for slot, shape in zip(slots, shapes, strict=True):
             self._note(slot, shape)
@@ -109,12 +109,11 @@ class ShapeTable:
             slots: Where they are, shape (n,).
             posture: Weight of the postures.
         """
-        at = np.ix_(slots, slots)
-        direct = np.sqrt(posture * squares(levels, levels) + self._direct[at])
+        direct = _rooted(squares(levels, levels), self._direct, slots, posture)
         if self.mirror is None:
             return direct, np.full_like(direct, np.inf)
         images = self.mirror.apply(levels)
-        return direct, np.sqrt(posture * squares(images, levels) + self._mirrored[at])
+        return direct, _rooted(squares(images, levels), self._mirrored, slots, posture)
 
     def distances_to(
         self, shape: Shape, levels: FloatArray, slots: IntArray, posture: float
@@ -132,9 +131,9 @@ class ShapeTable:
             return direct, np.full_like(direct, np.inf)
         return direct, row(mirrored(shape, self.mirror))
 
-    def _grow(self, shape: Shape) -> None:
+    def _grow(self, shape: Shape, least: int = 1) -> None:
         held = len(self._postures)
-        n = max(16, 2 * held)
+        n = max(16, 2 * held, held + least)
         for name, width in (
             ("_postures", len(shape.posture)),
             ("_movements", len(shape.movement)),
@@ -154,6 +153,24 @@ def stacked(shapes: Sequence[Shape]) -> ShapeTable:
     for shape in shapes:
         table.add(shape)
     return table
+
+
+@njit(cache=True)
+def _rooted(
+    postures: FloatArray, movements: FloatArray, slots: IntArray, weight: float
+) -> FloatArray:
+    """Return distances of squared ones of postures, (n, n), which they take the place of.
+
+    Args:
+        postures: Those, of the shapes of some slots.
+        movements: Those of movements, of all slots.
+        slots: Which, shape (n,).
+        weight: Of postures.
+    """
+    for i, one in enumerate(slots):
+        for j, other in enumerate(slots):
+            postures[i, j] = np.sqrt(weight * postures[i, j] + movements[one, other])
+    return postures
 
 
 _BLOCK = 32  # rows that the processor's cache holds twice
