@@ -203,6 +203,9 @@ class Hub:
             case "segment":
                 self._segments.append(header)
                 self._tell(header)
+            case "person":  # who watches knows what a person looks like, also where no robot is
+                known = self._latest.get("bodies", {"robot": []})
+                self._show(known | {"kind": "bodies", "person": header["shapes"]})
             case "bodies":
                 self._set("robot", "there")
                 self._learner.send({"do": "forget-deliveries"})

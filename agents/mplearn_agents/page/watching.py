@@ -19,6 +19,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from mplearn.body import human_body
 from mplearn.demonstrator import demonstrate
 from mplearn.errors import InvalidValueError, MPLearnError, RecordingWarning, StoreWarning
 from mplearn.learner import LearnerConfig, MotionLearner, learnable_rate
@@ -28,7 +29,7 @@ from mplearn.store import LifelongLearner, Store
 from mplearn.tree import PrimitiveTree, TreeConfig
 from mplearn_agents.learning.pauses import short_pauses
 
-from .figures import CLIP_HZ, motions_of
+from .figures import CLIP_HZ, motions_of, shapes_of
 from .happenings import happening, tell
 from .knowledge import knowledge
 from .messages import Header, clip, literal, mention, number, unpack
@@ -243,6 +244,7 @@ class Watcher:
         else:
             self._tell(self._lifelong.begin_stream(block.channels))
         self._figure = WatchedFigure(block.channels, block.rate_hz)
+        self._outbox.post({"kind": "person", "shapes": shapes_of(human_body().model())})
         self._outbox.post(
             {
                 "kind": "stream",

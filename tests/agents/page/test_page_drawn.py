@@ -298,6 +298,23 @@ def test_a_figure_is_shown_with_its_demonstrations(server, new_page):
     until(lambda: page.get_attribute("html", "data-shown") == str(asked["ref"]), 5)
 
 
+def test_who_moves_is_drawn_where_there_is_no_robot(new_page):
+    """Without a robot's process who watches says what a person looks like."""
+    ink = """() => { const c = document.querySelector("#stage canvas");
+      const d = c.getContext("2d").getImageData(0, 0, c.width / 2, c.height * 0.6).data;
+      let n = 0; for (let k = 0; k < d.length; k += 4) n += d[k] < 150; return n; }"""
+    with served() as server:
+        server.hear(world.stream())
+        server.hear({"kind": "person", "shapes": world.bodies()["person"]})
+        page = new_page(server.url)
+        assert page.evaluate(ink) < 100
+        server.hear(*world.live(0, 10))
+        until(lambda: page.evaluate(ink) > 500, 20, "a person")
+        assert page.get_attribute("html", "data-figures") is None
+        server.hear(world.bodies())
+        until(lambda: page.get_attribute("html", "data-figures") == "there", 20)
+
+
 def test_what_is_not_allowed_is_said(server, new_page):
     """A reply that refuses is shown, as text."""
     server.hear(world.knowledge(3))

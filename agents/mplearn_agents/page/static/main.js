@@ -38,7 +38,7 @@ function heard(message) {
       stream.take(message);
       break;
     case "clip": if (message.ref === asked) { stage.show(message); root.dataset.shown = asked; } break;
-    case "bodies": stage.setBodies(message); root.dataset.figures = "there"; break;
+    case "bodies": stage.setBodies(message); if (message.robot.length) root.dataset.figures = "there"; break;
     case "stream": begin(message); break;
     case "knowledge": learn(message); break;
     case "forecast": world.forecast = message.next; present(); break;
