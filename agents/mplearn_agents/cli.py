@@ -34,6 +34,7 @@ _CODES = (
     "exit codes: 0 done; 1 what was checked is not in order; 2 bad input; 3 not all that "
     "was learned could be written where it was to be; 130 interrupted (143 by SIGTERM)"
 )
+_NARROWEST = 11  # columns that a help takes at least, as argparse has it
 
 
 class _Version(argparse.Action):
@@ -133,7 +134,7 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
 
 def _codes() -> str:
     """Return the exit codes in lines that fit the terminal, as argparse writes the rest."""
-    return textwrap.fill(_CODES, shutil.get_terminal_size().columns - 2)
+    return textwrap.fill(_CODES, max(shutil.get_terminal_size().columns - 2, _NARROWEST))
 
 
 def command_modules() -> dict[str, ModuleType]:

@@ -268,6 +268,13 @@ def test_exit_codes_in_help_fit_the_terminal(columns, capsys, monkeypatch):
     assert " ".join(told.split()) == cli._CODES
 
 
+@pytest.mark.parametrize("columns", ["1", "2", "5"])
+def test_no_terminal_is_too_narrow(columns, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", columns)
+    out = said(capsys, "learn", "--help")[1]
+    assert "interrupted" in out and "SIGTERM" in out
+
+
 def test_nothing_is_cut_where_the_output_is_no_terminal(monkeypatch):
     monkeypatch.setenv("COLUMNS", "40")
     file = io.StringIO()

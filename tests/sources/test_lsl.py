@@ -1,5 +1,6 @@
 """The lab streaming layer, with an outlet of ours."""
 
+import itertools
 import os
 import signal
 import subprocess
@@ -205,6 +206,34 @@ def test_who_hangs_ends_with_who_started_it(tmp_path: Path) -> None:
         assert process.stdout.read(lsl_process.HEAD.size)  # it has begun to look
         process.stdin.close()  # as where its parent is killed
         assert process.wait(10.0) == 0
+
+
+def test_who_pulls_ends_orderly_where_the_library_fails(tmp_path: Path) -> None:
+    environment = hanging(tmp_path)
+    (tmp_path / "pylsl.py").write_text("def resolve_byprop(*a, **b): raise ValueError('broken')\n")
+    command = [sys.executable, lsl_process.__file__, "name", "x", "attended"]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, env=environment, **pipes) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        said = process.stdout.read()  # while its standard input is open
+        assert said.endswith(b"broken") and process.stderr.read() == b""
+        assert process.wait(10.0) == 0
+
+
+def test_time_in_which_a_program_stands_still_is_no_silence(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """As after Ctrl-Z: who was stopped for a minute has heard nothing for a minute."""
+    for key, value in hanging(tmp_path).items():
+        monkeypatch.setenv(key, value)
+    clock = itertools.count(step=60)
+    monkeypatch.setattr(time, "monotonic", lambda: float(next(clock)))
+    receiver, inbox = LSLReceiver("x"), Inbox()
+    closing = threading.Timer(0.7, inbox.close)
+    closing.start()
+    with pytest.raises(OSError, match="signal 9"):
+        receiver.receive(inbox)
 
 
 def test_a_description_says_names_and_unit() -> None:

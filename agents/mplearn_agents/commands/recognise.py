@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> None:
     )
     for each in found:
         table.add_row(
-            Text(each.take),
+            Text(printable(each.take)),  # before it is laid out: it may get longer
             f"{each.start_s:.2f}",
             f"{each.end_s:.2f}",
             Text(each.name) if each.name else Text("unknown", "dim"),

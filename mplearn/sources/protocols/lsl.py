@@ -5,7 +5,6 @@ from __future__ import annotations
 import subprocess
 import sys
 import threading
-import time
 from types import ModuleType
 from typing import Any
 from xml.etree import ElementTree
@@ -85,7 +84,7 @@ class _Pulled:
 
     def __init__(self, process: subprocess.Popen[bytes], inbox: Inbox) -> None:
         self._process, self._inbox = process, inbox
-        self._heard_s = time.monotonic()
+        self._silent = 0  # looks since it said something
         self._over = threading.Event()
         self._hangs = False
 
@@ -106,7 +105,8 @@ class _Pulled:
     def _attend(self) -> None:
         """End the process when nobody reads, or it hangs: a read of what it says would not end."""
         while not self._over.wait(_LOOK_S):
-            self._hangs = time.monotonic() - self._heard_s > HANGS_S
+            self._silent += 1  # time in which this process stood still, too, is none of it
+            self._hangs = self._silent * _LOOK_S > HANGS_S
             if self._inbox.closed or self._hangs:
                 self._process.kill()
                 return
@@ -133,7 +133,7 @@ class _Pulled:
     def _read(self, size: int) -> bytes:
         assert self._process.stdout is not None
         data = self._process.stdout.read(size)
-        self._heard_s = time.monotonic()
+        self._silent = 0
         if len(data) == size:
             return data
         code = self._process.wait()

@@ -65,7 +65,8 @@ def _pull(what: str, value: str) -> None:
 
 def _attend() -> None:
     """End this process when the one that started it ends, though liblsl may never return."""
-    sys.stdin.buffer.read()
+    while os.read(0, 1 << 12):  # sys.stdin would be locked when Python ends, which aborts it
+        pass
     os._exit(0)
 
 

@@ -65,6 +65,14 @@ def test_what_is_not_a_number_is_never_sent():
         messages.as_text({"x": float("nan")})
 
 
+@pytest.mark.parametrize("name", ["\u05d0\u2066", "\u2067\u2067x", "\u05d0", "\u05d0\u2069"])
+def test_what_is_written_backward_is_kept_apart_to_its_end(name):
+    """Isolates that a name begins and does not end, or ends, would reach beyond it."""
+    text = messages.literal(name)
+    assert (text[0], text[-1]) == ("\u2068", "\u2069")
+    assert not set(text[1:-1]) & set("\u2066\u2067\u2068\u2069")
+
+
 def test_a_clip_says_how_long_each_motion_is():
     motions = [np.random.default_rng(k).normal(size=(n, 3, 7)) for k, n in enumerate((4, 2))]
     data = messages.clip(9, 30.0, motions)

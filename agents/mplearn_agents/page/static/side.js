@@ -91,7 +91,7 @@ export class Side {
 
 // A name within a text: where it is written from right to left, the rest stays where it was.
 export function apart(name) {
-  return /[\u0590-\u08ff\u200f\u202a-\u202e\u2066-\u2069\ufb1d-\ufdff\ufe70-\ufeff]/.test(name) ? `\u2068${name.replaceAll("\u2069", "")}\u2069` : name;
+  return /[\u0590-\u08ff\u200f\u202a-\u202e\u2066-\u2069\ufb1d-\ufdff\ufe70-\ufeff]/.test(name) ? `\u2068${name.replace(/[\u2066-\u2069]/g, "")}\u2069` : name;
 }
 
 export function set(node, text) { if (node.textContent !== text) node.textContent = text; }
