@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import gzip
+import lzma
 import re
 import stat
 import zipfile
@@ -43,7 +44,8 @@ _BESIDE = re.compile(
 )
 _WORKBOOK = "[Content_Types].xml"  # of programs for offices
 _MOST_NAMED = 6
-_ZIP_DAMAGE = (zipfile.BadZipFile, NotImplementedError, RuntimeError, ValueError, KeyError)
+_ZIP_DAMAGE = (zipfile.BadZipFile, lzma.LZMAError, RuntimeError, ValueError, KeyError)
+_PIECE = 4096  # bytes of what is packed that are unpacked at once
 # characters that a line, and a cell, of a large table has at least: more lines of nothing than
 # memory holds are no measurement
 _LEAST_LINE, _LEAST_CELL = 12, 1.6
@@ -109,7 +111,7 @@ def head(path: Path, n_bytes: int = 8192) -> bytes:
         return b""
     try:
         with _opened(path) as file:
-            return file.read(n_bytes)
+            return _start(file, n_bytes)
     except (OSError, EOFError, zlib.error, *_ZIP_DAMAGE):
         return b""
 
@@ -137,7 +139,7 @@ def read_bytes(path: Path) -> bytes:
         if packed:
             limit = max(_SMALL_BYTES, _MOST_PACKED * limit)
         with _opened(path) as file:
-            data = file.read(limit + 1)
+            data = _start(file, limit + 1)
     except (OSError, EOFError, zlib.error, *_ZIP_DAMAGE) as error:
         if packed and not (isinstance(error, OSError) and error.errno):
             whole = "gzip file" if _starts(path) == _GZIP else "zip archive"
@@ -265,6 +267,19 @@ def _opened(path: Path) -> BufferedIOBase:
         return path.open("rb")
     with zipfile.ZipFile(path) as archive:  # keeps the file open as long as what is in it
         return cast("BufferedIOBase", archive.open(inside))
+
+
+def _start(file: BufferedIOBase, n_bytes: int) -> bytes:
+    """Return the first so many bytes; those in a zip archive by pieces.
+
+    There bzip2 and LZMA unpack all that they are given, however few bytes are asked for.
+    """
+    if not isinstance(file, zipfile.ZipExtFile):
+        return file.read(n_bytes)
+    data = bytearray()
+    while len(data) < n_bytes and (piece := file.read(min(_PIECE, n_bytes - len(data)))):
+        data += piece
+    return bytes(data)
 
 
 def _is_packed(path: Path) -> bool:

@@ -54,7 +54,7 @@ def folders_in(path: Path) -> FoundFolders:
                     continue
                 seen.add((known.st_dev, known.st_ino))
                 found.append(Path(at))
-                linked = [name for name in inside if Path(at, name).is_symlink()]
+                linked = [name for name in inside if _is_link(Path(at, name))]
                 links += [Path(at, name) for name in linked]
                 inside[:] = [name for name in inside if name not in linked]
         starts = links
@@ -79,7 +79,7 @@ def no_files(folder: Path) -> dict[str, RecordingError]:
         if suffix(each) in suffixes():
             problem = _problem(each)
         else:  # what a name without a suffix links to may be a folder
-            problem = "" if suffix(each) or not each.is_symlink() else _problem(each)
+            problem = "" if suffix(each) or not _is_link(each) else _problem(each)
         if problem:
             found[each.name] = bad_file(each, problem, "a recording")
     return found
@@ -91,6 +91,13 @@ def _problem(path: Path) -> str:
         return ""
     if is_file(path):
         return "" if os.access(path, os.R_OK) else "a file that may not be read"
-    if path.is_symlink():
+    if _is_link(path):
         return f"a link to {path.readlink()}, where nothing is"
+    if not os.path.lexists(path):  # in a folder whose names may be read, and nothing else
+        return "a file that may not be read"
     return "a pipe or a device"
+
+
+def _is_link(path: Path) -> bool:
+    """Say whether a path is a link; no where nobody may know."""
+    return os.path.islink(path)  # noqa: PTH114 (`is_symlink` raises there, on Python 3.11)

@@ -201,9 +201,16 @@ def open_takes(
         [('quick', 50.0), ('slow', 50.0)]
     """
     found: list[Recording] = []
-    takes = _takes(Path(path))
-    unreadable = no_files(Path(path)) if is_folder(Path(path)) else {}
-    if strict and unreadable:
+    unreadable: dict[str, RecordingError] = {}
+    try:
+        takes = _takes(Path(path))
+        unreadable |= no_files(Path(path)) if is_folder(Path(path)) else {}
+    except NothingReadableError:
+        unreadable |= no_files(Path(path))
+        if not unreadable:
+            raise
+        takes = {}
+    if unreadable and (strict or not takes):
         raise next(iter(unreadable.values()))
     for name, take in takes.items():
         try:

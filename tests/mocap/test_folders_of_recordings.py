@@ -88,3 +88,38 @@ def test_a_folder_that_may_not_be_read_is_refused(corpus: Path, monkeypatch: pyt
     for door in (find_takes, open_takes):
         with pytest.raises(RecordingError, match="Permission denied"):
             door(corpus)
+
+
+def test_a_folder_whose_names_alone_may_be_read_costs_nothing_else(
+    corpus: Path, monkeypatch: pytest.MonkeyPatch
+):
+    names = [take.name for take in find_takes(corpus).takes]
+    shut = corpus / "shut"
+    (shut / "within").mkdir(parents=True)
+    for name in ("bow.csv", "notes", "within/bow.csv"):
+        (shut / name).write_text(TABLE)
+
+    def closed(function):
+        def called(path, *args, **kwargs):
+            if isinstance(path, str | os.PathLike) and shut in Path(path).parents:
+                raise PermissionError(13, "Permission denied", str(path))
+            return function(path, *args, **kwargs)
+
+        return called
+
+    for name in ("stat", "lstat"):
+        monkeypatch.setattr(os, name, closed(getattr(os, name)))
+    scan = os.scandir
+    monkeypatch.setattr(os, "scandir", closed(scan))
+    monkeypatch.setattr(os, "access", lambda path, mode: shut not in Path(path).parents)
+    found = find_takes(corpus)
+    assert [take.name for take in found.takes] == names
+    assert sorted(found.unreadable) == ["shut/bow.csv", "shut/within"]
+    assert "a file that may not be read" in str(found.unreadable["shut/bow.csv"])
+
+
+def test_where_nothing_else_is_it_is_said_what_cannot_be_read(tmp_path: Path):
+    (tmp_path / "gone.csv").symlink_to("nowhere.csv")
+    for read in (find_takes, open_takes):
+        with pytest.raises(RecordingError, match=r"gone.csv: a link to nowhere.csv"):
+            read(tmp_path)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import gzip
+import tracemalloc
 from contextlib import suppress
 from pathlib import Path
-from zipfile import ZIP_DEFLATED, ZipFile
+from zipfile import ZIP_BZIP2, ZIP_DEFLATED, ZIP_LZMA, ZIP_STORED, ZipFile
 
 import numpy as np
 import pytest
@@ -87,9 +88,10 @@ def test_what_is_in_an_archive_is_named(tmp_path: Path) -> None:
         open_recording(path)
 
 
-def test_a_bad_archive_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("method", [ZIP_STORED, ZIP_DEFLATED, ZIP_BZIP2, ZIP_LZMA])
+def test_a_bad_archive_is_refused(tmp_path: Path, method: int) -> None:
     path, rng = tmp_path / "a.zip", np.random.default_rng(0)
-    with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+    with ZipFile(path, "w", method) as archive:
         archive.writestr("a.bvh", write(tmp_path, "BVH").read_bytes())
     whole = path.read_bytes()
     for _ in range(200):
@@ -103,6 +105,18 @@ def test_a_bad_archive_is_refused(tmp_path: Path) -> None:
         archive.writestr("a.bvh", bytes(30_000_000))
     with pytest.raises(RecordingError, match="expands to more than"):
         open_recording(path)
+
+
+def test_what_expands_without_end_is_refused_before_it_fills_the_memory(tmp_path: Path) -> None:
+    path = tmp_path / "a.zip"
+    with ZipFile(path, "w", ZIP_LZMA) as archive:  # which unpacks all that it is given
+        archive.writestr("a.bvh", bytes(150_000_000))
+    tracemalloc.start()
+    with pytest.raises(RecordingError, match="expands to more than"):
+        open_recording(path)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 100_000_000
 
 
 @pytest.mark.parametrize(
