@@ -192,6 +192,23 @@ def test_a_question_goes_when_it_is_answered(server, new_page):
     until(lambda: question.count() == 0, 5)
 
 
+def test_a_long_name_does_not_cut_how_many_more_come(server, new_page):
+    said = new_page(server.url).evaluate(
+        """async () => {
+          const { clipped } = await import("/stage.js");
+          const c = document.createElement("canvas").getContext("2d");
+          c.font = "16px sans-serif";
+          return ["raise", "raise both arms, and lower them"].map((name) => {
+            const text = clipped(c, name, 120, ", 12 more");
+            return [text, c.measureText(text).width];
+          });
+        }"""
+    )
+    assert said[0][0] == "raise, 12 more"
+    assert said[1][0].startswith("ra") and said[1][0].endswith("\u2026, 12 more")
+    assert said[1][1] <= 120
+
+
 def test_names_are_text_never_markup(server, new_page):
     server.hear(world.stream())
     server.hear(world.knowledge(len(world.HOSTILE), world.HOSTILE))

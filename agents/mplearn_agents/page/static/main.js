@@ -159,13 +159,14 @@ function figures(list) {
 
 function robot() {
   const r = world.robot, state = world.processes.robot;
-  let text = "robot";
+  let text = "robot", left = "";
   if (state === "none") text = "no robot";
   else if (state === "stopped") text = "robot: starting again";
-  else if (r.primitive != null) text = `${label(r.primitive)}${r.left ? `, ${r.left} more` : ""}`;
+  else if (r.primitive != null) { text = label(r.primitive); left = r.left ? `, ${r.left} more` : ""; }
   else if (r.cannot) text = "robot: cannot perform this";
   else if (r.left) text = "robot: planning";
   stage.captions.robot = text;
+  stage.captions.left = left;
   root.dataset.robot = r.primitive ?? "";
   find("#stop").disabled = r.primitive == null && !r.left;
   find("#walk").disabled = state === "none" || Boolean(r.cannot);

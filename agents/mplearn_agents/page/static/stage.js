@@ -39,7 +39,7 @@ export class Stage {
     this.figures = { person: null, robot: null };
     this.moving = {};
     this.shown = null;
-    this.captions = { person: "", robot: "", shown: "" };
+    this.captions = { person: "", robot: "", shown: "", left: "" }; // left: what ends the robot's
     this.still = new Map();
     canvas.addEventListener("pointerdown", (e) => this.drag(e));
     canvas.addEventListener("dblclick", () => { this.turn = TURN; this.elevation = ELEVATION; });
@@ -96,7 +96,7 @@ export class Stage {
       c.font = `600 ${font}px ${style.font}`;
       c.textAlign = "center";
       c.fillStyle = name === "shown" ? style.accent : style.soft;
-      c.fillText(clipped(c, this.captions[name] ?? "", width / Object.keys(places).length - 12), x, height - 0.55 * font);
+      c.fillText(clipped(c, this.captions[name] ?? "", width / Object.keys(places).length - 12, name === "robot" ? this.captions.left : ""), x, height - 0.55 * font);
       if (name === "shown") { this.drawShown(x, ground, scale, looks, camera, style, now); continue; }
       const moving = this.moving[name];
       if (!moving || !this.figures[name]) continue;
@@ -290,9 +290,9 @@ export function fitted(canvas, context) {
 }
 
 // Shorten a text to a width.
-export function clipped(context, text, width) {
-  if (context.measureText(text).width <= width) return text;
+export function clipped(context, text, width, tail = "") {
+  if (context.measureText(text + tail).width <= width) return text + tail;
   let n = text.length;
-  while (n > 1 && context.measureText(`${text.slice(0, n)}…`).width > width) n--;
-  return `${text.slice(0, n)}…`;
+  while (n > 1 && context.measureText(`${text.slice(0, n)}…${tail}`).width > width) n--;
+  return `${text.slice(0, n)}…${tail}`;
 }
