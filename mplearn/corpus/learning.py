@@ -345,12 +345,16 @@ class _Run:
     ) -> None:
         """Have all tasks done, those again whose worker died, and say how far it is meanwhile.
 
+        Whoever works beside one that dies is lost with it: what did nothing each time is tried at
+        last with nothing beside it.
+
         ``died`` is told of the death, and returns a number that differs where anything was done.
         """
         tries: Counter[tuple[int, int]] = Counter()
         running: dict[Future[T], int] = {}
         waiting = list(reversed(range(len(tasks))))
-        while waiting or running:
+        lost: list[int] = []
+        while waiting or running or lost:
             self._look_at_stop()
             while waiting and len(running) < room(self._executor) and not self._stop.is_set():
                 k = waiting.pop()
@@ -358,6 +362,9 @@ class _Run:
                 running[future] = k
                 if future.done():  # by this process: the others can wait until that is seen
                     break
+            if not running and lost and not self._stop.is_set():
+                k = lost.pop()
+                running[self._executor.submit(work, *tasks[k])] = k
             if not running:
                 return
             for future in wait(running, _LOOK_S, FIRST_COMPLETED).done:
@@ -375,7 +382,7 @@ class _Run:
                         f"a worker died {_TRIES} times before it did anything: "
                         f"{type(error).__name__}: {error}"
                     ) from error
-                waiting.append(k)
+                (waiting if tries[k, trace] < _TRIES - 1 else lost).append(k)
             self._show(self._progress())
 
     def _look_at_stop(self) -> None:

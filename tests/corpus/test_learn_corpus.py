@@ -33,7 +33,7 @@ from mplearn.corpus import (
 )
 from mplearn.corpus.cluster import RayTasks, _pass_on
 from mplearn.corpus.executors import Here
-from mplearn.corpus.shard import ShardJournal
+from mplearn.corpus.shard import ShardJournal, learn_shard
 from mplearn.errors import CorpusError, InvalidValueError, RecordingError, StoreError
 from mplearn.merging import merge_learners
 from mplearn.mocap import Hints, TakeFiles, readers, register_reader, registry
@@ -393,6 +393,43 @@ def test_workers_that_die_again_and_again_end_nothing(
     assert frail.most == 2
     assert frail.deaths >= 3
     assert saved(corpus, tmp_path) == alone
+
+
+def test_who_works_beside_one_that_dies_again_and_again_is_not_held_to_be_dying(
+    folder: Path, tmp_path: Path
+) -> None:
+    class Beside:
+        """Two workers; the first shard's comes to its first take and dies, three times."""
+
+        jobs, deaths = 2, 0
+
+        def __init__(self) -> None:
+            self.given: list[Future[Any]] = []
+
+        def submit(self, work: Callable[..., Any], *args: Any) -> Future[Any]:
+            if self.deaths == 3 or work is not learn_shard:
+                return Here().submit(work, *args)
+            future: Future[Any] = Future()
+            self.given.append(future)
+            if args[0].store.stem == "0000":
+                ShardJournal(args[0].store).write("begun", args[0].takes[0].name)
+            if len(self.given) == 2:
+                self.deaths += 1
+                for each in self.given:
+                    each.set_exception(RuntimeError("ended abruptly"))
+                self.given = []
+            return future
+
+        def close(self) -> None:
+            pass
+
+    corpus = learn_corpus(folder, tmp_path / "s", executor=Beside())
+    first = corpus.shards[0].takes[0]
+    assert "was tried 3 times" in corpus.progress.refused[first]
+    names = {name for shard in corpus.shards for name in shard.takes}
+    learned = {name for report in corpus.reports for name in report.learned}
+    assert learned == names - corpus.progress.refused.keys()
+    assert len(corpus.progress.refused) == 2  # another cannot be read, whoever dies
 
 
 def test_workers_that_die_at_once_end_it(folder: Path, tmp_path: Path) -> None:

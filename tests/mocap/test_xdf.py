@@ -172,6 +172,15 @@ def test_streams_of_several_people_are_people(tmp_path: Path) -> None:
         assert each.markers == pytest.approx(points, abs=1e-5)
 
 
+def test_a_bad_stream_costs_no_other(tmp_path: Path) -> None:
+    points = person(100, 12)
+    bad = write_xdf(tmp_path / "a.xdf", points, rate_hz=1e6, stream="torn")
+    whole = write_xdf(tmp_path / "b.xdf", points[:, :8], names=UPPER)
+    with pytest.warns(RecordingWarning, match="stream 'torn' is left out: .*a rate of 1e"):
+        recording = open_recording(_beside(bad, whole, 9), hints=Hints(unit_m=1.0, up_axis="z"))
+    assert recording.markers == pytest.approx(points[:, :8], abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("stream", "rate_hz", "start_s", "moved", "says"),
     [

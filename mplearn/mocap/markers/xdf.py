@@ -67,21 +67,24 @@ class XDFReader(Reader):
                 f"no markers in {len(streams)} streams of numbers",
                 "a stream of motion capture, with channels x, y, z for each marker",
             )
-        first = _seen(path, *found[0], hints, findings)
-        others = []
-        for markers, stream in found[1:]:
+        seen, problems = [], []
+        for markers, stream in found:
             try:
-                others.append(_seen(path, markers, stream, hints, findings))
+                seen.append(_seen(path, markers, stream, hints, findings))
             except RecordingError as error:
+                problems.append(error)
                 findings.warn(f"stream {stream.name!r} is left out: {error}")
+        if not seen:
+            raise problems[0]
+        first, *others = seen
         read = _joined(first, others, findings)
         findings.leave_out(
             f"stream {s.name!r}" for s in streams if all(s is not each.stream for each in read)
         )
         points = np.concatenate([each.on(first) for each in read], axis=1)
         called = _told_apart(read)
-        seen = (~np.isnan(points).any(axis=2)).sum(axis=0)
-        kept, names = chosen_names(path, called, seen, findings)
+        often = (~np.isnan(points).any(axis=2)).sum(axis=0)
+        kept, names = chosen_names(path, called, often, findings)
         space = Space(first.unit_m or 1.0, says_unit=first.unit_m is not None)
         points = points if len(kept) == points.shape[1] else points[:, kept]
         return placed_markers(path, points, names, first.rate_hz, space, hints, findings)
