@@ -72,7 +72,8 @@ def find_steps(ahead: FloatArray, above: FloatArray, rate_hz: float) -> list[Bou
 
     Where a knee is raised, a person kicks or jogs on the spot, an ankle rises about as far as it
     goes ahead or back; where the trunk turns over feet that stand, none leaves the floor; in a
-    boxer's stance none passes the other: these are no steps.
+    boxer's stance none passes the other: these are no steps. Nor is walking backward, where the
+    ankle that goes back is lifted: it is rhythmic motion like any other, where it is labelled.
 
     Args:
         ahead: How far the left ankle is ahead of the right one, shape (T,) [m].
