@@ -153,7 +153,10 @@ def test_what_cannot_be_is_said_in_a_line(
     damaged = store.read_bytes()[:middle] + bytes(2000) + store.read_bytes()[middle + 2000 :]
     (tmp_path / "d.db").write_bytes(damaged)
     assert main(["store", "check", str(tmp_path / "d.db")]) == 1
-    assert "d.db is damaged" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "d.db is damaged" in told and "\\n" not in told and told.count("\n") == 1
+    assert main(["store", "check", str(tmp_path / "b.db"), "--salvage"]) == 1  # nothing is left
+    assert "b.db is damaged" in capsys.readouterr().out
     assert "--out, or a store" in refused(capsys, "learn", tmp_path)
 
 

@@ -175,19 +175,24 @@ def _backup(args: argparse.Namespace) -> None:
 def _check(args: argparse.Namespace) -> int | None:
     from mplearn.store import LifelongLearner, check
 
-    if args.salvage:
-        with LifelongLearner.open(args.store, salvage=True) as life:
-            print(f"{len(life.snapshot())} primitives from {_length(life)} of motion are kept")
     try:
+        if args.salvage:
+            with LifelongLearner.open(args.store, salvage=True) as life:
+                print(f"{len(life.snapshot())} primitives from {_length(life)} of motion are kept")
         wrong = check(args.store)
     except StoreDamagedError as error:  # it cannot be opened at all
-        print(printable(str(error)))
+        print(_in_one_line(str(error)))
         return NOT_IN_ORDER
     if wrong:
-        print(printable(f"{args.store} is damaged: {'; '.join(wrong)}"))
+        print(_in_one_line(f"{args.store} is damaged: {'; '.join(wrong)}"))
         return NOT_IN_ORDER
     print(f"{printable(str(args.store))} is sound")
     return None
+
+
+def _in_one_line(text: str) -> str:
+    """Return a text as one line: what SQLite finds is said in several."""
+    return printable(" ".join(text.split()))
 
 
 def _command(args: argparse.Namespace) -> None:
