@@ -24,7 +24,7 @@ STEP_M = 0.1
 """Least prominence of an extreme of one ankle ahead of the other: half of a short step [m]."""
 
 LEVEL = 0.6  # of how far ahead: an ankle is no higher above the other where a step turns
-LIFT_M = 0.025  # of the ankle that comes ahead over the other, on its way, at the least [m]
+LIFT_M = 0.025  # of one ankle over the other as they pass, at the least [m]
 PROMINENCE = 0.35  # of the oscillation's usual height, for other motion
 LEAST_CYCLES = 1.5  # of a bout of labelled motion
 LEAST_STRIDES = 2.0  # of a bout of steps, which nobody says are steps
@@ -68,12 +68,11 @@ class CutScore:
 
 
 def find_steps(ahead: FloatArray, above: FloatArray, rate_hz: float) -> list[Bout]:
-    """Return the bouts of walking and running.
+    """Return the bouts of walking, forward or backward, and running.
 
     Where a knee is raised, a person kicks or jogs on the spot, an ankle rises about as far as it
     goes ahead or back; where the trunk turns over feet that stand, none leaves the floor; in a
-    boxer's stance none passes the other: these are no steps. Nor is walking backward, where the
-    ankle that goes back is lifted: it is rhythmic motion like any other, where it is labelled.
+    boxer's stance none passes the other: these are no steps.
 
     Args:
         ahead: How far the left ankle is ahead of the right one, shape (T,) [m].
@@ -88,10 +87,7 @@ def find_steps(ahead: FloatArray, above: FloatArray, rate_hz: float) -> list[Bou
     steps = level[:-1] & level[1:] & (ahead[turns[:-1]] * ahead[turns[1:]] < 0)
     for i in np.flatnonzero(steps):
         start, end = turns[i : i + 2]
-        swings = (
-            np.sign(ahead[end]) * above[start:end]
-        )  # the ankle that comes ahead, over the other
-        steps[i] = swings.max() >= LIFT_M
+        steps[i] = np.abs(above[start:end]).max() >= LIFT_M
     return _bouts("steps", turns, heights, LEAST_STRIDES, rate_hz, steps)
 
 

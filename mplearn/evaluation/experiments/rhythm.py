@@ -23,7 +23,7 @@ RATES_HZ = (60.0, 30.0)
 SHORTEST_S = 1.5  # of a labelled stretch in which cycles are sought
 NOTE = (
     "Truth is found with look-ahead. Steps turn where one ankle is farthest ahead of the other, "
-    "about where a foot strikes, wherever in a take that repeats, by at least 10 cm, each lifted "
+    "about where a foot strikes, wherever in a take that repeats, by at least 10 cm, one lifted "
     "past the other by at least 2.5 cm; labelled stretches without steps turn at the extremes of "
     "their main oscillation (first principal component from 0.2 to 4 Hz). A bout holds at least "
     "1.5 cycles that are alike, 2 of steps. Cuts a cycle: all boundaries of the segmenter, those "
