@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -136,8 +137,6 @@ def library_file(library, tmp_path):
 @pytest.fixture
 def hostile_library(library, tmp_path):
     """A library whose names are as bad as a file may hold them; `rename` would refuse them."""
-    from dataclasses import replace
-
     names = [*(n for n in HOSTILE if n != "\udcff"), *(f"p{k}\x1b[2J" for k in range(100))]
     primitives = tuple(
         replace(each, name=name) for each, name in zip(library.primitives, names, strict=False)
@@ -257,6 +256,17 @@ def test_a_library_that_resets_colours_at_the_end_prints_nothing(capsys):
     stream.write("\x1b[0m")
     stream.write("a name\x1b[0m\n")
     assert capsys.readouterr().out == "a name\\x1b[0m\n"
+
+
+@pytest.mark.parametrize("width", [80, 400, 100_000])
+def test_names_that_are_spelled_out_are_not_cut(width, library):
+    name = "a" + "\u200d" * 9 + "end"
+    primitives = tuple(replace(p, name=f"{name}{p.id}") for p in library.primitives)
+    file = io.StringIO()
+    console = InertConsole(file=file, width=width, force_terminal=True, color_system=None)
+    console.print(primitive_table(replace(library, primitives=primitives)))
+    for primitive in primitives:
+        assert printable(primitive.name) in file.getvalue()
 
 
 @pytest.mark.parametrize("columns", ["60", "80"])

@@ -29,6 +29,7 @@ def run(args: argparse.Namespace) -> None:
 
     from mplearn.library import PrimitiveLibrary
     from mplearn_agents.terminal.console import new_table, open_console
+    from mplearn_agents.terminal.inert import printable
 
     library = PrimitiveLibrary.load(args.library)
     history = [key if key in library else primitive_key(key) for key in args.history]
@@ -51,7 +52,7 @@ def run(args: argparse.Namespace) -> None:
     for each in found:
         table.add_row(
             str(each.id),
-            Text(library[each.id].name),
+            Text(printable(library[each.id].name)),
             f"{each.probability:.3f}",
             f"{each.duration_s:.2f}",
             f"{each.duration_std_s:.2f}",

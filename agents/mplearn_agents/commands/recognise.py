@@ -93,8 +93,8 @@ def run(args: argparse.Namespace) -> None:
             Text(printable(each.take)),  # before it is laid out: it may get longer
             f"{each.start_s:.2f}",
             f"{each.end_s:.2f}",
-            Text(each.name) if each.name else Text("unknown", "dim"),
-            Text(each.nearest),
+            Text(printable(each.name)) if each.name else Text("unknown", "dim"),
+            Text(printable(each.nearest)),
             f"{each.distance:.3g}",
             f"{each.p_value:.3g}",
         )

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mplearn_agents.terminal.inert import printable  # before it is laid out: it may get longer
+
 if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
@@ -34,7 +36,7 @@ def primitive_table(library: PrimitiveLibrary) -> Table:
     for primitive in library.primitives:
         table.add_row(
             str(primitive.id),
-            Text(primitive.name),
+            Text(printable(primitive.name)),
             str(primitive.n_exemplars),
             f"{primitive.mean_duration_s:.2f} s",
             Text(", ".join(most_active(primitive, library.channels))),
@@ -56,7 +58,7 @@ def transition_table(library: PrimitiveLibrary) -> Table:
             graph.out_edges(primitive.id, data=True), key=lambda e: (-e[2]["probability"], e[1])
         )
         following = [(library[after].name, edge["probability"]) for _, after, edge in out]
-        table.add_row(Text(primitive.name), _following(following))
+        table.add_row(Text(printable(primitive.name)), _following(following))
     return table
 
 
@@ -77,7 +79,7 @@ def chain_table(library: PrimitiveLibrary) -> Table:
         if len(chain) > 1:
             after = sorted(graph.out_edges(head, data=True), key=lambda e: -e[2]["probability"])
             following = [(names[next_head], edge["probability"]) for _, next_head, edge in after]
-            table.add_row(Text(names[head]), _following(following))
+            table.add_row(Text(printable(names[head])), _following(following))
     return table
 
 
@@ -87,7 +89,8 @@ def _following(following: Sequence[tuple[str, float]]) -> Text:
 
     if not following:
         return Text("nothing was seen to follow", "dim")
-    return Text("; ".join(f"{name} {100 * probability:.0f} %" for name, probability in following))
+    told = "; ".join(f"{name} {100 * probability:.0f} %" for name, probability in following)
+    return Text(printable(told))
 
 
 def primitive_tree(library: PrimitiveLibrary) -> Tree:
