@@ -50,6 +50,10 @@ class Bout:
         """How many cycles it holds."""
         return 0.5 * (len(self.turns) - 1)
 
+    def overlaps(self, other: Bout) -> bool:
+        """Return whether both go on at some time."""
+        return bool(self.turns[0] < other.turns[-1] and other.turns[0] < self.turns[-1])
+
 
 @dataclass(frozen=True)
 class CutScore:
@@ -84,11 +88,17 @@ def find_steps(ahead: FloatArray, above: FloatArray, rate_hz: float) -> list[Bou
         return []
     turns, heights = _turns(band, STEP_M)
     level = np.abs(above[turns]) <= LEVEL * np.abs(ahead[turns])
-    steps = level[:-1] & level[1:] & (ahead[turns[:-1]] * ahead[turns[1:]] < 0)
-    for i in np.flatnonzero(steps):
-        start, end = turns[i : i + 2]
-        steps[i] = np.abs(above[start:end]).max() >= LIFT_M
-    return _bouts("steps", turns, heights, LEAST_STRIDES, rate_hz, steps)
+    passed = level[:-1] & level[1:] & (ahead[turns[:-1]] * ahead[turns[1:]] < 0)
+    found: list[Bout] = []
+    for way in (1, -1):  # forward the ankle that comes ahead is lifted, backward the other
+        steps = passed.copy()
+        for i in np.flatnonzero(passed):
+            start, end = turns[i : i + 2]
+            lifts = way * np.sign(ahead[end]) * above[start:end]
+            steps[i] = lifts.max() >= LIFT_M
+        bouts = _bouts("steps", turns, heights, LEAST_STRIDES, rate_hz, steps)
+        found += [bout for bout in bouts if not any(map(bout.overlaps, found))]
+    return found
 
 
 def find_oscillation(label: str, posture: FloatArray, rate_hz: float) -> list[Bout]:
