@@ -165,10 +165,17 @@ def test_a_learner_that_was_killed_goes_on_and_all_end_together(new_page, tmp_pa
         page.keyboard.press("Enter")
         name = page.locator(f'#tree [data-id="{id}"] text.name')
         until(lambda: name.text_content() == "mine", PATIENCE_S)
+        state.evaluate(
+            """state => {
+                state.said = [];
+                const note = () => state.said.push(state.dataset.live);
+                new MutationObserver(note).observe(state, {attributeFilter: ["data-live"]});
+            }"""
+        )
         until(lambda: _learners(process.pid), PATIENCE_S, "the learner's process")[0].kill()
         until(lambda: "SIGKILL" in page.locator("#log").text_content(), PATIENCE_S)
-        until(lambda: state.get_attribute("data-live") == "no", PATIENCE_S)
-        until(lambda: state.get_attribute("data-live") == "yes", PATIENCE_S)
+        until(lambda: "no" in state.evaluate("state => state.said"), PATIENCE_S, "no longer live")
+        until(lambda: state.get_attribute("data-live") == "yes", PATIENCE_S, "live again")
         assert name.text_content() == "mine"
         n = rows(page).count()
         until(lambda: rows(page).count() > n or page.locator("#log .learned").count(), PATIENCE_S)
