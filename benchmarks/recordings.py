@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
+import re
 import tempfile
 import time
 import warnings
@@ -103,12 +104,13 @@ def _outcome(file: Path, folder: Path, dynamics: str) -> Outcome:
         return found
     found.stage = "learned"
     said = _run("perform", str(library), "--steps", str(STEPS), "--dynamics", dynamics)
-    if " falls" not in said:
+    fell = re.search(r"(\d+) falls?$", said)
+    if fell is None:
         found.problem = said
         return found
     found.stage = "performed"
     found.standing = "none of the" in said
-    found.falls = int(said.rpartition(", ")[2].split()[0])
+    found.falls = int(fell[1])
     return found
 
 

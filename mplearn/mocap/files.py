@@ -1,23 +1,28 @@
-"""Files as they come: plain, gzipped or alone in a zip archive, and the error that names them."""
+"""Files as they come: plain, packed or in an archive, and the error that names them."""
 
 from __future__ import annotations
 
 import codecs
-import gzip
-import lzma
+import os
 import re
 import stat
-import zipfile
-import zlib
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BufferedIOBase
 from pathlib import Path
-from typing import cast
+from zipfile import ZipExtFile
 
 from ..errors import RecordingError
+from .archives import (
+    ArchiveError,
+    Member,
+    archive_of,
+    members,
+    open_member,
+    recordings_in,
+)
+from .packing import DAMAGE, STARTS, most_unpacked, packing, unpacked_name, unpacking
 
-_MOST_PACKED = 60  # times; tables of measured numbers pack to a half or a tenth
-_SMALL_BYTES = 4_000_000
 _LONGEST_SHOWN = 300  # characters of what a file holds
 _LARGE_BYTES = 8_000_000
 _TELLING = 64  # bytes of plain letters, in which every second one is 0 in UTF-16
@@ -34,17 +39,7 @@ _NO_RECORDINGS = (
 )
 _LAST_CELL = re.compile(r"(?<=[^\s,;])[ \t,;]+([^\s,;]*)\Z")
 _WORD = re.compile(r"\b(?!nan\b)[a-z]", re.I)
-_ZIP_NAME = 30  # where an archive names the first file in it
-_ZIP, _GZIP = b"PK\x03\x04", b"\x1f\x8b\x08"
-# what lies beside a recording in an archive, and is none
-_BESIDE = re.compile(
-    r"(?:^|/)(?:__MACOSX/|\.|desktop\.ini$|thumbs\.db$|(?:read ?me|licen[cs]e)[^/]*$)"
-    r"|\.(?:pdf|md|html?|rtf|docx?|png|jpe?g|gif|mp4|avi|mov|fbx|blend)$",
-    re.I,
-)
-_WORKBOOK = "[Content_Types].xml"  # of programs for offices
-_MOST_NAMED = 6
-_ZIP_DAMAGE = (zipfile.BadZipFile, lzma.LZMAError, RuntimeError, ValueError, KeyError)
+_ZIP = b"PK\x03\x04"
 _PIECE = 4096  # bytes of what is packed that are unpacked at once
 # characters that a line, and a cell, of a large table has at least: more lines of nothing than
 # memory holds are no measurement
@@ -53,20 +48,13 @@ _LINES_BEFORE = 20  # of which the last numbers tell whether a file's last one i
 
 
 def suffix(path: Path) -> str:
-    """Return the suffix that names the format, lower case: ``86_01.amc.gz`` -> ``.amc``.
-
-    Of a zip archive it is that of the only recording in it.
-    """
-    ending = Path(_ungzipped(path)).suffix.lower()
-    if ending != ".zip":
-        return ending
-    inside = _only_recording(path)
-    return Path(inside).suffix.lower() if inside else ending
+    """Return the suffix that names the format, lower case: ``86_01.amc.gz`` -> ``.amc``."""
+    return Path(unpacked_name(path.name)).suffix.lower()
 
 
 def stem(path: Path) -> str:
     """Return the name without the suffixes: ``86_01.amc.gz`` -> ``86_01``."""
-    return Path(_ungzipped(path)).stem
+    return Path(unpacked_name(path.name)).stem
 
 
 def cmu_subject(name: str) -> str:
@@ -89,30 +77,85 @@ def bad_file(path: Path, found: str, expected: str) -> RecordingError:
 
 
 def is_file(path: Path) -> bool:
-    """Whether a path is a regular file: no folder, no pipe, no device, and no nonsense."""
-    return _is(path, stat.S_ISREG)
-
-
-def is_folder(path: Path) -> bool:
-    """Whether a path is a folder."""
-    return _is(path, stat.S_ISDIR)
-
-
-def _is(path: Path, kind: Callable[[int], bool]) -> bool:
+    """Whether a path is a regular file, also in an archive: no folder, pipe, device or nonsense."""
     try:
-        return kind(path.stat().st_mode)
+        return stat.S_ISREG(path.stat().st_mode)
+    except NotADirectoryError:  # it leads through a file
+        return _inside(path) is not None
     except (OSError, ValueError):  # too long a name, too many links, a null character
         return False
 
 
+def is_folder(path: Path) -> bool:
+    """Whether a path is a folder, also in an archive; an archive itself is a file."""
+    try:
+        return stat.S_ISDIR(path.stat().st_mode)
+    except NotADirectoryError:
+        at = archive_of(path / "file")
+        return at is not None and bool(contents(path))
+    except (OSError, ValueError):
+        return False
+
+
+def may_be_read(path: Path) -> bool:
+    """Whether a file may be read by who asks."""
+    return os.access(path, os.R_OK) or _inside(path) is not None
+
+
+def within(path: Path) -> list[Path]:
+    """Return what lies in a folder, an archive or a folder in one, in order.
+
+    Not what macOS keeps of a file beside it, ``._one.bvh``.
+
+    Raises:
+        OSError: A folder may not be read.
+        RecordingError: An archive cannot be looked into.
+    """
+    if path.is_dir():
+        return sorted(each for each in path.iterdir() if not each.name.startswith("._"))
+    names = {file.relative_to(path).parts[0] for file in contents(path)}
+    return sorted(path / name for name in names)
+
+
+def contents(path: Path) -> list[Path]:
+    """Return the files in an archive, or in a folder in one, that may be recordings, in order.
+
+    Raises:
+        RecordingError: It cannot be looked into.
+    """
+    archive, _ = archive_of(path / "file") or (path, "")
+    try:
+        inside = [archive / name for name in recordings_in(archive)]
+    except ArchiveError as error:
+        raise bad_file(archive, error.found, error.expected) from error
+    return [file for file in inside if path in file.parents]
+
+
+def size_of(path: Path) -> int:
+    """Return the size of a file, also in an archive [bytes]; -1 where there is none."""
+    inside = _inside(path)
+    if inside is not None:
+        return inside.size
+    return path.stat().st_size if is_file(path) else -1
+
+
+def _inside(path: Path) -> Member | None:
+    """Return the file in an archive that a path leads to; None where it does not."""
+    at = archive_of(path)
+    try:
+        return None if at is None else members(at[0]).get(at[1])
+    except ArchiveError:
+        return None
+
+
 def head(path: Path, n_bytes: int = 8192) -> bytes:
-    """Return the start of a file, unpacked where it is gzipped; empty if unreadable."""
+    """Return the start of a file, unpacked where it is packed; empty if unreadable."""
     if not is_file(path):
         return b""
     try:
         with _opened(path) as file:
             return _start(file, n_bytes)
-    except (OSError, EOFError, zlib.error, *_ZIP_DAMAGE):
+    except (*DAMAGE, ArchiveError):
         return b""
 
 
@@ -123,30 +166,30 @@ def head_text(path: Path, n_bytes: int = 8192) -> str:
 
 
 def read_bytes(path: Path) -> bytes:
-    """Return the content of a file, unpacked where it is gzipped, or alone in a zip archive.
+    """Return the content of a file, unpacked where it is packed, or in an archive.
 
     Raises:
         RecordingError: The file is missing, empty, unreadable, no regular file, a packed file that
             is damaged or expands beyond what measured motion does, or what was saved instead of a
-            recording: a pointer to it, a page of the web, an archive of several.
+            recording: a pointer to it, a page of the web, an archive.
     """
     if not is_file(path):
         raise bad_file(path, "no such file", "a readable file")
-    packed = False
+    inside, how = _inside(path), ""
     try:
-        packed = _is_packed(path)
-        limit = path.stat().st_size
-        if packed:
-            limit = max(_SMALL_BYTES, _MOST_PACKED * limit)
+        with _raw(path) as file:
+            how = packing(file.read(STARTS))
+        size = path.stat().st_size if inside is None else inside.packed
+        limit = most_unpacked(size) if how or inside else size
         with _opened(path) as file:
             data = _start(file, limit + 1)
-    except (OSError, EOFError, zlib.error, *_ZIP_DAMAGE) as error:
-        if packed and not (isinstance(error, OSError) and error.errno):
-            whole = "gzip file" if _starts(path) == _GZIP else "zip archive"
+    except (*DAMAGE, ArchiveError) as error:
+        if (how or inside) and not (isinstance(error, OSError) and error.errno):
+            whole = f"{how} file" if how else "archive"
             raise bad_file(path, f"damaged ({error})", f"a whole {whole}") from error
         reason = getattr(error, "strerror", None) or error
         raise bad_file(path, f"cannot be read ({reason})", "a readable file") from error
-    if packed and len(data) > limit:
+    if len(data) > limit and (how or inside):
         raise bad_file(path, f"expands to more than {limit} bytes", "a recording of motion")
     if not data.strip():
         raise _empty(path)
@@ -164,19 +207,8 @@ def _refuse_other_files(path: Path, data: bytes) -> None:
     for begins, found, expected in _NO_RECORDINGS:
         if start.startswith(begins):
             raise bad_file(path, f"it is {found}, not a recording", expected)
-    if data.startswith(_ZIP) and data[_ZIP_NAME:].startswith(b"header.json"):
-        raise bad_file(
-            path, "it is a library of primitives, not a recording", "a recording of motion"
-        )
     if data.startswith(_ZIP) and suffix(path) != ".npz":
-        inside = _recordings_in(path)
-        if _WORKBOOK in inside:
-            raise bad_file(path, "it is a file of an office program", "a table saved as CSV")
-        shown = ", ".join(inside[:_MOST_NAMED]) + (", ..." if len(inside) > _MOST_NAMED else "")
-        found = f"it is a zip archive of {len(inside)} files ({shown})"
-        if not inside:
-            found = "it is a zip archive without a recording, or damaged"
-        raise bad_file(path, found, "one recording in it, or the files unpacked")
+        raise bad_file(path, "it is an archive", "a recording, or the archive unpacked")
 
 
 def read_text(path: Path) -> str:
@@ -259,14 +291,22 @@ def _plain(data: bytes) -> bytes:
     return data.decode(encoding, errors="replace").encode("utf-8", errors="replace")
 
 
-def _opened(path: Path) -> BufferedIOBase:
-    if _starts(path) == _GZIP:
-        return gzip.open(path)
-    inside = _only_recording(path) if _is_packed(path) else ""
-    if not inside:
-        return path.open("rb")
-    with zipfile.ZipFile(path) as archive:  # keeps the file open as long as what is in it
-        return cast("BufferedIOBase", archive.open(inside))
+@contextmanager
+def _opened(path: Path) -> Iterator[BufferedIOBase]:
+    """Open a file, unpacked where it is packed, whatever it is called."""
+    with _raw(path) as file:
+        how = packing(file.read(STARTS))
+    with _raw(path) as file:
+        if how:
+            with unpacking(file, how) as unpacked:
+                yield unpacked
+        else:
+            yield file
+
+
+def _raw(path: Path) -> BufferedIOBase:
+    at = archive_of(path)
+    return path.open("rb") if at is None else open_member(*at)
 
 
 def _start(file: BufferedIOBase, n_bytes: int) -> bytes:
@@ -274,42 +314,9 @@ def _start(file: BufferedIOBase, n_bytes: int) -> bytes:
 
     There bzip2 and LZMA unpack all that they are given, however few bytes are asked for.
     """
-    if not isinstance(file, zipfile.ZipExtFile):
+    if not isinstance(file, ZipExtFile):
         return file.read(n_bytes)
     data = bytearray()
     while len(data) < n_bytes and (piece := file.read(min(_PIECE, n_bytes - len(data)))):
         data += piece
     return bytes(data)
-
-
-def _is_packed(path: Path) -> bool:
-    """Whether a file is gzipped, as browsers unpack and leave its name, or alone in an archive."""
-    start = _starts(path)
-    return start == _GZIP or (start == _ZIP[: len(_GZIP)] and bool(_only_recording(path)))
-
-
-def _starts(path: Path) -> bytes:
-    with path.open("rb") as file:
-        return file.read(len(_GZIP))
-
-
-def _only_recording(path: Path) -> str:
-    """Return the name of the file that is alone in a zip archive; empty for none, and for more."""
-    inside = _recordings_in(path)
-    return inside[0] if len(inside) == 1 else ""
-
-
-def _recordings_in(path: Path) -> list[str]:
-    """Return the files in a zip archive that may be recordings; none where it is no archive."""
-    if Path(_ungzipped(path)).suffix.lower() == ".npz" or not is_file(path):
-        return []  # an archive of arrays is one recording
-    try:
-        with zipfile.ZipFile(path) as archive:
-            names = archive.namelist()
-    except (OSError, *_ZIP_DAMAGE):
-        return []
-    return [name for name in names if not name.endswith("/") and not _BESIDE.search(name)]
-
-
-def _ungzipped(path: Path) -> str:
-    return path.name[:-3] if path.name.lower().endswith(".gz") else path.name

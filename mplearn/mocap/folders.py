@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import RecordingError
-from .files import bad_file, is_file, is_folder, suffix
+from .archives import is_archive, named_archive
+from .files import bad_file, is_file, is_folder, may_be_read, read_bytes, suffix, within
 from .registry import suffixes
 
 
@@ -64,7 +65,8 @@ def folders_in(path: Path) -> FoundFolders:
 def no_files(folder: Path) -> dict[str, RecordingError]:
     """Return why not, by name, for what a folder holds that is called as recordings are.
 
-    Links that lead nowhere, pipes and devices, and files that may not be read.
+    Links that lead nowhere, pipes and devices, files that may not be read, and what is called as
+    archives are and is none, or lies in one.
 
     Example:
         >>> import os
@@ -75,8 +77,11 @@ def no_files(folder: Path) -> dict[str, RecordingError]:
         linked/walk.csv: a link to elsewhere.csv, where nothing is; expected a recording
     """
     found = {}
-    for each in sorted(folder.iterdir()):
-        if suffix(each) in suffixes():
+    for each in within(folder):
+        if named_archive(each) and not is_archive(each) and may_be_read(each):
+            found[each.name] = _no_archive(each)
+            continue
+        if suffix(each) in suffixes() or named_archive(each):
             problem = _problem(each)
         else:  # what a name without a suffix links to may be a folder
             problem = "" if suffix(each) or not _is_link(each) else _problem(each)
@@ -85,12 +90,21 @@ def no_files(folder: Path) -> dict[str, RecordingError]:
     return found
 
 
+def _no_archive(path: Path) -> RecordingError:
+    """Return why what is called as archives are is not looked into."""
+    try:
+        read_bytes(path)
+    except RecordingError as error:  # as a page of the web that was saved instead
+        return error
+    return bad_file(path, "it is no archive", "one, or a recording called as those of its format")
+
+
 def _problem(path: Path) -> str:
     """Return why a path cannot be read; empty where it can, or is a folder."""
     if is_folder(path):
         return ""
     if is_file(path):
-        return "" if os.access(path, os.R_OK) else "a file that may not be read"
+        return "" if may_be_read(path) else "a file that may not be read"
     if _is_link(path):
         return f"a link to {path.readlink()}, where nothing is"
     if not os.path.lexists(path):  # in a folder whose names may be read, and nothing else

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..recording import LabelledSegment, Recording
-from .files import bad_file, cmu_subject, read_text, stem
+from .files import bad_file, cmu_subject, is_file, read_text, stem
 
 # fmt: off
 CMU13_EXERCISES = (
@@ -38,10 +38,10 @@ def labels_beside(path: Path, recording: Recording) -> tuple[LabelledSegment, ..
         RecordingError: The labels are damaged, or reach beyond the recording.
     """
     track = path.parent / f"{stem(path)}.txt"
-    if cmu_subject(stem(path)) and track != path and track.is_file():
+    if cmu_subject(stem(path)) and track != path and is_file(track):
         return _class_track(track, recording)
     table = path.parent / "labels_parsed.json"
-    if table.is_file():
+    if is_file(table):
         return _table(table, recording)
     return ()
 

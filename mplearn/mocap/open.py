@@ -15,7 +15,8 @@ import numpy as np
 
 from ..errors import RecordingError, RecordingWarning
 from ..recording import ReadReport, Recording
-from .files import bad_file, is_file, is_folder, stem
+from .archives import archive_kind, archive_of, is_archive
+from .files import bad_file, contents, is_file, is_folder, may_be_read, size_of, stem, within
 from .folders import folders_in, no_files
 from .keypoints.tables import DeepLabCutReader, KeyPointsReader, SLEAPReader
 from .labels import labels_beside
@@ -83,9 +84,10 @@ def open_recording(
     r"""Read one recording.
 
     Args:
-        path: A file of any format that a reader is registered for, plain or gzipped, or a folder.
-        take: Which take of a folder: UI-PRMD's ``"m01_s01"``, a file's name without its suffix, or
-            with it where two formats hold the same take.
+        path: A file of any format that a reader is registered for, plain or packed (gzip, bzip2,
+            xz), a folder, an archive (zip, tar), or what is in one: ``"session.zip/one.bvh"``.
+        take: Which take of a folder or archive: UI-PRMD's ``"m01_s01"``, a file's name without its
+            suffix, or with it where two formats hold the same take.
         rate_hz: Resample to this rate [1/s]; by default the file's own.
         positions: For skeletal files (AMC, BVH): joint-centre positions as markers [m] instead of
             joint angles [rad].
@@ -112,7 +114,11 @@ def open_recording(
     """
     takes = _takes(Path(path))
     if take is None and len(takes) > 1:
-        raise RecordingError(f"{path}: {len(takes)} takes; expected take= one of {_listed(takes)}")
+        at = Path(path)
+        what = f"it is a {archive_kind(at)} archive of " if is_archive(at) else ""
+        raise RecordingError(
+            f"{path}: {what}{len(takes)} takes; expected take= one of {_listed(takes)}"
+        )
     name = next(iter(takes)) if take is None else take
     if name not in takes:
         raise RecordingError(f"{path}: no take {take!r}; expected one of {_listed(takes)}")
@@ -201,15 +207,7 @@ def open_takes(
         [('quick', 50.0), ('slow', 50.0)]
     """
     found: list[Recording] = []
-    unreadable: dict[str, RecordingError] = {}
-    try:
-        takes = _takes(Path(path))
-        unreadable |= no_files(Path(path)) if is_folder(Path(path)) else {}
-    except NothingReadableError:
-        unreadable |= no_files(Path(path))
-        if not unreadable:
-            raise
-        takes = {}
+    takes, unreadable = _found_in(Path(path))
     if unreadable and (strict or not takes):
         raise next(iter(unreadable.values()))
     for name, take in takes.items():
@@ -318,18 +316,18 @@ def find_takes(path: str | os.PathLike[str]) -> FoundTakes:
     for folder in folders:
         parts = folder.relative_to(path).parts
         try:
-            if is_folder(folder):
-                problems = no_files(folder)
-                unreadable |= {"/".join((*parts, name)): e for name, e in problems.items()}
-            takes = _takes(folder)
+            takes, problems = _found_in(folder)
         except NothingReadableError:
             continue
         except RecordingError as error:
             unreadable[_named(path, folder)] = error
             continue
+        unreadable |= {"/".join((*parts, name)): error for name, error in problems.items()}
         for name, take in takes.items():
-            person = take.person or (parts[0] if parts else "")
-            found.append(replace(take, name="/".join((*parts, name)), person=person))
+            whole = "/".join((*parts, name))
+            folder_of = parts[0] if parts else stem(Path(whole.split("/")[0]))  # or an archive
+            person = take.person or (folder_of if "/" in whole else "")
+            found.append(replace(take, name=whole, person=person))
     if not found:
         raise next(iter(unreadable.values()), _nothing_readable(path))
     return FoundTakes(tuple(sorted(found, key=lambda take: take.name)), unreadable)
@@ -341,37 +339,107 @@ def _named(path: Path, folder: Path) -> str:
 
 
 def _nothing_readable(path: Path) -> RecordingError:
+    what = "an archive" if is_archive(path) else "a folder"
     return NothingReadableError(
-        f"{path}: a folder with nothing readable; expected files named {', '.join(suffixes())}"
+        f"{path}: {what} with nothing readable; expected files named {', '.join(suffixes())}"
     )
 
 
 def _takes(path: Path) -> dict[str, TakeFiles]:
     """Return the files of each take, by name."""
+    takes, unreadable = _found_in(path)
+    if not takes:
+        raise next(iter(unreadable.values()))
+    return takes
+
+
+def _found_in(path: Path) -> tuple[dict[str, TakeFiles], dict[str, RecordingError]]:
+    """Return the files of each take, and why something is none, by name; not both are empty."""
     if is_file(path):
+        if is_archive(path):
+            return _found_in_archive(path)
         name, reader = stem(path), reader_for(path)
-        return {name: TakeFiles(name, reader.person(name), (path,), reader)}
+        return {name: TakeFiles(name, reader.person(name), (path,), reader)}, {}
     if not is_folder(path):
         raise bad_file(path, "no such file or folder", "a recording or a folder of recordings")
+    return _found_in_folder(path)
+
+
+def _found_in_folder(path: Path) -> tuple[dict[str, TakeFiles], dict[str, RecordingError]]:
+    """Return the takes in a folder, an archive or a folder in one, and not in folders in it."""
     files: dict[Reader, list[Path]] = {}
     try:
-        within = sorted(path.iterdir())
+        inside = within(path)
     except OSError as error:
         raise bad_file(path, f"{error.strerror}", "a folder that may be read") from error
-    for file in within:
-        fitting = reader_of(file) if os.access(file, os.R_OK) else None
-        if fitting is not None:
+    unreadable = no_files(path)
+    named: list[tuple[str, TakeFiles]] = []  # and what it is called where its name is not its own
+    for file in inside:
+        if is_archive(file):
+            try:
+                takes, problems = _found_in_archive(file, beside=True)
+            except RecordingError as error:
+                unreadable[file.name] = error
+                continue
+            inner = f"{file.name}/"
+            unreadable |= {inner + name: error for name, error in problems.items()}
+            if len(takes) == 1:
+                named += [(file.name, take) for take in takes.values()]
+            else:
+                named += [(inner + n, replace(t, name=inner + n)) for n, t in takes.items()]
+        elif may_be_read(file) and (fitting := reader_of(file)) is not None:
             files.setdefault(fitting, []).append(file)
-    found = [
-        TakeFiles(name, reader.person(name), take, reader)
-        for reader, group in files.items()
-        for name, take in reader.takes(group).items()
-    ]
-    if not found:
+    for reader, group in files.items():
+        for name, taken in reader.takes(group).items():
+            named.append((taken[0].name, TakeFiles(name, reader.person(name), taken, reader)))
+    if not named and not unreadable:
         raise _nothing_readable(path)
-    times = Counter(take.name for take in found)
-    takes = (replace(t, name=t.files[0].name) if times[t.name] > 1 else t for t in found)
-    return {take.name: take for take in sorted(takes, key=lambda take: take.name)}
+    times = Counter(take.name for _, take in named)
+    takes = {t.name if times[t.name] == 1 else whole: t for whole, t in named}
+    return {name: replace(takes[name], name=name) for name in sorted(takes)}, unreadable
+
+
+def _found_in_archive(
+    path: Path, *, beside: bool = False
+) -> tuple[dict[str, TakeFiles], dict[str, RecordingError]]:
+    """Return the takes in an archive as those of a folder; one alone is called as the archive.
+
+    Args:
+        path: The archive.
+        beside: Whether it is refused where its files lie unpacked beside it, as they are found too.
+    """
+    files, called = contents(path), stem(path)
+    if beside and files and all(_lies_unpacked(file, path, len(files) > 1) for file in files):
+        raise bad_file(path, "what is in it lies unpacked beside it", "each take once")
+    if len(files) == 1:
+        reader = reader_for(files[0])
+        return {called: TakeFiles(called, reader.person(called), (files[0],), reader)}, {}
+    takes: dict[str, TakeFiles] = {}
+    unreadable: dict[str, RecordingError] = {}
+    for folder in sorted({file.parent for file in files}):
+        inner = "".join(f"{part}/" for part in folder.relative_to(path).parts)
+        try:
+            found, problems = _found_in_folder(folder)
+        except NothingReadableError:
+            continue
+        except RecordingError as error:
+            unreadable[inner or called] = error
+            continue
+        takes |= {inner + name: take for name, take in found.items()}
+        unreadable |= {inner + name: error for name, error in problems.items()}
+    if not takes and not unreadable:
+        raise _nothing_readable(path)
+    if len(takes) == 1:
+        takes = {called: next(iter(takes.values()))}
+    return {name: replace(takes[name], name=name) for name in sorted(takes)}, unreadable
+
+
+def _lies_unpacked(file: Path, archive: Path, several: bool) -> bool:
+    """Whether a file in an archive also lies in its folder, or in one that is called like it."""
+    if not several and stem(file) != stem(archive):
+        return False
+    at = archive.parent, archive.parent / stem(archive)
+    return any(size_of(each / file.relative_to(archive)) == size_of(file) for each in at)
 
 
 def _read(
@@ -381,7 +449,7 @@ def _read(
     for file in take.files:
         # numbers that no one measured overflow: what comes of them is checked, and refused
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            read = take.reader.read(file, hints or Hints(), positions=positions)
+            read = _read_by(take.reader, file, hints or Hints(), positions=positions)
         part = _recording(read, file, take.reader)
         if not part.labels:
             part = replace(part, labels=labels_beside(file, part))
@@ -389,6 +457,8 @@ def _read(
             part = replace(part, report=ReadReport(take.reader.format, part.rate_hz))
         if hints is not None and hints.mirrored:
             part = right_handed(file, part)
+        if archive_of(file) is not None:  # of which folders may hold files of one name
+            part = replace(part, name=take.name)
         parts.append(part)
     recording = parts[0] if len(parts) == 1 else joined(take.name, parts)
     if hints is not None and hints.level:
@@ -396,6 +466,14 @@ def _read(
     else:
         recording = told_of_lean(recording)
     return recording if rate_hz is None else resample(recording, rate_hz)
+
+
+def _read_by(reader: Reader, file: Path, hints: Hints, *, positions: bool) -> object:
+    try:
+        return reader.read(file, hints, positions=positions)
+    except NotADirectoryError as error:
+        own = f"{type(reader).__name__} opens files itself, and cannot open one in an archive"
+        raise bad_file(file, own, "the archive unpacked, or a reader by read_bytes") from error
 
 
 def _recording(read: object, file: Path, reader: Reader) -> Recording:

@@ -84,7 +84,14 @@ def reader_of(path: Path, *, any_suffix: bool = False) -> Reader | None:
         return None
     start = _XML.sub("", head_text(path, _TELLING).lstrip().upper())
     fitting = (r for r in readers() if suffix(path) in r.suffixes or start.startswith(r.begins))
-    return next((reader for reader in fitting if reader.accepts(path)), None)
+    return next((reader for reader in fitting if _accepts(reader, path)), None)
+
+
+def _accepts(reader: Reader, path: Path) -> bool:
+    try:
+        return reader.accepts(path)
+    except NotADirectoryError:  # it opens files itself, and not those in archives
+        return False
 
 
 def reader_for(path: Path) -> Reader:

@@ -79,7 +79,7 @@ def test_what_is_in_an_archive_is_named(tmp_path: Path) -> None:
     with ZipFile(path, "w") as archive:
         for name in ("walk.bvh", "run.bvh"):
             archive.writestr(name, write(tmp_path, "BVH").read_bytes())
-    with pytest.raises(RecordingError, match=r"2 files \(walk.bvh, run.bvh\)"):
+    with pytest.raises(RecordingError, match=r"zip archive of 2 takes; expected .* run, walk"):
         open_recording(path)
     with ZipFile(path, "w") as archive:
         archive.writestr("[Content_Types].xml", "<xml/>")

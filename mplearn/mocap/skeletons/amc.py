@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...recording import FloatArray, Recording
-from ..files import bad_file, cmu_subject, read_text, stem, suffix
+from ..files import bad_file, cmu_subject, read_text, stem, suffix, within
 from ..findings import Findings
 from ..numbers import numbers
 from ..placing.space import Space
@@ -69,7 +69,7 @@ def _skeleton_file(path: Path, hints: Hints, findings: Findings) -> Path | None:
         return Path(hints.skeleton)
     own = stem(path).lower()
     named = {own, cmu_subject(own)}
-    beside = sorted(file for file in path.parent.iterdir() if suffix(file) == ".asf")
+    beside = sorted(file for file in within(path.parent) if suffix(file) == ".asf")
     starts = []
     for file in beside:
         name = stem(file).lower()

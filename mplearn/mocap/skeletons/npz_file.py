@@ -18,6 +18,7 @@ from numpy.lib import format as npy
 from ...errors import RecordingError
 from ...recording import FloatArray
 from ..files import bad_file, head, read_bytes
+from ..packing import most_unpacked
 
 RATES = (
     *("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps", "mocap_fps"),
@@ -31,8 +32,6 @@ LENGTHS = ("mocap_time_length", "time_length", "duration", "duration_s")
 _USUAL_HZ = (24, 25, 29.97, 30, 50, 59.94, 60, 90, 100, 119.88, 120, 125, 150, 200, 240, 250, 300)
 _ROUNDED = 3e-4  # of a length that is said
 _EXPECTED = "plain arrays of NumPy (.npy, or .npz)"
-_MOST_PACKED = 60  # times; measured numbers pack to a half or so
-_SMALL_BYTES = 4_000_000
 _HEADER_BYTES = 1000
 _DAMAGE = (zipfile.BadZipFile, zlib.error, OSError, EOFError, ValueError, KeyError, struct.error,
            NotImplementedError, RuntimeError, SyntaxError, TypeError, TokenError,
@@ -132,7 +131,7 @@ class NPZFile(Arrays):
 
     def __init__(self, path: Path) -> None:
         data = read_bytes(path)
-        self._limit = max(_SMALL_BYTES, _MOST_PACKED * len(data))
+        self._limit = most_unpacked(len(data))
         try:
             self._archive = zipfile.ZipFile(io.BytesIO(data))
             members = self._archive.infolist()

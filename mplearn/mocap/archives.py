@@ -1,0 +1,254 @@
+"""Archives as folders: a path may lead into one, ``session.zip/walks/one.bvh``."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import tarfile
+import tempfile
+import zipfile
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path, PurePosixPath
+from threading import Lock
+from typing import IO, NamedTuple, cast
+
+from .packing import DAMAGE, STARTS, most_unpacked, packing, unpacking
+
+_ZIP_STARTS = (b"PK\x03\x04", b"PK\x05\x06")  # of one with files, of an empty one
+_OTHERS = {b"7z\xbc\xaf\x27\x1c": "a 7z", b"Rar!\x1a\x07": "a RAR"}
+_TAR, _TAR_AT = b"ustar", 257
+_OF_TAR = re.compile(r"\.(?:tar|t[bgx]z2?|tar\.(?:gz|bz2|xz))\Z", re.IGNORECASE)
+_OF_OTHERS = re.compile(r"\.(?:zip|7z|rar|tzst|tar\.zst)\Z", re.IGNORECASE)
+_OF_ARRAYS = re.compile(r"\.npz(?:\.gz)?\Z", re.IGNORECASE)
+# what lies beside recordings in an archive, and is none
+_BESIDE = re.compile(
+    r"(?:^|/)(?:__MACOSX/|\.|desktop\.ini$|thumbs\.db$|(?:read ?me|licen[cs]e)[^/]*$)"
+    r"|\.(?:pdf|md|html?|rtf|docx?|png|jpe?g|gif|mp4|avi|mov|fbx|blend)$",
+    re.IGNORECASE,
+)
+_WORKBOOK = "[Content_Types].xml"  # of programs for offices
+_LIBRARY = "header.json"  # of a library of primitives
+_ENCRYPTED = 1  # flag of a file in a zip archive
+_PIECE = 65_536
+
+
+class ArchiveError(Exception):
+    """What a file is that cannot be looked into, and what is expected instead."""
+
+    def __init__(self, found: str, expected: str) -> None:
+        super().__init__(found)
+        self.found, self.expected = found, expected
+
+
+class Member(NamedTuple):
+    """A file in an archive.
+
+    Attributes:
+        packed: Its size there [bytes].
+        size: Its size unpacked, as the archive says [bytes].
+    """
+
+    packed: int
+    size: int
+
+
+def is_archive(path: Path) -> bool:
+    """Whether a file is an archive of files, by its start; one of arrays (npz) is none.
+
+    Example:
+        >>> with zipfile.ZipFile("walks.zip", "w") as made:
+        ...     made.writestr("slow.bvh", "HIERARCHY")
+        >>> is_archive(Path("walks.zip"))
+        True
+    """
+    if _OF_ARRAYS.search(path.name):
+        return False
+    try:
+        if not path.is_file():
+            return False
+        with path.open("rb") as file:
+            start = file.read(_TAR_AT + len(_TAR))
+    except (OSError, ValueError):
+        return False
+    if start.startswith((*_ZIP_STARTS, *_OTHERS)):
+        return True
+    of_tar = bool(packing(start)) or start[_TAR_AT:] == _TAR
+    return of_tar and _OF_TAR.search(path.name) is not None
+
+
+def named_archive(path: Path) -> bool:
+    """Whether a file is called as archives are."""
+    return any(named.search(path.name) is not None for named in (_OF_TAR, _OF_OTHERS))
+
+
+def archive_kind(path: Path) -> str:
+    """Return what kind of archive a file is by its name."""
+    return "tar" if _OF_TAR.search(path.name) else "zip"
+
+
+def archive_of(path: Path) -> tuple[Path, str] | None:
+    """Return the archive that a path leads into, and the name there; None where it does not."""
+    with suppress(OSError, ValueError):  # not to be known, or no name of a file
+        if path.exists():
+            return None
+        at = next(parent for parent in path.parents if parent.exists())
+        if at.is_file() and is_archive(at):
+            return at, path.relative_to(at).as_posix()
+    return None
+
+
+def members(archive: Path) -> dict[str, Member]:
+    """Return the files in an archive, by name.
+
+    Raises:
+        ArchiveError: It cannot be looked into, or is something else that is packed so.
+    """
+    files = _opened(archive).files
+    if _WORKBOOK in files:
+        raise ArchiveError("it is a file of an office program", "a table saved as CSV")
+    if next(iter(files), "") == _LIBRARY:
+        raise ArchiveError(
+            "it is a library of primitives, not a recording", "a recording of motion"
+        )
+    return files
+
+
+def recordings_in(archive: Path) -> tuple[str, ...]:
+    """Return the files in an archive that may be recordings, in order; see `members`."""
+    return tuple(sorted(name for name in members(archive) if not _BESIDE.search(name)))
+
+
+def open_member(archive: Path, name: str) -> io.BufferedIOBase:
+    """Open a file in an archive; see `members`."""
+    return _opened(archive).open(name)
+
+
+def _opened(path: Path) -> _Archive:
+    try:
+        known = path.stat()
+        return _open(path.absolute(), known.st_ino, known.st_mtime_ns, known.st_size, os.getpid())
+    except DAMAGE as error:
+        if isinstance(error, OSError) and error.errno:
+            raise ArchiveError(f"cannot be read ({error.strerror})", "a readable file") from error
+        raise ArchiveError(f"damaged ({error})", f"a whole {archive_kind(path)} archive") from error
+
+
+@lru_cache(maxsize=4)
+def _open(path: Path, *_: int) -> _Archive:
+    """Open an archive once, as long as it is what it was: each process by itself."""
+    with path.open("rb") as file:
+        start = file.read(STARTS)
+    for begins, what in _OTHERS.items():
+        if start.startswith(begins):
+            raise ArchiveError(
+                f"it is {what} archive, not a recording", "the files unpacked, or a zip archive"
+            )
+    return _Zip(path) if start.startswith(_ZIP_STARTS) else _Tar(path)
+
+
+class _Archive(ABC):
+    """An archive that is open; ``files`` is what is in it, by name."""
+
+    files: dict[str, Member]
+
+    @abstractmethod
+    def open(self, name: str) -> io.BufferedIOBase:
+        """Open a file in it."""
+
+
+class _Zip(_Archive):
+    def __init__(self, path: Path) -> None:
+        self._file = zipfile.ZipFile(path)
+        files = [info for info in self._file.infolist() if not info.is_dir()]
+        if any(info.flag_bits & _ENCRYPTED for info in files):
+            raise ArchiveError("it is encrypted", "an archive that needs no password")
+        _refuse_endless(path.stat().st_size, (info.file_size for info in files))
+        self._named = {_plain(info.filename): info for info in files}
+        self.files = {
+            name: Member(info.compress_size, info.file_size) for name, info in self._named.items()
+        }
+
+    def open(self, name: str) -> io.BufferedIOBase:
+        return cast("io.BufferedIOBase", self._file.open(self._named[name]))
+
+
+class _Tar(_Archive):
+    """A tar archive; one that is packed is unpacked as a whole, once, into a nameless file."""
+
+    def __init__(self, path: Path) -> None:
+        self._file = _unpacked(path)
+        self._lock = Lock()
+        self._at: dict[str, tuple[int, int]] = {}
+        with tarfile.open(fileobj=self._file, mode="r:") as archive:
+            before = -1
+            while (info := archive.next()) is not None:
+                if archive.offset <= before:  # a negative size leads back, again and again
+                    raise tarfile.ReadError("a file ends before it begins")
+                before = archive.offset
+                archive.members = []  # type: ignore[attr-defined] # else it keeps all of them
+                if info.isreg() and not info.issparse():
+                    self._at[_plain(info.name)] = info.offset_data, info.size
+        _refuse_endless(self._file.seek(0, os.SEEK_END), (size for _, size in self._at.values()))
+        self.files = {name: Member(size, size) for name, (_, size) in self._at.items()}
+
+    def __del__(self) -> None:
+        with suppress(AttributeError):  # where it could not be opened
+            self._file.close()
+
+    def open(self, name: str) -> io.BufferedIOBase:
+        return io.BufferedReader(_Part(self._file, self._lock, *self._at[name]))
+
+
+class _Part(io.RawIOBase):
+    """A part of a file, of which others read other parts."""
+
+    def __init__(self, file: IO[bytes], lock: Lock, begin: int, size: int) -> None:
+        self._file, self._lock, self._at, self._end = file, lock, begin, begin + size
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, into: object) -> int:
+        view = memoryview(cast("bytearray", into))
+        with self._lock:
+            self._file.seek(self._at)
+            found = self._file.read(min(len(view), self._end - self._at))
+        view[: len(found)] = found
+        self._at += len(found)
+        return len(found)
+
+
+def _unpacked(path: Path) -> IO[bytes]:
+    """Return an open tar archive, unpacked where it is packed."""
+    file = path.open("rb")
+    how = packing(file.read(STARTS))
+    file.seek(0)
+    if not how:
+        return file
+    whole = cast("IO[bytes]", tempfile.TemporaryFile())  # noqa: SIM115 (open as long as needed)
+    try:
+        with file, unpacking(file, how) as unpacked:
+            while piece := unpacked.read(_PIECE):
+                whole.write(piece)
+                _refuse_endless(path.stat().st_size, (whole.tell(),))
+    except BaseException:
+        whole.close()
+        raise
+    whole.seek(0)
+    return whole
+
+
+def _refuse_endless(packed: int, sizes: Iterable[int]) -> None:
+    limit = most_unpacked(packed)
+    if sum(sizes) > limit:
+        raise ArchiveError(f"expands to more than {limit} bytes", "recordings of motion")
+
+
+def _plain(name: str) -> str:
+    r"""Return a name in an archive, as a path in it: ``.\walks\\one.bvh`` -> ``walks/one.bvh``."""
+    parts = PurePosixPath(name.replace("\\", "/")).parts
+    return "/".join(part for part in parts if part not in ("/", "..", "//"))
