@@ -349,7 +349,8 @@ def _takes(path: Path) -> dict[str, TakeFiles]:
     """Return the files of each take, by name."""
     takes, unreadable = _found_in(path)
     if not takes:
-        raise next(iter(unreadable.values()))
+        first = next(iter(unreadable.values()))
+        raise NothingReadableError(f"{_nothing_readable(path)}; there is {first}")
     return takes
 
 
