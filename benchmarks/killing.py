@@ -2,7 +2,8 @@
 
 Each time it goes on from what the last one left, and that must be, bit for bit, what a run without
 end would know there; nothing that was said to be written may be missing. Some are killed inside a
-checkpoint or a migration. Linux and macOS only: processes are forked.
+checkpoint or a migration, none after the end of the stream, which has none. Linux and macOS only:
+processes are forked.
 """
 
 import argparse
@@ -12,6 +13,7 @@ import sqlite3
 import struct
 import tempfile
 import time
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +27,7 @@ from mplearn.store.store import Store
 
 CHANNELS, RATE_HZ = ("a", "b", "c", "d"), 50.0
 CHUNK = round(RATE_HZ)
+PER_KILL_S = 60.0  # of stream: more than is learned before a kill
 
 
 def stream(seconds: float, seed: int = 0, n_motions: int = 4) -> FloatArray:
@@ -79,8 +82,8 @@ def act(life: LifelongLearner, asked: int) -> None:
 def live(path: Path, frames: FloatArray, told: int, seed: int) -> None:
     """Learn until killed; tell how much is written for certain."""
     rng = np.random.default_rng(seed)
-    if seed % 5 == 3:
-        _die_in_checkpoint(int(rng.integers(1, 6)))
+    if dies_in_checkpoint(seed):
+        _die_in_checkpoint(int(rng.integers(1, 6)), written=bool(rng.integers(2)))
     with LifelongLearner.open(path, learner, checkpoint_s=2) as life:
         while life.n_frames < len(frames):
             step(life, frames, int(rng.integers(1, 80)))
@@ -91,16 +94,22 @@ def live(path: Path, frames: FloatArray, told: int, seed: int) -> None:
                 os.write(told, struct.pack("qq", written, life.number))
 
 
-def _die_in_checkpoint(after: int) -> None:
-    """Be killed inside a checkpoint, after some transactions."""
+def dies_in_checkpoint(seed: int) -> bool:
+    """Say whether who learns is killed inside a checkpoint, not at a moment of its time."""
+    return seed % 5 == 3
+
+
+def _die_in_checkpoint(after: int, *, written: bool) -> None:
+    """Be killed inside a checkpoint, after some: before or after it is written, uncommitted."""
     left = [after]
     write = writer.write_checkpoint
 
     def dying(*args: object) -> None:
         left[0] -= 1
+        if written or left[0] > 0:
+            write(*args)  # type: ignore[arg-type]
         if left[0] <= 0:
             os.kill(os.getpid(), signal.SIGKILL)
-        write(*args)  # type: ignore[arg-type]
 
     writer.write_checkpoint = dying
 
@@ -126,8 +135,13 @@ def made_old(path: Path) -> None:
     connection.close()
 
 
-def forked(do: object, *args: object, killed_after_s: float | None = None) -> None:
-    """Do something in a process of its own, which is killed after some processor time of its."""
+def forked(do: object, *args: object, killed_after_s: float | None = None) -> str:
+    """Do something in a process of its own, which is killed after some processor time of its.
+
+    Returns:
+        How it ended: "killed"; "killed inside", by itself; or "ended".
+    """
+    killed = False
     pid = os.fork()
     if pid == 0:
         try:
@@ -140,38 +154,46 @@ def forked(do: object, *args: object, killed_after_s: float | None = None) -> No
         while process.status() != psutil.STATUS_ZOMBIE:
             if sum(process.cpu_times()[:2]) >= killed_after_s:
                 os.kill(pid, signal.SIGKILL)
+                killed = True
                 break
             time.sleep(0.004)
-    os.waitpid(pid, 0)
+    _, status = os.waitpid(pid, 0)
+    if not os.WIFSIGNALED(status):
+        return "ended"
+    return "killed" if killed else "killed inside"
 
 
-def run(times: int, folder: Path, seed: int = 1) -> int:
-    """Kill so many times, at moments drawn by a seed; return how many frames were learned."""
+def run(times: int, folder: Path, seed: int = 1) -> tuple[int, Counter[str]]:
+    """Kill so many times, at moments drawn by a seed.
+
+    Returns:
+        How many frames were learned, and how many processes were killed where.
+    """
     path, rng = folder / "life.db", np.random.default_rng(seed)
-    frames = stream(60 + 8 * times, seed)
+    frames = stream(60 + PER_KILL_S * times, seed)
+    where: Counter[str] = Counter()
     whole = LifelongLearner(learner())
     whole.learn_many(frames[:CHUNK], np.arange(CHUNK) / RATE_HZ)  # what is compiled, is by now
     whole = LifelongLearner(learner())
     for k in range(times):
         told, tell = os.pipe()
-        forked(
-            live,
-            path,
-            frames,
-            tell,
-            k + 1000 * seed,
-            killed_after_s=float(rng.exponential(0.5)) + 0.02,
+        after_s, life_seed = float(rng.exponential(0.5)) + 0.02, k + 1000 * seed
+        inside = dies_in_checkpoint(life_seed)
+        ended = forked(
+            *(live, path, frames, tell, life_seed), killed_after_s=None if inside else after_s
         )
         os.close(tell)
         said = b""
         while more := os.read(told, 1 << 16):
             said += more
         os.close(told)
+        where["in a checkpoint" if ended == "killed inside" else ended] += 1
         if k % 25 == 10:
             with LifelongLearner.open(path):
                 pass
             made_old(path)
-            forked(die_in_migration, path)
+            if forked(die_in_migration, path) == "killed inside":
+                where["in a migration"] += 1
         with LifelongLearner.open(path, learner) as life:
             pairs = list(struct.iter_unpack("qq", said))
             if pairs:
@@ -184,8 +206,10 @@ def run(times: int, folder: Path, seed: int = 1) -> int:
             assert life.state() == whole.state(), f"another state after kill {k}, at {target}"
             assert life.n_frames % CHUNK == 0
         if k % 20 == 19:
-            print(f"{k + 1} kills, {whole.n_frames / RATE_HZ:.0f} s of stream", flush=True)
-    return whole.n_frames
+            told_where = ", ".join(f"{n} {what}" for what, n in where.items())
+            stream_s = whole.n_frames / RATE_HZ
+            print(f"{k + 1} kills, {stream_s:.0f} s of stream: {told_where}", flush=True)
+    return whole.n_frames, where
 
 
 def main() -> None:
@@ -196,11 +220,13 @@ def main() -> None:
     times = args.times
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        n = run(times, Path(folder), args.seed)
+        n, where = run(times, Path(folder), args.seed)
         took = time.perf_counter() - start
     print(
-        f"killed {times} times in {took:.0f} s and {n / RATE_HZ:.0f} s of stream: each time the "
-        "state was, bit for bit, that of a run without end, and nothing written was lost"
+        f"killed {times} times in {took:.0f} s and {n / RATE_HZ:.0f} s of stream, "
+        f"{where['in a checkpoint']} times in a checkpoint and as many more as "
+        f"{where['in a migration']} in a migration, {where['ended']} times after its end: each "
+        "time the state was, bit for bit, that of a run without end, and nothing written was lost"
     )
 
 

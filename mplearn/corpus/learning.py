@@ -18,7 +18,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..errors import CorpusError, InvalidValueError, MPLearnError, RecordingError, StoreError
+from ..errors import (
+    CorpusError,
+    InvalidValueError,
+    MPLearnError,
+    RecordingError,
+    StoreError,
+    StoreWriteError,
+)
 from ..learner import LearnerConfig, MotionLearner
 from ..learner.learner_state import FILES
 from ..merging import merged_learner, merged_state
@@ -118,7 +125,9 @@ def learn_corpus(
         RecordingError: There are no recordings, or none can be learned.
         InvalidValueError: ``into`` was made with other rules.
         CorpusError: Workers die, whatever they are given.
-        StoreError: A store cannot be written.
+        StoreError: A store cannot be opened.
+        StoreWriteError: A store, or what is beside it, cannot be written: the disk is full. Nothing
+            that is finished is lost; the same call goes on once there is room.
 
     Example:
         >>> import numpy as np
@@ -204,7 +213,7 @@ def _planned(
             temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
             temporary.replace(path)
         except OSError as error:
-            raise StoreError(f"{path} cannot be written: {error.strerror}") from error
+            raise StoreWriteError(f"{path} cannot be written: {error.strerror}") from error
     return _Plan(config, shards)
 
 
@@ -421,12 +430,15 @@ def merge_files(parts: Sequence[Path], to: Path, person: str) -> None:
         person: Who moves; empty where unknown, then there may be many.
 
     Raises:
-        MPLearnError: One cannot be read, or the file cannot be written.
+        MPLearnError: One cannot be read.
+        StoreWriteError: The file cannot be written.
     """
     state = merged_state((_learner_of(part) for part in parts), [person] * len(parts))
-    replace(FILES, compression=0).write(
-        to, to_plain(state, whole=True)
-    )  # it is read once, and goes
+    file = replace(FILES, compression=0)  # it is read once, and goes
+    try:
+        file.write(to, to_plain(state, whole=True))
+    except MPLearnError as error:
+        raise StoreWriteError(str(error)) from error
 
 
 def _learner_of(path: Path) -> MotionLearner:

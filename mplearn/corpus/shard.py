@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import multiprocessing
 import os
@@ -9,14 +10,22 @@ import resource
 import signal
 import threading
 import time
+import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..errors import MPLearnError, RecordingError, StoreError, StoreInUseError
+from ..errors import (
+    MPLearnError,
+    RecordingError,
+    StoreError,
+    StoreInUseError,
+    StoreWarning,
+    StoreWriteError,
+)
 from ..learner import Event, FramesLost, LearnerConfig, MotionLearner
 from ..mocap import TakeFiles
 from ..recording import Recording
@@ -99,6 +108,7 @@ class ShardJournal:
         self._why: dict[str, str] = {}
         self._done: dict[str, dict[str, Any]] = {}
         self._in_hand = False
+        self._begun_at = 0  # where the last line begins that says so
         self.refresh()
 
     def refresh(self) -> None:
@@ -146,11 +156,33 @@ class ShardJournal:
         return f"learning it was tried {self.deaths(take)} times: {reason}"
 
     def write(self, what: str, take: str, **rest: Any) -> None:
-        """Write a line: all of it with one call, so that no other line tears it."""
+        """Write a line: all of it with one call, so that no other line tears it.
+
+        Raises:
+            StoreWriteError: It cannot be written, and is not there.
+        """
         line = json.dumps({"what": what, "take": take, **rest}, ensure_ascii=True)
-        torn = self.path.exists() and self.path.read_bytes()[-1:] not in (b"", b"\n")
-        with self.path.open("ab", buffering=0) as file:
-            file.write(f"{chr(10) if torn else ''}{line}\n".encode())
+        try:
+            torn = self.path.exists() and self.path.read_bytes()[-1:] not in (b"", b"\n")
+            text = f"{chr(10) if torn else ''}{line}\n".encode()
+            with self.path.open("ab", buffering=0) as file:
+                before = file.tell()
+                written = file.write(text)
+                if written < len(text):
+                    file.truncate(before)
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as error:
+            raise StoreWriteError(f"{self.path} cannot be written: {error.strerror}") from error
+        if what == "begun":
+            self._begun_at = before
+
+    def take_back(self, take: str) -> None:
+        """Take note that a take that was begun last is not learned, through no fault of its own."""
+        try:
+            self.write("stopped", take)
+        except StoreWriteError:  # no room: the line that says that it was begun goes
+            with suppress(OSError):
+                os.truncate(self.path, self._begun_at)
 
     def report(self) -> ShardReport:
         """Return what came of the shard so far."""
@@ -185,9 +217,11 @@ def learn_shard(task: ShardTask) -> ShardReport:
         return journal.report()
     life = _opened(task)
     try:
-        for take in left:
-            if not _learn_take(life, take, task, journal):
-                break
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", StoreWarning)  # what cannot be written is an error here
+            for take in left:
+                if not _learn_take(life, take, task, journal):
+                    break
     except BaseException:  # what is known may be half of something: the log alone is kept
         if isinstance(life.store, Store):
             store, life.store = life.store, None
@@ -220,12 +254,21 @@ def _learn_take(
         journal.write("left out", take.name, why=journal.why(take.name))
         return True
     journal.write("begun", take.name)
+    try:
+        return _learn_begun(life, take, task, journal)
+    except StoreError:
+        journal.take_back(take.name)
+        raise
+
+
+def _learn_begun(
+    life: LifelongLearner, take: TakeFiles, task: ShardTask, journal: ShardJournal
+) -> bool:
     began = time.perf_counter()
     try:
         with _ended_on_purpose(journal, take.name):
             watched = _learn(life, take, task)
     except StoreError:
-        journal.write("stopped", take.name)
         raise
     except MPLearnError as error:
         life.end_stream()
@@ -255,7 +298,7 @@ def _ended_on_purpose(journal: ShardJournal, take: str) -> Iterator[None]:
     """While this lasts, a worker that is told to end (SIGTERM) did not die of the take."""
 
     def end(number: int, frame: object) -> None:
-        journal.write("stopped", take)
+        journal.take_back(take)
         os._exit(128 + number)  # nothing is closed on the way: what is known may be half of it
 
     worker = multiprocessing.parent_process() is not None

@@ -1,5 +1,6 @@
 """Motion as it happens: recordings at their own pace, the demonstrator, and live streams."""
 
+from .buffered import BufferedSource as BufferedSource
 from .opening import open_source as open_source
 from .registry import Observe as Observe
 from .registry import Wanted as Wanted

@@ -4,12 +4,13 @@ import contextlib
 import multiprocessing
 import os
 import random
+import resource
 import shutil
 import signal
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from pathlib import Path
 from types import SimpleNamespace
@@ -34,7 +35,13 @@ from mplearn.corpus import (
 from mplearn.corpus.cluster import RayTasks, _pass_on
 from mplearn.corpus.executors import Here
 from mplearn.corpus.shard import ShardJournal, learn_shard
-from mplearn.errors import CorpusError, InvalidValueError, RecordingError, StoreError
+from mplearn.errors import (
+    CorpusError,
+    InvalidValueError,
+    RecordingError,
+    StoreError,
+    StoreWriteError,
+)
 from mplearn.merging import merge_learners
 from mplearn.mocap import Hints, TakeFiles, readers, register_reader, registry
 from mplearn.mocap.markers.csv_table import CSVReader
@@ -488,3 +495,54 @@ def test_a_journal_torn_by_a_death_is_read_on(tmp_path: Path) -> None:
     assert again.deaths("a") == 2
     assert not again.is_done("a")
     assert ShardJournal(tmp_path / "0000.db").deaths("a") == 2
+
+
+@contextlib.contextmanager
+def little_room(most_bytes: int) -> Iterator[None]:
+    """While this lasts, no file gets longer than that: as on a full disk, a write stops short."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_a_full_disk_costs_no_take_and_nothing_twice(
+    folder: Path, alone: bytes, tmp_path: Path
+) -> None:
+    """Each time there is room for some more; what comes of it is what one pass makes."""
+    learned: list[int] = []
+    for most_bytes in (2_000, 20_000, 60_000, 110_000, 160_000, 220_000):
+        with little_room(most_bytes), pytest.raises(StoreWriteError):
+            learn_corpus(folder, tmp_path / "s", jobs=0)
+        journals = [
+            ShardJournal(path.with_suffix(".db")) for path in (tmp_path / "s").glob("*.jsonl")
+        ]
+        learned.append(sum(len(each.report().learned) for each in journals))
+        assert not any(each.report().deaths for each in journals)
+    assert learned == sorted(learned)
+    assert learned[-1] > 0
+    again = learn_corpus(folder, tmp_path / "s", jobs=0)
+    assert again.progress.already >= learned[-1]
+    assert list(again.refused) == ["ben/broken"]
+    assert saved(again, tmp_path) == alone
+
+
+def test_a_take_that_was_begun_without_room_to_say_how_it_ended_is_not_held_a_death(
+    tmp_path: Path,
+) -> None:
+    journal = ShardJournal(tmp_path / "a.db")
+    journal.write("begun", "bow")
+    journal.write("refused", "bow", why="it is empty")
+    with little_room(journal.path.stat().st_size + 45):
+        for _ in range(3):
+            journal.write("begun", "kick")
+            with pytest.raises(StoreWriteError, match="cannot be written"):
+                journal.write("learned", "kick", took_s=1.0)
+            journal.take_back("kick")
+    read = ShardJournal(tmp_path / "a.db")
+    read.abandoned()
+    assert read.deaths("kick") == 0
+    assert read.is_done("bow")
+    assert not read.is_done("kick")

@@ -11,6 +11,7 @@ from mplearn_agents.terminal.inert import printable
 
 HELP = "Learn from live motion, and show it all on a page in the browser."
 EXAMPLE = "mplearn live demonstrator --port 8765"
+_TOLD_S = 1.0  # of the stream, that were not learned
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,7 +58,7 @@ def run(args: argparse.Namespace) -> None:
     def ready(url: str) -> None:
         print(f"open {printable(url)}   (Ctrl-C ends it)", flush=True)
 
-    serve(
+    left_s = serve(
         Watch(args.source, args.observe, args.speed, str(args.store or "")),
         host=args.host,
         port=args.port,
@@ -65,3 +66,5 @@ def run(args: argparse.Namespace) -> None:
         robot=not args.no_robot,
         ready=ready,
     )
+    if left_s >= _TOLD_S:
+        print(f"the last {left_s:.0f} s of the stream still waited, and were not learned")

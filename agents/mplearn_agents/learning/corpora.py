@@ -10,9 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mplearn.errors import InvalidValueError
+from mplearn.errors import InvalidValueError, StoreError, StoreWriteError
+from mplearn_agents.learning.keeping import keep, say_unkept
 from mplearn_agents.recordings.reading import hints_of
-from mplearn_agents.terminal.exit_codes import INTERRUPTED
+from mplearn_agents.terminal.exit_codes import INTERRUPTED, NOT_KEPT
 from mplearn_agents.terminal.inert import printable
 from mplearn_agents.terminal.interrupts import asked_to_stop
 
@@ -56,8 +57,6 @@ def learn_in_shards(
     args: argparse.Namespace, configure: Callable[[LearnerConfig], LearnerConfig]
 ) -> int:
     """Learn a folder as a corpus, save the library and print a summary; return the exit code."""
-    from rich.live import Live
-
     from mplearn.corpus import learn_corpus
     from mplearn.mocap import command_line
     from mplearn.store import LifelongLearner, is_begun
@@ -74,23 +73,30 @@ def learn_in_shards(
         raise InvalidValueError("--strict is for takes learned one after the other, not --jobs")
     into = args.shards or args.out.with_name(args.out.name + ".shards")
     console = open_console()
-    with (
-        command_line(),
-        asked_to_stop() as stop,
-        chosen_executor(args) as executor,
-        Live(console=console, refresh_per_second=4) as live,
-    ):
-        corpus = learn_corpus(
-            args.data,
-            into,
-            reading=reading_of(args),
-            rate_hz=args.rate_hz,
-            configure=configure,
-            executor=executor,
-            people=args.person or (),
-            show=lambda progress: live.update(progress_table(progress)),
-            stop=stop,
+    try:
+        with (
+            command_line(),
+            asked_to_stop() as stop,
+            chosen_executor(args) as executor,
+            _live_table(console) as show,
+        ):
+            corpus = learn_corpus(
+                args.data,
+                into,
+                reading=reading_of(args),
+                rate_hz=args.rate_hz,
+                configure=configure,
+                executor=executor,
+                people=args.person or (),
+                show=show,
+                stop=stop,
+            )
+    except StoreWriteError as error:
+        say_unkept(
+            f"{error}; what was learned until then is in {into}, and the same command goes on from "
+            "there once there is room"
         )
+        return NOT_KEPT
     _say_refused(console, corpus.refused.items())
     if corpus.learner is None:
         console.print(
@@ -103,18 +109,33 @@ def learn_in_shards(
     library = life.snapshot(shown_once=args.demonstrations == 1)
     if not len(library):
         library = life.snapshot(shown_once=True)
-    written = [into]
-    if args.out is not None:
-        args.out.parent.mkdir(parents=True, exist_ok=True)
-        library.save(args.out)
-        written.insert(0, args.out)
+    kept = keep(life, library, out=args.out, store=None)
+    written, problems = [*kept.paths, into], [kept.problem] if kept.problem else []
     if args.store is not None:
-        args.store.parent.mkdir(parents=True, exist_ok=True)
-        LifelongLearner.open(args.store, lambda: life).close()
-        written.append(args.store)
+        try:
+            args.store.parent.mkdir(parents=True, exist_ok=True)
+            LifelongLearner.open(args.store, lambda: life).close()
+            written.append(args.store)
+        except StoreError as error:
+            problems.append(str(error))
     console.print(primitive_table(library))
     console.print(_summary(corpus, written), markup=False)
-    return 0
+    for problem in problems:
+        say_unkept(f"{problem}; all is in {into}, from which the same command makes it again")
+    return NOT_KEPT if problems else 0
+
+
+@contextmanager
+def _live_table(console: Console) -> Iterator[Callable[[Progress], None]]:
+    """Show how far a corpus is while this lasts; yields what takes that."""
+    from rich.live import Live
+
+    try:
+        with Live(console=console, refresh_per_second=4) as live:
+            yield lambda progress: live.update(progress_table(progress))
+    finally:
+        if not console.is_terminal:  # in a file the table has no last line break
+            console.line()
 
 
 def recognise_in_chunks(args: argparse.Namespace) -> None:

@@ -115,6 +115,11 @@ class Hub:
         workers = [self._learner] + ([self._robot] if self._robot else [])
         return {worker.name: worker.pid for worker in workers}
 
+    @property
+    def behind_s(self) -> float:
+        """How much of the stream waits to be learned, as was heard last [s]."""
+        return float(self._latest.get("status", {}).get("behind_s", 0.0))
+
     def start(self) -> None:
         """Start the processes."""
         self._learner.start()

@@ -27,8 +27,8 @@ def serve(
     token: str = "",
     robot: bool = True,
     ready: Callable[[str], None] = lambda url: None,
-) -> None:
-    """Serve the page until it is interrupted.
+) -> float:
+    """Serve the page until it is interrupted; return how much of the stream was left unlearned [s].
 
     Args:
         settings: What is watched.
@@ -47,8 +47,10 @@ def serve(
         token = secrets.token_urlsafe(24)
     listening = listen(host, port)
     url = _address(host, listening.getsockname()[1], token)
+    left_s: list[float] = []
     with listening, suppress(KeyboardInterrupt), python_interrupts():
-        asyncio.run(_serve(settings, listening, token, robot, lambda: ready(url)))
+        asyncio.run(_serve(settings, listening, token, robot, lambda: ready(url), left_s))
+    return sum(left_s)
 
 
 async def _serve(
@@ -57,6 +59,7 @@ async def _serve(
     token: str,
     robot: bool,
     ready: Callable[[], None],
+    left_s: list[float],
 ) -> None:
     uvicorn = require("uvicorn", "ui")
     hub = Hub(settings, robot=robot)
@@ -74,6 +77,7 @@ async def _serve(
     finally:
         server.should_exit = True
         await hub.close()
+        left_s.append(hub.behind_s)
         await serving
 
 

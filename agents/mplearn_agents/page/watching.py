@@ -24,7 +24,7 @@ from mplearn.demonstrator import demonstrate
 from mplearn.errors import InvalidValueError, MPLearnError, RecordingWarning, StoreWarning
 from mplearn.learner import LearnerConfig, MotionLearner, learnable_rate
 from mplearn.library import PrimitiveLibrary
-from mplearn.sources import Block, Change, Observe, Source, open_source
+from mplearn.sources import Block, BufferedSource, Change, Observe, open_source
 from mplearn.store import LifelongLearner, Store
 from mplearn.tree import PrimitiveTree, TreeConfig
 from mplearn_agents.learning.pauses import short_pauses
@@ -38,7 +38,7 @@ from .shelf import Sender
 from .teaching import do, history
 from .watched_figure import WatchedFigure
 
-MOST_WAITING = 3_000  # blocks of the stream that may wait for the learner
+_READ_AHEAD = 2**17  # bytes of a source that is as fast as it is read
 STATUS_S, KNOWLEDGE_S = 0.25, 0.2
 _WARM_UP = ("BAR", "BAL") * 4
 _KINDS = 14  # more primitives than are compared one by one
@@ -90,11 +90,11 @@ class Watcher:
         self._settings, self._connection, self._outbox = settings, connection, outbox
         self._inbox: queue.PriorityQueue[tuple[int, int, str, Any]] = queue.PriorityQueue()
         self._numbers = itertools.count()
-        self._room = threading.Semaphore(MOST_WAITING)
         self._lifelong: LifelongLearner | None = None
         self._library: PrimitiveLibrary | None = None  # what was told last
         self._figure: WatchedFigure | None = None
-        self._source: Source | None = None
+        self._source: BufferedSource | None = None
+        self._over = False  # nothing more will come of it
         self._rate_hz = 0.0
         self._sender = Sender()
         self._told_revision = -1
@@ -102,7 +102,7 @@ class Watcher:
         self._delays: deque[float] = deque(maxlen=_DELAYS)
         self._arrivals: deque[tuple[float, int]] = deque(maxlen=_DELAYS)
         self._doubled = self._late = 0
-        self._state = "waiting for frames"
+        self._state = "compiling, which takes a while the first time"
         self._last_motion = -1  # frame at which the last motion began
         self._rows: list[np.ndarray[Any, Any]] = []
         self._n_rows = 0
@@ -129,35 +129,36 @@ class Watcher:
                 **options,
             )
             with source:
-                self._watch(source)
+                self._outbox.post(self._status(), key="status")
+                _warm_up()
+                with BufferedSource(source, **self._keeping(), arrived=self._arrived) as buffered:
+                    self._watch(buffered)
         finally:
             if self._lifelong is not None:
                 self._lifelong.close()
 
-    def _watch(self, source: Source) -> None:
+    def _watch(self, source: BufferedSource) -> None:
         self._source = source
-        self._state = "compiling, which takes a while the first time"
-        self._outbox.post(self._status(), key="status")
-        _warm_up()
         self._state = "waiting for frames"
-        for target in (self._read_source, self._read_requests):
-            threading.Thread(target=target, args=(source,), daemon=True).start()
+        threading.Thread(target=self._read_requests, daemon=True).start()
         with short_pauses():
             while self._step():
                 pass
+        self._outbox.post(self._status(), key="status")
+
+    def _keeping(self) -> dict[str, Any]:
+        """Return where frames that wait are kept, and how much of them."""
+        if self._settings.speed == math.inf:
+            return {"most_bytes": _READ_AHEAD}
+        store = self._settings.store
+        return {"folder": Path(store).absolute().parent} if store else {}
 
     # ---- threads that read
 
-    def _read_source(self, source: Source) -> None:
-        try:
-            for item in source:
-                self._room.acquire()
-                self._put(_STREAM, "stream", item)
-            self._put(_STREAM, "ended")
-        except Exception as error:  # of a source of somebody else
-            self._put(_STREAM, "broken", error)
+    def _arrived(self) -> None:
+        self._put(_STREAM, "stream")
 
-    def _read_requests(self, _: Source) -> None:
+    def _read_requests(self) -> None:
         try:
             while True:
                 self._put(_TEACHERS, "request", unpack(self._connection.recv_bytes())[0])
@@ -176,22 +177,13 @@ class Watcher:
             _, _, what, item = self._inbox.get(timeout=STATUS_S)
         except queue.Empty:
             what, item = "", None
-        if what == "stream":
-            self._room.release()
         match what:
             case "closed":
                 return False
             case "request":
                 self._answer(item)
-            case "stream" if isinstance(item, Block):
-                self._try(item)
             case "stream":
-                self._changed(item)
-            case "ended":
-                self._end()
-            case "broken":
-                self._state = "broken"
-                self._happened("source", literal(f"the source broke: {item}"))
+                self._take()
         now = time.monotonic()
         if now - self._told_at > KNOWLEDGE_S:
             self._told_at = now
@@ -200,6 +192,28 @@ class Watcher:
             self._status_at = now
             self._outbox.post(self._status(), key="status")
         return not self._outbox.broken
+
+    def _take(self) -> None:
+        """Take what the source has, and look for more after what came before that."""
+        source = self._source
+        assert source is not None
+        if self._over:
+            return
+        try:
+            items = source.read(0.0)
+        except Exception as error:  # of a source of somebody else
+            self._over, self._state = True, "broken"
+            self._happened("source", literal(f"the source broke: {error}"))
+            return
+        for item in items:
+            if isinstance(item, Block):
+                self._try(item)
+            else:
+                self._changed(item)
+        if source.n_waiting:
+            self._arrived()
+        elif source.ended:
+            self._end()
 
     def _try(self, block: Block) -> None:
         """Learn from a block; one that cannot be learned from costs nothing else.
@@ -283,7 +297,7 @@ class Watcher:
         self._happened("source", literal(change.text))
 
     def _end(self) -> None:
-        self._state = "ended"
+        self._over, self._state = True, "ended"
         if self._lifelong is not None:
             self._tell(self._lifelong.end_stream())
         self._happened("source", "the stream has ended")
@@ -357,7 +371,7 @@ class Watcher:
             "rate_hz": round(sum(n for _, n in recent[1:]) / span, 1) if span > 0 else 0.0,
             "delay_ms": round(1e3 * delays[len(delays) // 2], 1) if delays else None,
             "delay_99_ms": round(1e3 * delays[int(0.99 * len(delays))], 1) if delays else None,
-            "behind_s": round(self._behind_s(), 1),
+            "behind_s": 0.0 if self._source is None else round(self._source.waiting_s, 1),
             "lost": tally.get("lost", 0),
             "faults": {name: n for name, n in tally.items() if n and name != "frames"},
             "frames": 0 if lifelong is None else lifelong.n_frames,
@@ -368,12 +382,6 @@ class Watcher:
             "paused": False if lifelong is None else lifelong.learner.paused,
             "memory_mb": _memory_mb(),
         }
-
-    def _behind_s(self) -> float:
-        """Return how much of the stream waits to be learned [s]."""
-        blocks = self._inbox.qsize()
-        mean = sum(n for _, n in self._arrivals) / max(len(self._arrivals), 1)
-        return blocks * mean / self._rate_hz if self._rate_hz else 0.0
 
     def _problem(self) -> str:
         """Return why what is learned cannot be kept; empty where it can."""

@@ -18,9 +18,9 @@ from mplearn.demonstrator import demonstrate
 from mplearn.errors import InvalidValueError, LibraryError
 from mplearn.learner import LearnerConfig, MotionLearner
 from mplearn.maths.rotations import quaternion_to_matrix
-from mplearn.sources import Block, Stream
+from mplearn.sources import Block, BufferedSource, Source, Stream, Tally
 from mplearn.store import LifelongLearner
-from mplearn_agents.page import messages, teaching
+from mplearn_agents.page import messages, teaching, watching
 from mplearn_agents.page.figures import CLIP_HZ, has_figure, human_poses, poses_of, shapes_of
 from mplearn_agents.page.happenings import tell
 from mplearn_agents.page.knowledge import knowledge
@@ -330,6 +330,60 @@ def test_frames_that_cannot_be_learned_cost_nothing_else():
     assert watcher._lifelong.n_frames == 20
     assert abs(watcher._lifelong.state().chunk_when - time.time()) < 60  # dated by the clock
     assert any("10 frames were not learned" in str(h.get("text")) for h, _ in kept.posted)
+    theirs.close()
+
+
+class Given(Source):
+    """A source that has all at once, and breaks or ends after that."""
+
+    def __init__(self, frames, error=None):
+        self.name, self.tally, self._error = "given:", Tally(), error
+        times_s = np.arange(len(frames)) / 100.0
+        stream = Stream(("a", "b"), 100.0)
+        self._blocks = [
+            Block(stream, frames[i : i + 1], times_s[i : i + 1], times_s[i : i + 1])
+            for i in range(len(frames))
+        ]
+
+    @property
+    def ended(self):
+        return not self._blocks and self._error is None
+
+    def read(self, timeout_s=None):
+        if not self._blocks:
+            raise self._error
+        return [self._blocks.pop(0)]
+
+    def close(self):
+        self._blocks.clear()
+
+
+@pytest.mark.parametrize("error", [None, RuntimeError("the cable is out")])
+def test_what_waits_is_learned_in_order_and_teachers_come_first(error):
+    mine, theirs = Pipe()
+    kept = Kept()
+    watcher = Watcher(Watch("mine"), mine, kept)
+    t = np.arange(800) / 100.0
+    swing = np.where(t % 2 < 1, np.sin(np.pi * t) ** 2, 0.0)[:, None] * [1.0, 0.5]
+    source = Given(swing, error)
+    with BufferedSource(source, arrived=watcher._arrived) as waiting:
+        watcher._source = waiting
+        while source._blocks:
+            time.sleep(0.01)
+        watcher._put(watching._TEACHERS, "request", {"do": "history", "id": 1, "ref": 1})
+        watcher._step()
+        assert [h["kind"] for h, _ in kept.posted if h["kind"] == "reply"] == ["reply"]
+        assert watcher._lifelong is None
+        assert watcher._status()["behind_s"] >= 7.9
+        while not watcher._over:
+            assert watcher._step()
+        assert watcher._status()["behind_s"] == 0.0
+    learner = MotionLearner(LearnerConfig(("a", "b"), 100.0))
+    learner.learn_many(swing)
+    if error is None:
+        learner.end_stream()
+    assert watcher._state == ("ended" if error is None else "broken")
+    assert watcher._lifelong.learner.state() == learner.state()
     theirs.close()
 
 
