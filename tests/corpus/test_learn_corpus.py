@@ -4,13 +4,12 @@ import contextlib
 import multiprocessing
 import os
 import random
-import resource
 import shutil
 import signal
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,6 +21,7 @@ from corpus_folder import write_take
 from frail_workers import Frail
 from hypothesis import given
 from hypothesis import strategies as st
+from little_room import little_room
 
 from mplearn.corpus import (
     Corpus,
@@ -495,17 +495,6 @@ def test_a_journal_torn_by_a_death_is_read_on(tmp_path: Path) -> None:
     assert again.deaths("a") == 2
     assert not again.is_done("a")
     assert ShardJournal(tmp_path / "0000.db").deaths("a") == 2
-
-
-@contextlib.contextmanager
-def little_room(most_bytes: int) -> Iterator[None]:
-    """While this lasts, no file gets longer than that: as on a full disk, a write stops short."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def test_a_full_disk_costs_no_take_and_nothing_twice(

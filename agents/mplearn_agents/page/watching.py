@@ -38,7 +38,7 @@ from .shelf import Sender
 from .teaching import do, history
 from .watched_figure import WatchedFigure
 
-_READ_AHEAD = 2**17  # bytes of a source that is as fast as it is read
+_READ_AHEAD, _HELD_UP = 2**17, 2**22  # bytes of a source that waits: to be read, or to send
 STATUS_S, KNOWLEDGE_S = 0.25, 0.2
 _WARM_UP = ("BAR", "BAL") * 4
 _KINDS = 14  # more primitives than are compared one by one
@@ -150,6 +150,8 @@ class Watcher:
         """Return where frames that wait are kept, and how much of them."""
         if self._settings.speed == math.inf:
             return {"most_bytes": _READ_AHEAD}
+        if self._settings.source.startswith("ndjson:"):
+            return {"most_bytes": _HELD_UP}
         store = self._settings.store
         return {"folder": Path(store).absolute().parent} if store else {}
 

@@ -5,12 +5,14 @@ import json
 import struct
 import threading
 import time
+import warnings
 from multiprocessing import Pipe
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from little_room import little_room
 
 from benchmarks.teaching_session import until
 from mplearn.body import human_body, posture_of, robot_body
@@ -384,6 +386,43 @@ def test_what_waits_is_learned_in_order_and_teachers_come_first(error):
         learner.end_stream()
     assert watcher._state == ("ended" if error is None else "broken")
     assert watcher._lifelong.learner.state() == learner.state()
+    theirs.close()
+
+
+def test_on_a_full_disk_the_page_says_so_and_all_is_kept_once_there_is_room(tmp_path):
+    mine, theirs = Pipe()
+    kept = Kept()
+    path = tmp_path / "life.db"
+    watcher = Watcher(Watch("mine", store=str(path)), mine, kept)
+    rng = np.random.default_rng(0)
+    stream = Stream(("a", "b"), 100.0)
+    blocks = [
+        Block(stream, rng.normal(size=(50, 2)), k / 2 + np.arange(50) / 100.0, np.zeros(50))
+        for k in range(60)
+    ]
+
+    def full():
+        return "full" in watcher._status()["problem"] or "I/O" in watcher._status()["problem"]
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        warnings.showwarning = watcher._warned
+        watcher._try(blocks.pop(0))
+        with little_room(200_000):
+            while not full():
+                watcher._try(blocks.pop(0))
+                assert blocks, "the disk is not full"
+            for _ in range(5):
+                watcher._try(blocks.pop(0))  # learning goes on
+        until(lambda: not watcher._status()["problem"], 60.0, "written again")
+    said = [h["text"] for h, _ in kept.posted if h.get("what") == "store"]
+    assert len(said) == 1 and "learning goes on in memory" in said[0]
+    n_frames = watcher._lifelong.n_frames
+    state = watcher._lifelong.learner.state()
+    watcher._lifelong.close()
+    with LifelongLearner.open(path) as again:
+        assert again.n_frames == n_frames
+        assert again.learner.state() == state
     theirs.close()
 
 
