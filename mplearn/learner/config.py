@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from ..arguments import is_one_of, names_of, require_kind, require_numbers
 from ..errors import InvalidValueError
 from ..people import PeopleConfig
 from ..segmentation import require_segmenter
@@ -71,15 +72,18 @@ class LearnerConfig:
     false_alarms: float = 0.01
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "channels", tuple(self.channels))
+        object.__setattr__(self, "channels", names_of("channels", self.channels))
+        require_numbers(self)
+        require_kind("tree", self.tree, TreeConfig)
+        require_kind("people", self.people, PeopleConfig)
         if not self.channels:
             raise InvalidValueError("a learner needs at least one channel")
         if not LOWEST_HZ <= self.rate_hz <= HIGHEST_HZ:
             raise InvalidValueError(f"rate_hz must lie in [20, 250], not {self.rate_hz}")
-        if self.observe not in ("robot", "markers"):
+        if not is_one_of(self.observe, ("robot", "markers")):
             raise InvalidValueError(f"observe must be 'robot' or 'markers', not {self.observe!r}")
         require_segmenter(self.segmenter)
-        if self.scaffolding not in (True, False, "inside"):
+        if not is_one_of(self.scaffolding, (True, False, "inside")):
             raise InvalidValueError(
                 f"scaffolding must be True, False or 'inside', not {self.scaffolding!r}"
             )

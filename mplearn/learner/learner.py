@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arguments import require_kind
 from ..body import BodyView, MotionObserver, Watched, feature_channels, robot_body, view_of
 from ..body.observer.observer import BLOCK_FRAMES
 from ..errors import InvalidValueError
@@ -91,6 +92,7 @@ class MotionLearner:
     """
 
     def __init__(self, config: LearnerConfig) -> None:
+        require_kind("config", config, LearnerConfig)
         self.config = config
         watches = config.observe == "robot" and are_markers(config.channels)
         self._checks = StreamChecks(config.channels, config.rate_hz, gaps=watches)

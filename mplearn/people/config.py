@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ..arguments import require_numbers
 from ..errors import InvalidValueError
 from ..state import newer
 
@@ -55,6 +56,7 @@ class PeopleConfig:
     offset_prior: float = 1.0
 
     def __post_init__(self) -> None:
+        require_numbers(self)
         for name in ("repertoire", "link", "link_own", "join", "reach", "sided", "offset_prior"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InvalidValueError(f"{name} must be positive, not {getattr(self, name)}")

@@ -83,7 +83,7 @@ def require_segmenter(name: str) -> None:
         mplearn.errors.InvalidValueError: segmenter must be one of [...] (...), not 'by eye'
     """
     _load_entry_points()
-    if name not in SEGMENTERS:
+    if not isinstance(name, str) or name not in SEGMENTERS:
         raise InvalidValueError(
             f"segmenter must be one of {sorted(SEGMENTERS)} (register_segmenter adds one), "
             f"not {name!r}"

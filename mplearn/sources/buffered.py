@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arguments import path_of, require_kind, require_number
 from ..errors import InvalidValueError
 from .source import WAIT_S, Block, Change, Source
 
@@ -59,12 +60,14 @@ class BufferedSource(Source):
         most_bytes: int = MOST_BYTES,
         arrived: Callable[[], object] = lambda: None,
     ) -> None:
-        if most_bytes < 1:
+        require_kind("source", source, Source, "open_source(name) opens one")
+        require_number("most_bytes", most_bytes)
+        if not most_bytes >= 1:
             raise InvalidValueError(f"most_bytes must be positive, not {most_bytes}")
         self.name, self.tally = source.name, source.tally
         self._source, self._arrived = source, arrived
         self._most_bytes = most_bytes
-        self._spill = _Spill(None if folder is None else Path(folder))
+        self._spill = _Spill(None if folder is None else path_of("folder", folder))
         self._waiting: deque[Block | Change | _Spilled] = deque()
         self._newest: list[Block] = []  # will be one block
         self._n_waiting, self._rate_hz = 0, 0.0

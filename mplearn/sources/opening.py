@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from ..arguments import path_of
 from ..mocap import Hints
 from .played import play_demonstrator, play_recording
 from .protocols.lsl import open_lsl
@@ -82,9 +83,10 @@ def open_source(
         ('LFHD.x', 100.0)
     """
     wanted = Wanted(observe, hints or Hints(), names)
+    path = None if record is None else path_of("record", record)
     raw = connect(name, wanted, **options)
-    if record is not None:
-        raw = _recorded(raw, Path(record))
+    if path is not None:
+        raw = _recorded(raw, path)
     source = RecognisedSource(raw, wanted)
     return source if at_hz is None else ResampledSource(source, at_hz)
 

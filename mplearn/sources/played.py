@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arguments import require_number
 from ..demonstrator import Demonstrator
 from ..errors import InvalidValueError
 from ..mocap import open_recording
@@ -97,6 +98,7 @@ class PlayedSource(Source):
         speed: float = 1.0,
         name: str = "played:",
     ) -> None:
+        require_number("speed", speed)
         if not speed > 0:
             raise InvalidValueError(f"speed must be positive, not {speed}")
         self.name, self.tally = name, Tally()

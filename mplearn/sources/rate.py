@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arguments import require_number
 from ..errors import InvalidValueError
 from ..recording import BoolArray, FloatArray
 from .source import Block, Change, Source, Stream
@@ -31,6 +32,8 @@ class ResampledSource(Source):
     """
 
     def __init__(self, source: Source, rate_hz: float | Callable[[float], float]) -> None:
+        if not callable(rate_hz):
+            require_number("rate_hz", rate_hz)
         if not callable(rate_hz) and not 1.0 <= rate_hz <= 10_000.0:
             raise InvalidValueError(f"rate_hz must lie in [1, 10000] 1/s, not {rate_hz}")
         self.name, self.tally = source.name, source.tally

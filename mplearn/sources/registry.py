@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Literal, TypeAlias, get_args
 
+from ..arguments import is_one_of, require_kind
 from ..errors import InvalidValueError
 from ..mocap import Hints
 from ..plugins import join_installed
@@ -41,7 +42,10 @@ class Wanted:
     names: Mapping[str, str] | None = None
 
     def __post_init__(self) -> None:
-        if self.observe not in get_args(Observe):
+        require_kind("hints", self.hints, Hints)
+        if self.names is not None:
+            require_kind("names", self.names, Mapping, "the place of the body by marker or joint")
+        if not is_one_of(self.observe, get_args(Observe)):
             raise InvalidValueError(
                 f"observe must be one of {', '.join(get_args(Observe))}, not {self.observe!r}"
             )
@@ -73,8 +77,10 @@ def register_source(kind: str, factory: Factory) -> None:
         >>> "still" in source_kinds()
         True
     """
-    if not re.fullmatch(r"[a-z][a-z0-9_-]*", kind):
-        raise InvalidValueError(f"a kind of source is like 'my-suit', lower case, not {kind!r}")
+    if not isinstance(kind, str) or not re.fullmatch(r"[a-z][a-z0-9_-]*", kind):
+        raise InvalidValueError(f"a kind of source is like 'my-suit', lower case, not {kind!r:.60}")
+    if not callable(factory):
+        raise InvalidValueError(f"factory must make a source when called, not be {factory!r:.60}")
     _registered[kind] = factory
 
 
@@ -103,6 +109,9 @@ def connect(name: str, wanted: Wanted | None = None, **options: Any) -> Source:
         (100.0, 102)
     """
     _load_entry_points()
+    require_kind("name", name, str, "as 'recording:walk.bvh' or 'demonstrator'")
+    if wanted is not None:
+        require_kind("wanted", wanted, Wanted)
     kind, _, address = name.partition(":")
     factory = _registered.get(kind)
     if factory is None:

@@ -9,6 +9,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from ..arguments import names_of, require_number
 from ..closing import Closing
 from ..errors import InvalidValueError
 from ..recording import BoolArray, FloatArray, Recording, Skeleton, are_markers
@@ -53,7 +54,8 @@ class Stream:
         recording: All of it, where that is known before (a file): metres, z up.
 
     Raises:
-        InvalidValueError: Two channels have one name, or the rate is none of motion.
+        InvalidValueError: Two channels have one name, or the rate is none of motion; or they are
+            no names, and no number.
 
     Example:
         >>> stream = Stream(("LSHO.x", "LSHO.y", "LSHO.z"), rate_hz=100.0)
@@ -71,13 +73,15 @@ class Stream:
 
     def __post_init__(self) -> None:
         """Check the names and the rate."""
+        object.__setattr__(self, "channels", names_of("channels", self.channels))
+        require_number("rate_hz", self.rate_hz)
         seen: set[str] = set()
         for name in self.channels:
             if name in seen:
                 raise InvalidValueError(f"channels must differ, not two be {name!r:.60}")
             seen.add(name)
         least, most = RATES_HZ
-        if self.rate_hz and not least <= self.rate_hz <= most:
+        if self.rate_hz != 0 and not least <= self.rate_hz <= most:
             raise InvalidValueError(
                 f"rate_hz must lie in [{least:g}, {most:g}], or be 0 where it is not known, "
                 f"not {self.rate_hz:g}"

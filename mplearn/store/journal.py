@@ -220,12 +220,11 @@ class Journal:
         """Return a command with what it changed."""
         return self._entries.get(number)
 
-    def latest(self, *, undone: bool) -> int | None:
-        """Return the command that was done, or undone, last and can be undone, or redone."""
+    def reversible(self, *, undone: bool) -> list[int]:
+        """Return the commands that can be undone, or redone; the one that is next comes last."""
         found = [self._entries[n] for n in self._undoable()]
         found = [each for each in found if each.entry.undone == undone]
-        best = max(found, key=lambda each: each.toggled, default=None)
-        return None if best is None else best.entry.number
+        return [each.entry.number for each in sorted(found, key=lambda each: each.toggled)]
 
     def blocking(self, number: int) -> list[Entry]:
         """Return the commands that must be undone, or done again, before a command can be.

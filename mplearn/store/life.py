@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arguments import names_of, path_of, require_kind
 from ..closing import Closing
 from ..errors import (
     FrameError,
@@ -65,11 +66,17 @@ class LifelongLearner(Closing):
     def __init__(
         self, learner: MotionLearner, store: Log | None = None, done: Sequence[str] = ()
     ) -> None:
+        require_kind("learner", learner, MotionLearner)
+        if store is not None and not callable(getattr(store, "append", None)):
+            raise InvalidValueError(
+                f"store must be an opened Store, or None, not {store!r:.60}: "
+                "LifelongLearner.open(path, create) opens a file"
+            )
         self.learner = learner
         self.labels = Labels()
         self.store = store
         self._journal = Journal()
-        self._sources = SourcesState(tuple(done))
+        self._sources = SourcesState(names_of("done", done))
         self._source, self._taken = "", 0
         self._chunk: list[FloatArray] = []
         self._chunk_frame, self._chunk_when = learner.n_frames, 0.0
@@ -101,7 +108,12 @@ class LifelongLearner(Closing):
         Raises:
             StoreError: It cannot be opened; the class says why.
         """
-        if create is None and not Path(path).exists():
+        path = path_of("path", path)
+        if create is not None and not callable(create):
+            raise InvalidValueError(
+                f"create must make a learner when called, not be {create!r:.60}"
+            )
+        if create is None and not path.exists():
             raise NotAStoreError(f"there is no store {path}")
         store = Store(path, checkpoint_s=checkpoint_s)
         try:
@@ -343,6 +355,22 @@ class LifelongLearner(Closing):
         """Return the commands with numbers above ``since``, the oldest first; the last thousand."""
         return self._journal.entries(since)
 
+    def reversible(self, *, undone: bool = False) -> tuple[int, ...]:
+        """Return the numbers of the commands that `undo` takes; that which is next comes last.
+
+        Args:
+            undone: Whether those that `redo` takes are wanted.
+
+        Example:
+            >>> from mplearn import LearnerConfig, MotionLearner
+            >>> from mplearn.store import Pause
+            >>> life = LifelongLearner(MotionLearner(LearnerConfig(("elbow",))))
+            >>> entry = life.execute(Pause(), by="Anna")
+            >>> life.reversible(), life.reversible(undone=True)
+            ((1,), ())
+        """
+        return tuple(self._journal.reversible(undone=undone))
+
     def history(self, primitive: int) -> tuple[Happening, ...]:
         """Return what happened to a primitive, the oldest first.
 
@@ -481,16 +509,16 @@ class LifelongLearner(Closing):
     def _chosen(self, number: int | None, *, undone: bool) -> int:
         """Return the command to undo, or to redo, if that can be."""
         done = "redone" if undone else "undone"
+        able = self._journal.reversible(undone=undone)
         if number is None:
-            number = self._journal.latest(undone=undone)
-            if number is None:
+            if not able:
                 raise InvalidValueError(f"there is no command that can be {done}")
+            number = able[-1]
         kept = self._journal.kept(number)
         if kept is None or kept.effect is None:
-            able = [e.number for e in self.entries() if self._can_toggle(e.number, undone)]
             raise InvalidValueError(
                 f"command {number} cannot be {done}: it is none, changed nothing, or is too long "
-                f"ago; those that can be are {able}"
+                f"ago; those that can be are {sorted(able)}"
             )
         if kept.entry.undone != undone:
             state = "not undone" if undone else "undone already"
@@ -503,10 +531,6 @@ class LifelongLearner(Closing):
                 + ", then ".join(steps)
             )
         return number
-
-    def _can_toggle(self, number: int, undone: bool) -> bool:
-        kept = self._journal.kept(number)
-        return kept is not None and kept.effect is not None and kept.entry.undone == undone
 
     def _note_command(self, entry: Entry, effect: Effect, about: Sequence[int] = ()) -> None:
         ids = {*entry.command.about, *about}

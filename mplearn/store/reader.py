@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ..arguments import path_of
 from ..errors import NotAStoreError, StoreDamagedError
 from ..learner import MotionLearner
 from ..library import PrimitiveLibrary
@@ -37,7 +38,7 @@ class StoreReader:
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
+        self.path = path_of("path", path)
         self._seq = -1
         self.life = self._read()
 
@@ -119,7 +120,7 @@ def learner_of(path: str | Path) -> MotionLearner:
         >>> learner_of("swings.db").n_frames
         800
     """
-    return LifelongLearner.of_found(_found(Path(path)), lazily=True).learner
+    return LifelongLearner.of_found(_found(path_of("path", path)), lazily=True).learner
 
 
 def _found(path: Path) -> Found:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from ..arguments import path_of, require_number
 from ..errors import (
     InvalidValueError,
     NotAStoreError,
@@ -117,9 +118,10 @@ class Store:
     """
 
     def __init__(self, path: str | Path, *, checkpoint_s: float = 30.0) -> None:
+        require_number("checkpoint_s", checkpoint_s)
         if not checkpoint_s > 0:
             raise InvalidValueError(f"checkpoint_s must be positive, not {checkpoint_s}")
-        self.path = Path(path).resolve()
+        self.path = path_of("path", path).resolve()
         self._checkpoint_s = checkpoint_s
         look_at(self.path)
         self._lock = WriterLock(self.path)
@@ -333,7 +335,7 @@ def is_begun(path: str | Path) -> bool:
         >>> is_begun("new.db")
         True
     """
-    path = Path(path)
+    path = path_of("path", path)
     if not path.exists() or not path.stat().st_size:
         return False
     connection = open_reading(path)
@@ -364,7 +366,7 @@ def backup(path: str | Path, to: str | Path) -> Path:
         >>> check(copy), info(copy).version == info("life.db").version, is_begun("none.db")
         ((), True, False)
     """
-    path, to = Path(path), Path(to)
+    path, to = path_of("path", path), path_of("to", to)
     if to.exists():
         raise InvalidValueError(f"{to} exists already; a backup is a new file")
     if not is_begun(path):
@@ -400,12 +402,13 @@ def check(path: str | Path) -> tuple[str, ...]:
         ...     check(path), info(path).path == path
         ((), True)
     """
-    connection = open_reading(Path(path))
+    path = path_of("path", path)
+    connection = open_reading(path)
     try:
         wrong = integrity(connection)
         if not wrong:
             try:
-                found = read_all(connection, Path(path), salvage=True, older=True)
+                found = read_all(connection, path, salvage=True, older=True)
                 wrong = [*(found.damage if found else ("it holds no checkpoint",))]
             except StoreDamagedError as error:
                 wrong = [str(error)]
@@ -428,7 +431,7 @@ def info(path: str | Path) -> StoreInfo:
         >>> info("small.db").records
         0
     """
-    path = Path(path)
+    path = path_of("path", path)
     connection = open_reading(path)
     try:
         with errors_of(path):

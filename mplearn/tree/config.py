@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from ..arguments import is_one_of, require_kind, require_number, require_numbers
 from ..errors import InvalidValueError
 from ..state import newer, saved_as
 
@@ -38,6 +39,7 @@ class NormalisationConfig:
     centring: float = 0.5
 
     def __post_init__(self) -> None:
+        require_numbers(self)
         if not 2 <= self.n_points <= _MOST_POINTS:
             raise InvalidValueError(
                 f"n_points must lie in [2, {_MOST_POINTS}], not {self.n_points}"
@@ -221,6 +223,8 @@ class TreeConfig:
         )
 
     def __post_init__(self) -> None:
+        require_numbers(self)
+        require_kind("normalisation", self.normalisation, NormalisationConfig)
         for name in (
             "variance_floor",
             "power",
@@ -270,11 +274,13 @@ class TreeConfig:
         for name, low in lowest.items():
             if not getattr(self, name) >= low:
                 raise InvalidValueError(f"{name} must be at least {low}, not {getattr(self, name)}")
+        if self.false_acceptance is not None:
+            require_number("false_acceptance", self.false_acceptance)
         if self.false_acceptance is not None and not 0 < self.false_acceptance < 1:
             raise InvalidValueError(
                 f"false_acceptance must lie in (0, 1) or be None, not {self.false_acceptance}"
             )
-        if self.durations not in ("geometric", "explicit"):
+        if not is_one_of(self.durations, ("geometric", "explicit")):
             raise InvalidValueError(
                 f"durations must be 'geometric' or 'explicit', not {self.durations!r}"
             )
