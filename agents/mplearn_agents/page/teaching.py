@@ -27,12 +27,13 @@ from .messages import Header, literal, mention
 LONGEST_NAME, LONGEST_NOTE = 80, 1000
 
 
-def do(lifelong: LifelongLearner, asked: Mapping[str, Any], by: str) -> str:
-    """Do what a teacher asks, and return what was done, in words.
+def do(lifelong: LifelongLearner, asked: Mapping[str, Any], by: str) -> tuple[str, int]:
+    """Do what a teacher asks, and return what was done, in words, and the command's number.
 
     Args:
         lifelong: Who learns.
-        asked: The request: ``do`` says what, see `COMMANDS`; or undo and redo.
+        asked: The request: ``do`` says what, see `COMMANDS`; or undo and redo, of the command
+            ``entry`` where that is given.
         by: Who asks.
 
     Raises:
@@ -40,14 +41,14 @@ def do(lifelong: LifelongLearner, asked: Mapping[str, Any], by: str) -> str:
     """
     what = asked["do"]
     if what in ("undo", "redo"):
-        entry = lifelong.undo(by=by) if what == "undo" else lifelong.redo(by=by)
-        return in_words(entry.command, lifelong)
+        number = _id(asked, "entry", "a command") if "entry" in asked else None
+        entry = (lifelong.undo if what == "undo" else lifelong.redo)(by, number)
+        return in_words(entry.command, lifelong), entry.number
     if what not in COMMANDS:
         raise InvalidValueError(f"a request is one of {', '.join(COMMANDS)}, not {what[:40]!r}")
     command = COMMANDS[what](asked)
     text = in_words(command, lifelong)  # before names change
-    lifelong.execute(command, by=by)
-    return text
+    return text, lifelong.execute(command, by=by).number
 
 
 def in_words(command: Command, lifelong: LifelongLearner) -> str:
@@ -111,10 +112,10 @@ def history(lifelong: LifelongLearner, asked: Mapping[str, Any]) -> list[Header]
     return lines
 
 
-def _id(asked: Mapping[str, Any], key: str = "id") -> int:
+def _id(asked: Mapping[str, Any], key: str = "id", of: str = "a primitive") -> int:
     value = asked.get(key)
     if type(value) is not int or not 0 <= value < 2**53:
-        raise InvalidValueError(f"{key} must be the number of a primitive, not {value!r:.40}")
+        raise InvalidValueError(f"{key} must be the number of {of}, not {value!r:.40}")
     return value
 
 

@@ -44,6 +44,7 @@ _WARM_UP = ("BAR", "BAL") * 4
 _KINDS = 14  # more primitives than are compared one by one
 _TEACHERS, _STREAM = 0, 1  # who comes first
 _FORESEEN, _TOLD = 8, 3  # motions that may come next: looked at, and told
+_TOLD_UNDOABLE = 10  # commands, the latest: more do not stand on a page
 _DELAYS = 500  # frames over which the delay is measured
 
 
@@ -382,6 +383,9 @@ class Watcher:
             "store": self._settings.store,
             "problem": self._problem(),
             "paused": False if lifelong is None else lifelong.learner.paused,
+            "undoable": [] if lifelong is None else lifelong.reversible()[-_TOLD_UNDOABLE:],
+            "redoable": [] if lifelong is None else lifelong.reversible(undone=True)[-1:],
+            "entry": 0 if lifelong is None else lifelong.number - 1,
             "memory_mb": _memory_mb(),
         }
 
@@ -424,24 +428,25 @@ class Watcher:
             elif asked["do"] == "history":
                 reply["lines"] = history(self._known(), asked)
             else:
-                reply["text"] = self._do(asked)
+                reply["text"], reply["entry"] = self._do(asked)
             self._outbox.post(reply | {"ok": True})
         except MPLearnError as error:
             self._outbox.post(reply | {"ok": False, "text": literal(error)})
         self._told_at = 0.0
 
-    def _do(self, asked: Header) -> str:
-        """Do what a teacher asks, and return what was done.
+    def _do(self, asked: Header) -> tuple[str, int]:
+        """Do what a teacher asks, and return what was done, and the command's number.
 
         Raises:
             MPLearnError: It cannot be done.
         """
         lifelong = self._known()
         by = asked["by"]
-        text = do(lifelong, asked, by)
+        text, number = do(lifelong, asked, by)
         self._happened("command", f"{by}: {text}")
         self._tell_forecast()
-        return text
+        self._status_at = 0.0  # what can be undone is another
+        return text, number
 
     def _show(self, asked: Header) -> str:
         """Send the figure of a primitive, with its demonstrations; return which it is."""

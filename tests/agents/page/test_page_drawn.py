@@ -364,3 +364,78 @@ def test_it_draws_on_while_much_comes(server, new_page):
     frames = page.evaluate("new Promise((r) => requestAnimationFrame(() => r(1)))")
     assert frames == 1
     time.sleep(0.1)
+
+
+def test_what_cannot_be_undone_cannot_be_asked_to_be(server, new_page):
+    """A teacher's note loses its Undo when another one has undone it; so do the buttons."""
+    server.hear(world.stream())
+    server.hear(world.knowledge(3))
+    status = {"kind": "status", "source": "made up", "state": "live", "frames": 1}
+    server.hear(status | {"undoable": [4, 6], "redoable": [], "entry": 6})
+    page = new_page(server.url)
+    sent = []
+    page.on("websocket", lambda socket: socket.on("framesent", lambda text: sent.append(text)))
+    page.reload()
+    until(lambda: rows(page).count() == 3, 10)
+    assert page.locator("#undo").is_enabled()
+    assert not page.locator("#redo").is_enabled()
+    rows(page).first.click()
+    page.keyboard.press("Delete")
+    until(lambda: any('"forget"' in text for text in sent), 5)
+    asked = next(json.loads(text) for text in sent if '"forget"' in text)
+    number = max(client.number for client in server.hub.clients)
+    reply = {"kind": "reply", "client": number, "ref": asked["ref"], "ok": True, "entry": 7}
+    server.hear(reply | {"text": "{1} is forgotten"})
+    undo = page.locator("#notes button")
+    until(lambda: undo.count() == 1, 5)  # the status was said before it
+    server.hear(status | {"undoable": [4, 6, 7], "redoable": [], "entry": 7})
+    undo.click()
+    until(lambda: any('"undo"' in text for text in sent), 5)
+    assert next(json.loads(text) for text in sent if '"undo"' in text)["entry"] == 7
+    page.keyboard.press("Delete")
+    until(lambda: sum('"forget"' in text for text in sent) == 2, 5)
+    ref = [json.loads(text)["ref"] for text in sent if '"forget"' in text][-1]
+    server.hear(reply | {"ref": ref, "entry": 9, "text": "{1} is forgotten"})
+    until(lambda: undo.count() == 1, 5)
+    server.hear(status | {"undoable": [], "redoable": [9], "entry": 10})
+    until(lambda: undo.count() == 0, 5)
+    assert page.locator("#notes div").count() == 1
+    assert not page.locator("#undo").is_enabled()
+    assert page.locator("#redo").is_enabled()
+
+
+def test_in_the_tree_no_name_touches_how_often_it_was_shown(server, new_page):
+    names = ["MMMMMWWWWW MMMMMWWWWW MMMMMWWWWW", "iiiiiiiiiiiiiiiiiiiiiiiiiiiii", "上げる" * 12]
+    server.hear(world.stream())
+    server.hear(world.knowledge(12, names * 4))
+    page = new_page(server.url)
+    for screen in (False, True):
+        if screen:
+            page.keyboard.press("f")
+        until(lambda: rows(page).count() == 12, 10)
+        for row in rows(page).all():
+            name, count = (row.locator("text").nth(k).bounding_box() for k in (0, 1))
+            assert name["x"] + name["width"] + 5 <= count["x"]
+    page.keyboard.press("f")
+
+
+def test_no_arrow_lies_under_the_name_that_it_points_to(server, new_page):
+    names = [f"raise the arm, way {k}" for k in range(1, 9)]
+    server.hear(world.stream())
+    server.hear(world.knowledge(len(names), names))
+    page = new_page(server.url, 1920, 1080)
+    texts, tips = page.locator("#graph .node text"), page.locator("#graph .tip")
+    until(lambda: texts.count() == len(names), 10)
+
+    def clear():
+        return page.evaluate(
+            """() => [...document.querySelectorAll("#graph .tip")].every((tip) => {
+              const name = document.querySelector(`#graph [data-id="${tip.dataset.to}"] text`);
+              const a = tip.getBoundingClientRect(), b = name.getBoundingClientRect();
+              return a.right <= b.left + 1 || b.right <= a.left + 1
+                || a.bottom <= b.top + 3 || b.bottom - 3 <= a.top;
+            })"""
+        )
+
+    assert tips.count() > 8
+    until(clear, 20, "arrows that can be seen")

@@ -218,18 +218,20 @@ def test_each_request_is_a_command_and_can_be_undone(taught):
         {"do": "note", "id": a, "text": "slow"},
         {"do": "pause"},
     ):
-        said = teaching.do(life, asked, "Anna")
+        said, entry = teaching.do(life, asked, "Anna")
         assert said
-        assert teaching.do(life, {"do": "undo"}, "Bob").startswith("undone: ")
+        assert life.reversible()[-1] == entry
+        named = {"entry": entry} if asked["do"] != "pause" else {}  # that, or the latest
+        assert teaching.do(life, {"do": "undo"} | named, "Bob")[0].startswith("undone: ")
+        assert life.reversible(undone=True)[-1] == entry
     assert (life.snapshot().ids, life.snapshot().names) == before
     assert not life.learner.paused
     lines = teaching.history(life, {"id": a})
     assert any("Anna" in line["text"] and "undone" in line["text"] for line in lines)
-    said = teaching.do(life, {"do": "rename", "id": a, "name": "{7}"}, "Anna")
+    said, _ = teaching.do(life, {"do": "rename", "id": a, "name": "{7}"}, "Anna")
     assert said.endswith("is called {{7} now")  # which stands for no primitive
-    assert (
-        teaching.do(life, {"do": "undo"}, "Anna") == f"undone: {before[1][0]} is called {{{{7}} now"
-    )
+    said, _ = teaching.do(life, {"do": "undo"}, "Anna")
+    assert said == f"undone: {before[1][0]} is called {{{{7}} now"
 
 
 @pytest.mark.parametrize(
@@ -243,6 +245,9 @@ def test_each_request_is_a_command_and_can_be_undone(taught):
         {"do": "forget", "id": -1},
         {"do": "note", "id": 1, "text": None},
         {"do": "open the pod bay doors"},
+        {"do": "undo", "entry": "last"},
+        {"do": "undo", "entry": 10**6},
+        {"do": "redo", "entry": None},
     ],
 )
 def test_what_is_asked_wrongly_changes_nothing(taught, asked):

@@ -7,6 +7,8 @@ const LABELS_MOST = 44;     // edges up to which each has its probability beside
 const NAMED_MOST = 90;      // primitives up to which each has its name below it
 const AROUND_MOST = 9;      // primitives in a column
 const APART_MOST = 60;      // primitives up to which names lie apart, and edges go around others
+const FULL = 0.45;          // share of the panel that primitives and names can take and still lie apart
+const LETTERS = [18, 14, 12]; // of a name: as many as there is room for
 
 export class Graph {
   constructor(svg, choose) {
@@ -15,6 +17,7 @@ export class Graph {
     this.mode = "auto";
     this.places = new Map();
     this.heat = 0;
+    this.letters = LETTERS[0];
     this.ids = [];
     this.edges = [];
     this.primitives = new Map();
@@ -33,7 +36,15 @@ export class Graph {
     });
   }
 
-  get around() { return this.mode === "around" || (this.mode === "auto" && this.ids.length > WHOLE_MOST); }
+  get around() { return this.mode === "around" || (this.mode === "auto" && (this.ids.length > WHOLE_MOST || !this.letters)); }
+
+  // How many letters of each name there is room for; 0 where names could not lie apart.
+  fitting(width, height, size) {
+    if (this.ids.length > APART_MOST) return this.ids.length > NAMED_MOST ? 0 : 8;
+    const r = radius(this.ids.length, width, height, size), high = 2 * r + 1.35 * size;
+    const taken = (letters) => this.ids.reduce((sum, id) => sum + high * (Math.max(2 * r, 0.6 * size * Math.min(letters, this.primitives.get(id).name.length)) + 6), 0);
+    return LETTERS.find((letters) => taken(letters) <= FULL * width * height) ?? 0;
+  }
 
   set(primitives, edges) {
     const ids = [...primitives.keys()], before = `${this.ids} ${this.edges.map((e) => e.slice(0, 2))}`;
@@ -94,6 +105,8 @@ export class Graph {
     const width = this.svg.clientWidth, height = this.svg.clientHeight;
     if (!width || !height) return false;
     if (this.size !== `${width} ${height}`) { this.size = `${width} ${height}`; this.stale = true; }
+    const size = parseFloat(getComputedStyle(this.svg).fontSize) || 13;
+    if (this.stale) this.letters = this.fitting(width, height, size);
     let moved = false;
     if (!this.around) {
       const rounds = this.ids.length > 60 ? 12 : 2;
@@ -103,7 +116,6 @@ export class Graph {
     } else if (!this.stale) return false;
     this.stale = false;
     set(this.svg, { viewBox: `0 0 ${width} ${height}` });
-    const size = parseFloat(getComputedStyle(this.svg).fontSize) || 13;
     this.lines.replaceChildren();
     this.texts.replaceChildren();
     this.used = new Set();
@@ -118,19 +130,20 @@ export class Graph {
   }
 
   drawWhole(width, height, size) {
-    const n = this.ids.length, r = Math.max(5, Math.min(1.05 * size, 0.24 * Math.sqrt((width * height) / (n * 6))));
+    const n = this.ids.length, r = radius(n, width, height, size), { letters } = this;
     const loops = this.edges.some((e) => e[0] === e[1]); // they rise above their primitive
-    const named = n <= NAMED_MOST;
-    const margin = named ? { x: 4.2 * size, y: (loops ? 3.6 : 2) * size } : { x: 2 * size, y: 3 * r + size };
+    const named = letters > 0;
+    const margin = named ? { x: 4.2 * size, y: (loops ? 3.6 : 2) * size, below: r + 1.7 * size } : { x: 2 * size, y: 3 * r + size, below: 3 * r + size };
     const xs = this.ids.map((id) => this.places.get(id).x), ys = this.ids.map((id) => this.places.get(id).y);
     const box = { x: Math.min(...xs), y: Math.min(...ys), w: Math.max(Math.max(...xs) - Math.min(...xs), 0.25), h: Math.max(Math.max(...ys) - Math.min(...ys), 0.25) };
     const place = (id) => {
       const p = this.places.get(id);
-      return { x: n === 1 ? width / 2 : margin.x + ((p.x - box.x) / box.w) * (width - 2 * margin.x), y: n === 1 ? height / 2 : margin.y + ((p.y - box.y) / box.h) * (height - 2 * margin.y - size) };
+      return { x: n === 1 ? width / 2 : margin.x + ((p.x - box.x) / box.w) * (width - 2 * margin.x), y: n === 1 ? height / 2 : margin.y + ((p.y - box.y) / box.h) * (height - margin.y - margin.below) };
     };
-    const letters = n > APART_MOST ? 8 : 18, at = new Map(this.ids.map((id) => [id, place(id)]));
-    const room = this.ids.map((id) => ({ at: at.get(id), w: named ? 0.6 * size * Math.min(letters, this.primitives.get(id).name.length) : 0 }));
-    if (n <= APART_MOST) apart(room, r, size, { x0: margin.x, x1: width - margin.x, y0: margin.y, y1: height - margin.y - size });
+    const at = new Map(this.ids.map((id) => [id, place(id)]));
+    for (const [id, p] of at) Object.assign(p, { width, w: named ? 0.6 * size * Math.min(letters, this.primitives.get(id).name.length) : 0 });
+    const room = [...at.values()].map((p) => ({ at: p, w: p.w }));
+    if (n <= APART_MOST) apart(room, r, size, { x0: margin.x, x1: width - margin.x, y0: margin.y, y1: height - margin.below });
     const pairs = new Set(this.edges.map((e) => `${e[0]} ${e[1]}`));
     const { texts } = this;
     const labels = this.edges.length <= LABELS_MOST;
@@ -180,26 +193,34 @@ export class Graph {
     const before = this.edges.filter((e) => e[1] === id && e[0] !== id).sort((a, b) => b[2] - a[2]);
     for (const edge of before) if (follows.has(edge[0])) back.set(edge[0], edge);
     const itself = this.edges.find((e) => e[0] === id && e[1] === id);
-    const top = 2.1 * size, most = Math.max(1, Math.min(AROUND_MOST, Math.floor((height - top) / (2.9 * size))));
-    const r = 0.95 * size, centre = { x: width / 2, y: (height + top) / 2 - 0.6 * size };
+    const top = 2.1 * size, most = Math.max(1, Math.min(AROUND_MOST, Math.floor((height - top) / (3.4 * size))));
+    const r = 0.95 * size, letters = Math.max(6, Math.min(16, Math.floor((0.3 * width) / (0.6 * size))));
+    const room = (id, most) => 0.6 * size * Math.min(most, this.primitives.get(id)?.name.length ?? 3);
+    const centre = { x: width / 2, y: (height + top) / 2 - 0.6 * size, w: room(id, letters + 3), width }, taken = [];
+    const put = (id, at, r, letters) => {
+      this.node(id, at, r, size, letters, true, width);
+      taken.push({ x: at.x - r, y: at.y - r, w: 2 * r, h: 2 * r }, { x: at.x - at.w / 2, y: at.y + r, w: at.w, h: 1.3 * size });
+    };
     const draw = (edge, from, to, bent) => this.edge(from, to, r, edge, { lit: edge[0] === this.marks.present, dim: false, bend: bending(from, to, bent), label: true, size, late: edge[0] === id });
     const column = (list, x, end, head) => {
       const shown = list.slice(0, most), step = Math.min((height - top) / Math.max(shown.length, 1), 5 * size);
+      if (!list.length) return;
       const text = make("text", { class: "head", x, y: 1.4 * size });
       text.textContent = list.length > shown.length ? `${head}: ${shown.length} of ${list.length}` : head;
       this.texts.append(text);
       shown.forEach((edge, k) => {
-        const at = { x, y: centre.y + (k - (shown.length - 1) / 2) * step }, other = back.get(edge[1]);
+        const at = { x, y: centre.y + (k - (shown.length - 1) / 2) * step, w: room(edge[end], letters), width }, other = back.get(edge[1]);
         if (end === 0) draw(edge, at, centre, false);
         else draw(edge, centre, at, Boolean(other));
         if (end === 1 && other) draw(other, at, centre, true);
-        this.node(edge[end], at, r, size, 16, true, width);
+        put(edge[end], at, r, letters);
       });
     };
     column(before.filter((e) => !follows.has(e[0])), 0.16 * width, 0, "before");
     column(after, 0.84 * width, 1, "after");
     if (itself) draw(itself, centre, centre, false);
-    this.node(id, centre, 1.4 * r, size, 24, true, width);
+    put(id, centre, 1.4 * r, letters + 3);
+    uncovered(this.texts, taken, size);
   }
 
   edge(from, to, r, [source, target, count, p], { lit, dim, bend, label, size, late = false }) {
@@ -217,8 +238,10 @@ export class Graph {
       const cx = (from.x + to.x) / 2 - uy * bend * 2, cy = (from.y + to.y) / 2 + ux * bend * 2;
       const out = unit(cx - from.x, cy - from.y); way = unit(to.x - cx, to.y - cy);
       const head = 2.2 + 2.2 * weight;
-      tip = { x: to.x - way.x * (r + 2), y: to.y - way.y * (r + 2) };
-      const sx = from.x + out.x * (r + 1), sy = from.y + out.y * (r + 1);
+      let begin = beyond(from, out.x, out.y, r, size), end = beyond(to, -way.x, -way.y, r, size);
+      if (begin + end > length - 2 * head) { begin = r + 1; end = r + 2; }
+      tip = { x: to.x - way.x * end, y: to.y - way.y * end };
+      const sx = from.x + out.x * begin, sy = from.y + out.y * begin;
       d = `M${f(sx)} ${f(sy)}Q${f(cx)} ${f(cy)} ${f(tip.x - way.x * head)} ${f(tip.y - way.y * head)}`;
       const near = late ? 0.22 : 0.3; // names lie at the middle of what is around one: away from it
       middle = { x: near * sx + 0.5 * cx + (0.5 - near) * tip.x, y: near * sy + 0.5 * cy + (0.5 - near) * tip.y };
@@ -229,7 +252,7 @@ export class Graph {
     title.textContent = `${p.toFixed(2)}, seen ${count} times`;
     path.append(title);
     const head = 2.4 + 2.3 * weight, nx = -way.y, ny = way.x, w = 0.62 * head;
-    const arrow = make("path", { class: `tip${kind}`, d: `M${f(tip.x)} ${f(tip.y)}L${f(tip.x - way.x * head + nx * w)} ${f(tip.y - way.y * head + ny * w)}L${f(tip.x - way.x * head - nx * w)} ${f(tip.y - way.y * head - ny * w)}Z` });
+    const arrow = make("path", { class: `tip${kind}`, "data-to": target, d: `M${f(tip.x)} ${f(tip.y)}L${f(tip.x - way.x * head + nx * w)} ${f(tip.y - way.y * head + ny * w)}L${f(tip.x - way.x * head - nx * w)} ${f(tip.y - way.y * head - ny * w)}Z` });
     if (!dim) arrow.setAttribute("fill-opacity", f(lit ? 0.95 : opacity));
     this.lines.append(path, arrow);
     if (label && length > 5.5 * size || (label && source === target)) {
@@ -253,11 +276,27 @@ export class Graph {
     const words = named ? shortened(primitive?.name ?? `P${id}`, letters) : "", half = 0.3 * size * words.length;
     set(g, { class: kind, transform: `translate(${f(at.x)} ${f(at.y)})` });
     set(circle, { r: f(r) });
-    set(text, { x: f(Math.max(half - at.x, Math.min(0, width - half - at.x))), y: f(r + 1.05 * size) });
+    set(text, { x: f(aside(at.x, half, width)), y: f(r + 1.05 * size) });
     write(text, words);
     write(title, primitive?.name ?? "");
   }
 }
+
+// How large primitives are drawn, of so many.
+function radius(n, width, height, size) {
+  return Math.max(5, Math.min(1.05 * size, 0.24 * Math.sqrt((width * height) / (n * 6))));
+}
+
+// How far from the middle of a primitive an edge is seen: beyond its circle, and the name below it.
+function beyond({ x, w = 0, width }, ux, uy, r, size) {
+  const middle = aside(x, w / 2, width), half = w / 2 + 3, top = ((r + 0.25 * size) / uy) * ux;
+  if (uy <= 0 || !w || Math.abs(top - middle) > half) return r + 2;
+  const side = (middle + Math.sign(ux || 1) * half) / (ux || 1e-6);
+  return Math.max(r + 2, Math.min(side, (r + 1.4 * size) / uy) + 1);
+}
+
+// How far to the side of a primitive its name lies, so that all of it is in the panel.
+function aside(x, half, width) { return Math.max(half - x, Math.min(0, width - half - x)); }
 
 // How far an edge leaves the straight line: both ways between two are seen [px].
 function bending(from, to, bent) {
@@ -291,7 +330,7 @@ function clearing(from, to, bent, places, r) {
 // Move primitives so far that their names do not cover each other, where there is room.
 function apart(room, r, size, { x0, x1, y0, y1 }) {
   const wide = ({ w }) => Math.max(2 * r, w) + 6, h = 2 * r + 1.35 * size;
-  for (let round = 0; round < 12; round++) {
+  for (let round = 0; round < 40; round++) {
     let moved = false;
     for (let i = 0; i < room.length; i++) {
       for (let j = i + 1; j < room.length; j++) {
@@ -311,7 +350,7 @@ function apart(room, r, size, { x0, x1, y0, y1 }) {
 // Leave out the probabilities that would cover a node or a likelier one.
 function uncovered(texts, taken, size) {
   const w = 2.1 * size, h = 0.95 * size;
-  for (const text of [...texts.children].sort((a, b) => b.dataset.p - a.dataset.p)) {
+  for (const text of [...texts.querySelectorAll(".p")].sort((a, b) => b.dataset.p - a.dataset.p)) {
     const box = { x: text.getAttribute("x") - w / 2, y: text.getAttribute("y") - h / 2, w, h };
     const covers = taken.some((t) => box.x < t.x + t.w && t.x < box.x + w && box.y < t.y + t.h && t.y < box.y + h);
     if (covers) text.remove(); else taken.push(box);

@@ -128,6 +128,7 @@ function status() {
   set(find("#state .doing"), stopped ? `the learner is ${p.learner}` : ` — ${s.paused ? "learning is paused" : s.state ?? "starting"}`);
   root.dataset.frames = s.frames;
   find("#state").dataset.live = !stopped && s.state === "live" && !s.paused ? "yes" : "no";
+  undoable(s);
   world.paused = Boolean(s.paused);
   set(find("#pause"), world.paused ? "Resume" : "Pause");
   find("#pause").classList.toggle("main", world.paused);
@@ -143,6 +144,16 @@ function status() {
   ]);
   stage.captions.person = s.person ? `person ${s.person}` : "";
   if (!world.stream) present();
+}
+
+// Only what can be undone, by whoever did it, can be asked to be.
+function undoable({ undoable: list = [], redoable = [], entry = 0 }) {
+  find("#undo").disabled = !list.length;
+  find("#redo").disabled = !redoable.length;
+  for (const box of document.querySelectorAll("#notes [data-entry]")) {
+    const number = Number(box.dataset.entry);
+    if (number && number <= entry && !list.includes(number)) box.querySelector("button")?.remove();
+  }
 }
 
 function figures(list) {
@@ -181,7 +192,7 @@ let question = null;   // the note that asks for it
 async function ask(what, values, { quiet = false, undo = false } = {}) {
   const reply = await link.ask(what, values);
   if (!reply.ok) note(side.text(reply.text));
-  else if (!quiet) note(side.text(reply.text), undo ? ["Undo", () => ask("undo")] : null);
+  else if (!quiet) note(side.text(reply.text), undo ? ["Undo", () => ask("undo", { entry: reply.entry })] : null).dataset.entry = undo ? reply.entry : "";
   return reply;
 }
 

@@ -148,7 +148,7 @@ export class Stream {
       c.fillStyle = known ? (last ? style.onAccent : style.ink) : style.soft;
       c.textAlign = "left";
       const text = known ? label(segment.primitive) : "not recognised";
-      words(c, text, Math.max(a, 0) + 7, top + strip / 2 + 1, b - Math.max(a, 0) - 12, font, style.font, known ? 600 : 400);
+      words(c, text, Math.max(a, 0) + 6, top + strip / 2 + 1, b - Math.max(a, 0) - 10, font, style.font, known ? 600 : 400);
     }
     if (end !== null && end < now) { // what goes on now
       const a = Math.max(x(end), 0);
@@ -266,14 +266,24 @@ function words(c, text, x, y, width, size, family, weight) {
   if (width < 14) return;
   c.font = `${weight} ${size}px ${family}`;
   if (c.measureText(text).width <= width || !text.includes(" ")) { c.fillText(clipped(c, text, width), x, y); return; }
-  c.font = `${weight} ${0.84 * size}px ${family}`;
+  let [first, rest] = ["", ""];
+  for (const scale of [0.84, 0.72]) { // smaller before it is cut
+    c.font = `${weight} ${scale * size}px ${family}`;
+    [first, rest] = halves(c, text, width);
+    if (Math.max(c.measureText(first).width, c.measureText(rest).width) <= width) break;
+  }
+  c.fillText(clipped(c, first, width), x, y - 0.55 * size);
+  c.fillText(clipped(c, rest, width), x, y + 0.5 * size);
+}
+
+// Parts of a text in two lines: how it begins, and how it ends, which tells more than its middle.
+function halves(c, text, width) {
   const parts = text.split(" ");
   let first = parts.shift();
   while (parts.length > 1 && c.measureText(`${first} ${parts[0]}`).width <= width) first += ` ${parts.shift()}`;
   let rest = parts.join(" ");
-  while (parts.length > 1 && c.measureText(rest).width > width) { parts.shift(); rest = parts.join(" "); } // its end tells more
-  c.fillText(clipped(c, first, width), x, y - 0.55 * size);
-  c.fillText(clipped(c, rest, width), x, y + 0.5 * size);
+  while (parts.length > 1 && c.measureText(rest).width > width) { parts.shift(); rest = parts.join(" "); }
+  return [first, rest];
 }
 
 function line(c, x1, y1, x2, y2, colour, width) {

@@ -173,7 +173,8 @@ export class Tree {
     set(name, { x: x + 0.95 * size, y: y + 0.35 * size });
     set(count, { class: provisional ? "dots" : "soft", x: width - 8, y: y + 0.35 * size });
     write(count, provisional ? dots(primitive.n, primitive.of) : `× ${primitive?.n ?? node.n}`);
-    write(name, shortened(primitive?.name ?? `P${node.id}`, (width - x - 4.6 * size) / (0.53 * size)));
+    const room = width - 8 - wide(count.textContent, size) - 0.8 * size - (x + 0.95 * size);
+    write(name, fitted(primitive?.name ?? `P${node.id}`, room, size));
     write(title, `${primitive?.name ?? ""}, ${provisional ? `${primitive.n} of ${primitive.of}` : `shown ${primitive?.n ?? node.n} times`}`);
     return key;
   }
@@ -211,6 +212,21 @@ export function make(tag, attributes = {}) {
   const element = document.createElementNS(SVG, tag);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
   return element;
+}
+
+// How wide a text of the tree is when its primitive is lit, and it is widest [px].
+const pen = document.createElement("canvas").getContext("2d");
+function wide(text, size) {
+  pen.font = `650 ${size}px ${getComputedStyle(document.body).fontFamily}`;
+  return pen.measureText(text).width + (/^[●○]+$/.test(text) ? 2 * text.length : 0); // dots are spaced
+}
+
+// As much of a text as there is room for [px].
+function fitted(text, room, size) {
+  let n = [...text].length;
+  if (n <= 3 || wide(text, size) <= room) return text;
+  while (n > 3 && wide(shortened(text, n), size) > room) n--;
+  return shortened(text, n);
 }
 
 export function shortened(text, n) {
