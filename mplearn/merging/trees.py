@@ -12,6 +12,7 @@ from ..errors import InvalidValueError
 from ..recording import IntArray
 from ..state import Blob
 from ..tree import ROOT, Change, PrimitiveTree
+from ..tree.exemplars.memory import FOLLOWING
 from ..tree.exemplars.spread import SampleState, SpreadState
 from ..tree.nodes.node import NodeState
 from ..tree.nodes.search import mean_nearest
@@ -150,6 +151,7 @@ def _joined(
         sample=_sampled(a, b, config.n_sampled, config.seed),
         nodes=_with_one_root(a.nodes, nodes, config.max_unplaced),
         neighbours=a.neighbours + b.neighbours,
+        follows=np.concatenate([a.follows, b.follows + a.n_seen])[-FOLLOWING:],
     )
 
 

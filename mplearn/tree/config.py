@@ -109,9 +109,9 @@ class TreeConfig:
             for `pair_share` alone.
         sequence_extent: And below this share of how far each is from standing still.
         ignore_fragments: Whether nothing becomes a primitive that is, together with the segment
-            right before or after it, an execution of a sure one, or nearer by far to the only other
-            one that it is like: a motion that is cut in two where someone hesitated is not two
-            motions.
+            right before or after it, an execution of a primitive that is sure by then, or nearer by
+            far to the only other one that it is like: a motion that is cut in two where someone
+            hesitated is not two motions.
         confirmed: Members from which on a primitive is sure; with fewer it is provisional.
         patience: A provisional primitive that nothing has joined after so many further segments is
             forgotten; after four times as many as there are primitives, if that is more.
@@ -176,10 +176,10 @@ class TreeConfig:
     ignore_fragments: bool = newer(True, absent=False)
     confirmed: int = newer(3, absent=1)
     patience: int = newer(64, absent=64)
-    reach: float = 1.5
+    reach: float = 1.6
     young_reach: float = newer(0.85, absent=0.0)
     least_reach: float = newer(0.4, absent=0.0)
-    reach_cap: float = 1.75
+    reach_cap: float = 2.0
     reach_limit: float = 1.0
     n_nearest: int = 2
     split_ratio: float = 2.0
@@ -213,6 +213,7 @@ class TreeConfig:
             sequence_share=0.0,
             ignore_fragments=False,
             confirmed=1,
+            reach=1.5,
             young_reach=0.0,
             least_reach=0.0,
             reach_cap=math.inf,

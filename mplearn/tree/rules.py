@@ -7,7 +7,7 @@ motion merged.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from itertools import permutations
 
 import numpy as np
@@ -35,6 +35,7 @@ _BY_FAR = 1.2  # how many times as far the next is
 _PLAYED_BACK = 0.05  # over the scale: nobody hesitates again so exactly
 _SURELY = 1 - 1e-9  # whatever a mean is rounded to
 _NEARER = 0.8  # of how far a part is from a whole: what it is a part of, at the most
+_WELL_INSIDE = 0.8  # of its radius
 _UNKNOWN = 3.0  # leaves that the scale of all motion counts for beside that of those
 
 
@@ -184,25 +185,22 @@ def settle_fragments(structure: Structure, number: int, longest: int) -> None:
         number: The segment that came now; the one before it ended where it begins.
         longest: Most frames of a motion.
     """
-    root, memory, pair = structure.root, structure.memory, {number - 1, number}
-    if pair.isdisjoint(root.members) or not pair <= memory.frames.keys():
+    root, pair = structure.root, {number - 1, number}
+    if pair.isdisjoint(root.members) or not structure.memory.goes_on(number - 1):
         return
     if sum(map(structure.length_of, pair)) > longest:
         return
-    best = next(iter(structure.index.search(_joined(structure, pair), memory.bank)), None)
-    if best is None or best.ratio > 1:
-        return
-    home = structure.nodes[best.node]
-    if home.is_leaf and home.n_placed >= structure.config.confirmed:
+    if _is_of_sure(structure, _joined(structure, [number - 1])[0], 1.0):
         root.settled |= pair.intersection(root.members)
 
 
 def _fragments(structure: Structure, node: Node, members: Sequence[int]) -> set[int]:
-    """Return what waits and is only a part of what another segment is a whole execution of.
+    """Return what waits and is only a part of something that was performed whole, too.
 
-    Together with what came right before or after it, it is nearer to that one by far. Two that are
-    alike are few to tell; where there are more, the others outvote a part, and what is played back
-    counts nevertheless.
+    Together with what came before or after it, it is nearer by far to what it is like, or, where
+    that went on without a rest, an execution of a primitive that has become sure since. Two that
+    are alike are few to tell; where there are more, the others outvote a part, and what is played
+    back counts nevertheless.
 
     Args:
         structure: The tree.
@@ -217,22 +215,38 @@ def _fragments(structure: Structure, node: Node, members: Sequence[int]) -> set[
         or not node.settled.isdisjoint(members)
     ):
         return found
-    bank, frames = structure.memory.bank, structure.memory.frames
-    for number, other in permutations(members):
-        nearer = _NEARER * bank.distances(bank[number], [other])[0]
-        for pair in ({number - 1, number}, {number, number + 1}):
-            if other not in pair and pair <= frames.keys():
-                whole = _joined(structure, pair)
-                if bank.distances(whole, [other])[0] < nearer:
-                    found |= pair.intersection(node.members)
+    memory, bank = structure.memory, structure.memory.bank
+    parts = [
+        (number, other, first)
+        for number, other in permutations(members)
+        for first in (number - 1, number)
+        if other not in (first, first + 1) and {first, first + 1} <= memory.frames.keys()
+    ]
+    wholes = _joined(structure, [first for _, _, first in parts])
+    for (number, other, first), whole in zip(parts, wholes, strict=True):
+        alone, together = (bank.distances(one, [other])[0] for one in (bank[number], whole))
+        if together < _NEARER * alone or (
+            memory.goes_on(first) and _is_of_sure(structure, whole, _WELL_INSIDE)
+        ):
+            found |= {first, first + 1}.intersection(node.members)
     return found
 
 
-def _joined(structure: Structure, pair: Collection[int]) -> Exemplar:
-    """Return a model of two segments, one right after the other, as one."""
-    frames = np.concatenate([structure.memory.frames[number] for number in sorted(pair)])
-    seen = normalised(frames, structure.config.normalisation)
-    return structure.memory.bank.model(seen, len(frames))
+def _is_of_sure(structure: Structure, whole: Exemplar, most: float) -> bool:
+    """Return whether a segment lies in a sure primitive, at most so far out, 1 being its radius."""
+    best = next(iter(structure.index.search(whole, structure.memory.bank)), None)
+    if best is None or best.ratio > most:
+        return False
+    home = structure.nodes[best.node]
+    return home.is_leaf and home.n_placed >= structure.config.confirmed
+
+
+def _joined(structure: Structure, firsts: Sequence[int]) -> list[Exemplar]:
+    """Return models of some segments and the next of each, which follows it, as one."""
+    frames, config = structure.memory.frames, structure.config.normalisation
+    joined = [np.concatenate([frames[first], frames[first + 1]]) for first in firsts]
+    seen = [normalised(each, config) for each in joined]
+    return structure.memory.bank.models(seen, list(map(len, joined)))
 
 
 def _leaf_of(structure: Structure, members: Sequence[int], limit: float) -> Node | None:

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InvalidValueError, UnknownPrimitiveError
 from ..hmm import LeftRightHMM
 from ..hmm.sequences import as_frames
-from ..recording import FloatArray
+from ..recording import FloatArray, IntArray
 from ..state import (
     Array,
     Blob,
@@ -63,6 +63,7 @@ class TreeState(State):
         nodes: The nodes, the root first.
         renewal: Models on their way that will take the place of these; None for none.
         neighbours: See `exemplars.neighbours`; zeros in what was kept before there were any.
+        follows: Numbers of the latest segments that began where the one before them ended, rising.
     """
 
     n_seen: Count
@@ -75,6 +76,9 @@ class TreeState(State):
     neighbours: Annotated[FloatArray, Array(N_STEPS + 1, low=0.0)] = field(
         default_factory=lambda: np.zeros(N_STEPS + 1)
     )
+    follows: Annotated[IntArray, Array(None, low=1)] = field(
+        default_factory=lambda: np.zeros(0, np.int64)
+    )
 
     def check(self) -> None:
         """Check that the nodes make one tree, and that equal numbers are the same segment."""
@@ -82,6 +86,8 @@ class TreeState(State):
         require(len(self.spread.count) == width, "spread.count", f"must have shape ({width},)")
         growing = bool((np.diff(self.neighbours) >= 0).all())
         require(growing, "neighbours", "must not fall with the distance")
+        rising = bool((np.diff(self.follows, append=self.n_seen) > 0).all())
+        require(rising, "follows", f"must rise, and be below {self.n_seen}")
         _check_nodes(self.nodes, self.next_id)
         frames: dict[int, Blob] = {}
         parts: dict[str, NodeState | SampleState] = {"sample": self.sample}
@@ -370,13 +376,13 @@ class PrimitiveTree:
             return Placement(-1, ROOT, False, np.inf, np.inf, refused=reason)
         structure, bank, number = self._structure, self._memory.bank, self.n_seen
         self.n_seen += 1
-        self._memory.remember(number, frames.copy())
+        self._memory.remember(number, frames.copy(), follows=goes_on)
         matches, distances = structure.index.look(bank[number], bank)
         distance, ratio = (matches[0].distance, matches[0].ratio) if matches else (np.inf, np.inf)
         node = self.node(matches[0].node if ratio <= 1 else ROOT)
         recognised = node.id != ROOT and node.is_leaf
         structure.add(node, number)
-        if goes_on and self.config.ignore_fragments:
+        if self.config.ignore_fragments:
             settle_fragments(structure, number, longest)
         waiting = node.matrix[-1, :-1] if node.id == ROOT else np.zeros(0)
         self._memory.meet(np.concatenate([distances, waiting]))
@@ -570,6 +576,7 @@ class PrimitiveTree:
             nodes=tuple(node.state(memory.blob) for node in self.nodes),
             renewal=memory.renewal_state(),
             neighbours=memory.neighbours.counts.copy(),
+            follows=np.array(self._memory.follows, np.int64),
         )
 
     def load_state(self, state: TreeState) -> None:
@@ -592,6 +599,7 @@ class PrimitiveTree:
             [each for node in state.nodes for each in node.exemplars()],
         )
         memory.neighbours.counts = state.neighbours.copy()
+        memory.follows = state.follows.tolist()
         self.n_seen = state.n_seen
         self._memory = memory
         self._structure = Structure(self.config, memory)

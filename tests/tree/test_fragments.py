@@ -135,3 +135,23 @@ def test_motions_that_nobody_cuts_in_two_are_learned_as_if_nobody_ever_did(seed:
     for kind in rng.integers(0, 6, 40):
         frames = motion(int(kind), rng)
         assert tree.insert(frames, goes_on=True) == kept.insert(frames, goes_on=True)
+
+
+@pytest.mark.parametrize("kind", range(6))
+@pytest.mark.parametrize("follows", [True, False])
+def test_a_part_that_came_before_its_motion_was_known_becomes_no_primitive(
+    kind: int, follows: bool
+) -> None:
+    for config, born in ((TreeConfig(), int(not follows)), (KEPT, 1)):
+        rng = np.random.default_rng(kind)
+        early, late = (PrimitiveTree(config, D, RATE_HZ) for _ in range(2))
+        whole = motion(kind, rng)
+        early.insert(whole[:24])
+        early.insert(whole[24:], goes_on=follows)
+        for k in range(24):
+            late.insert(motion(k % 6, rng))
+        tree = PrimitiveTree(config, D, RATE_HZ)
+        tree.load_state(merge_trees([late, early]).tree.state())  # what followed still does
+        assert len(tree.leaves) == 6
+        tree.insert(motion(kind, rng)[:24])  # what it goes on with is still to come
+        assert len(tree.leaves) == 6 + born

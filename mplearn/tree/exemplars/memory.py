@@ -17,6 +17,8 @@ from .neighbours import Neighbours
 from .renewal import EFFORT, SAMPLE, Renewal, RenewalState
 from .spread import ChannelSpread, DistanceSample, SampleState, SpreadState
 
+FOLLOWING = 512  # segments of which it is known: by default 200 wait
+
 _RESCALE = 1.5  # models are made again when the variance of all motion has changed by this factor
 
 
@@ -32,6 +34,7 @@ class SegmentMemory:
         frames: The segments as they came, shape (L, D) each.
         neighbours: How near new segments come to known ones.
         renewal: The models on their way that will take the place of these; None for none.
+        follows: Numbers of the latest segments that began where the one before them ended, rising.
     """
 
     def __init__(self, config: TreeConfig, groups: IntArray) -> None:
@@ -44,9 +47,15 @@ class SegmentMemory:
         self._holds: Counter[int] = Counter()
         self.neighbours = Neighbours()
         self.renewal: Renewal | None = None
+        self.follows: list[int] = []
 
-    def remember(self, number: int, frames: FloatArray) -> None:
-        """Take up a segment, shape (L, D), held once; it is not written to from now on."""
+    def remember(self, number: int, frames: FloatArray, *, follows: bool = False) -> None:
+        """Take up a segment, shape (L, D), held once; it is not written to from now on.
+
+        It may begin where the one before it ended.
+        """
+        if follows:
+            self.follows = [*self.follows[1 - FOLLOWING :], number]
         points = normalisation.points_of(frames, self.config.normalisation)
         self._spread.update(points)
         if not self._sample.numbers:
@@ -69,6 +78,10 @@ class SegmentMemory:
         """Do what takes long and can be done before a segment is there."""
         self._sample.place_for(number)
         self.bank.prepare()
+
+    def goes_on(self, number: int) -> bool:
+        """Return whether a segment and the next are held, and that began where this one ended."""
+        return {number, number + 1} <= self.frames.keys() and number + 1 in self.follows
 
     def recall(self, number: int, frames: Blob) -> None:
         """Take up a segment again that may be forgotten by now, held once."""
