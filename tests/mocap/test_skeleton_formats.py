@@ -636,6 +636,30 @@ def test_g1_as_arrays(tmp_path: Path) -> None:
         open_recording(tmp_path / "d.npz")
 
 
+@pytest.mark.parametrize("form", ["npy", "nan", "blank"])
+@pytest.mark.parametrize("missing", ["first quaternion", "a joint's column", "all but the place"])
+def test_g1_with_numbers_that_are_missing(tmp_path: Path, form: str, missing: str) -> None:
+    values = g1_values()
+    plain = open_recording(write_g1_csv(tmp_path / "a.csv", values), positions=False)
+    at = {
+        "all but the place": np.s_[0, 3:35],
+        "first quaternion": np.s_[0, 3:7],
+        "a joint's column": np.s_[:, 12],
+    }
+    values[at[missing]] = np.nan
+    path = tmp_path / ("b_30hz.npy" if form == "npy" else "b_30hz.csv")
+    if form == "npy":
+        np.save(path, values)
+    else:
+        text = write_g1_csv(path, values).read_text()
+        path.write_text(text.replace("nan", "NaN" if form == "nan" else " "))
+    found = open_recording(path, positions=False)
+    assert found.channels == plain.channels
+    gone = np.isnan(found.frames)
+    assert gone.any() and not gone[1:, :11].any()
+    assert found.frames[~gone] == pytest.approx(plain.frames[~gone], abs=1e-7)
+
+
 def test_g1_with_quaternions_w_first(tmp_path: Path) -> None:
     values = g1_values()
     plain = open_recording(write_g1_csv(tmp_path / "a.csv", values))

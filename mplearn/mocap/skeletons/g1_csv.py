@@ -13,6 +13,7 @@ Arrays (``.npy``) of the 36 numbers are read, too, and archives of ``root_pos``,
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -45,6 +46,7 @@ _UNITS = {"deg": "degrees", "degrees": "degrees", "rad": "radians", "radians": "
 _BEGINNINGS = re.compile(r"^(?:joint|dof|pos)_")
 _ENDINGS = re.compile(rf"(_joint|_dof|_pos|_angle|_{'|_'.join(_UNITS)})+$")
 _ARRAYS = ("root_pos", "root_rot", "dof_pos")  # of an archive
+_LOOK = 20  # rows that are looked at
 _MOST_BEFORE = 2  # columns before a pose: a frame's number, and its time
 _EXPECTED = "the pelvis' place and orientation, and the G1's 29 joints"
 
@@ -72,10 +74,10 @@ class G1CSVReader(Reader):
         cells = _cells(lines[0])
         if sum(_joint(cell) is not None for cell in cells) >= len(G1_JOINTS) // 2:
             return True
-        row = _plain_numbers(cells)
-        if row is None or not _WIDTH <= len(row) <= _WIDTH + _MOST_BEFORE:
+        if _plain_numbers(cells) is None or not _WIDTH <= len(cells) <= _WIDTH + _MOST_BEFORE:
             return False
-        return _is_pose(row[-_WIDTH:])
+        rows = [_plain_numbers(_cells(line)) for line in lines[:_LOOK]]
+        return _has_pose([row[-_WIDTH:] for row in rows if row is not None and len(row) >= _WIDTH])
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read angles, or where the robot's joints are; see `Reader.read`."""
@@ -107,7 +109,7 @@ class G1ArrayReader(Reader):
             if suffix(path) == ".npz":
                 return set(_ARRAYS) <= set(NPZFile(path).names)
             shape = npy_shape(path)
-            return shape[1:] == (_WIDTH,) and shape[0] > 0 and _is_pose(_array(path)[0])
+            return shape[1:] == (_WIDTH,) and shape[0] > 0 and _has_pose(_array(path))
         except RecordingError:
             return False
 
@@ -137,11 +139,17 @@ def _array(path: Path) -> FloatArray:
     return table
 
 
-def _is_pose(pose: FloatArray) -> bool:
-    """Whether 36 numbers can be a pose: the quaternion is one, and no angle is too large."""
+def _has_pose(rows: Iterable[FloatArray]) -> bool:
+    """Whether the first 36 numbers that tell it are a pose: what is missing (NaN) tells nothing.
+
+    The quaternion is one, and no angle is too large.
+    """
+    pose = next((row for row in rows if np.isfinite(row[3:7]).all()), None)
+    if pose is None:
+        return False
     with np.errstate(over="ignore", invalid="ignore"):
         off = abs(float(np.linalg.norm(pose[3:7])) - 1.0)
-    reach = np.abs(pose[7:]).max()
+    reach = np.nanmax(np.abs(pose[7:]), initial=0.0)
     return bool(off < 0.01 and reach < 2 * np.pi) or bool(off < 1e-4 and reach < 360.0)
 
 
@@ -208,11 +216,12 @@ def _cells(line: str) -> list[str]:
 
 
 def _plain_numbers(cells: list[str]) -> FloatArray | None:
+    """Return the numbers in a row, NaN where one is missing; None where there is a word."""
     try:
-        values = np.array([float(cell) for cell in cells])
+        values = np.array([float(cell or "nan") for cell in cells])
     except ValueError:
         return None
-    return values if np.isfinite(values).all() else None
+    return None if np.isinf(values).any() else values
 
 
 def _counts(column: FloatArray) -> str:
