@@ -14,15 +14,14 @@ import importlib
 import os
 import pkgutil
 import re
-import shutil
 import sys
-import textwrap
 from collections.abc import Sequence
 from types import ModuleType
 from typing import Any, NoReturn
 
 from mplearn.errors import InvalidValueError, MPLearnError
 from mplearn_agents.terminal.exit_codes import BAD_INPUT, INTERRUPTED, SIGNALLED
+from mplearn_agents.terminal.help_that_fits import HelpThatFits
 from mplearn_agents.terminal.inert import inert_output
 from mplearn_agents.terminal.interrupts import interrupted
 from mplearn_agents.terminal.plain_warnings import plain_warnings
@@ -34,7 +33,6 @@ _CODES = (
     "exit codes: 0 done; 1 what was checked is not in order; 2 bad input; 3 not all that "
     "was learned could be written where it was to be; 130 interrupted (143 by SIGTERM)"
 )
-_NARROWEST = 11  # columns that a help takes at least, as argparse has it
 
 
 class _Version(argparse.Action):
@@ -123,18 +121,13 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
             name,
             help=module.HELP,
             description=module.HELP,
-            epilog=f"example:\n  {module.EXAMPLE}\n\n{_codes()}",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
+            epilog=f"example:\n  {module.EXAMPLE}\n\n{_CODES}",
+            formatter_class=HelpThatFits,
         )
         if named in (None, name):
             module.add_arguments(command)
             command.set_defaults(run=module.run, build_parser=build_parser)
     return parser
-
-
-def _codes() -> str:
-    """Return the exit codes in lines that fit the terminal, as argparse writes the rest."""
-    return textwrap.fill(_CODES, max(shutil.get_terminal_size().columns - 2, _NARROWEST))
 
 
 def command_modules() -> dict[str, ModuleType]:

@@ -45,10 +45,12 @@ def said(capsys, *argv):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_the_help_has_an_example_that_parses(command, capsys):
+def test_the_help_has_an_example_that_parses(command, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
     code, out, _ = said(capsys, command, "--help")
     example = command_modules()[command].EXAMPLE
     assert code == 0 and f"example:\n  {example}" in out and "exit codes" in out
+    assert all(len(line) <= 80 for line in out.replace(example, "").splitlines())
     words = shlex.split(example.split(" > ")[0])
     assert words[:2] == ["mplearn", command]
     args = build_parser().parse_args(words[1:])

@@ -74,7 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--first-seed", type=seed, default=100, help="the first (default: 100)")
     parser.add_argument("--episodes", type=count, default=50, help="kinematic episodes a seed")
     parser.add_argument(
-        "--simulated-episodes", type=count, default=4, help="simulated episodes a seed"
+        "--simulated-episodes", type=count, default=4, metavar="N", help="simulated episodes a seed"
     )
     parser.add_argument("--steps", type=count, help="macro steps of a training (default: by task)")
     parser.add_argument("--jobs", type=count, help="processes (default: one a processor)")

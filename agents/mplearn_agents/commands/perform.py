@@ -44,9 +44,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     who = parser.add_mutually_exclusive_group()
     who.add_argument(
-        "--policy", choices=[*POLICIES, _GOAL], default="random", help="who chooses what comes next"
+        "--policy",
+        choices=[*POLICIES, _GOAL],
+        default="random",
+        metavar="WHO",
+        help="who chooses what comes next",
     )
-    who.add_argument("--agent", type=Path, metavar="FOLDER", help="an agent of `mplearn train`")
+    who.add_argument("--agent", type=Path, metavar="PATH", help="an agent of `mplearn train`")
     who.add_argument(
         "--show",
         nargs="+",

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from mplearn.errors import StoreDamagedError
 from mplearn_agents.terminal.arguments import whole
 from mplearn_agents.terminal.exit_codes import NOT_IN_ORDER
+from mplearn_agents.terminal.help_that_fits import HelpThatFits
 from mplearn_agents.terminal.inert import printable
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             help=help,
             description=help,
             epilog=f"example:\n  mplearn store {name} life.db{_MORE.get(name, '')}",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
+            formatter_class=HelpThatFits,
         )
         action.add_argument("store", type=Path, metavar="STORE", help="the store, as life.db")
         action.set_defaults(act=do)
