@@ -16,11 +16,14 @@ from mplearn.maths.plane import turn_in_plane
 from mplearn.recording import FloatArray
 from mplearn_envs.mechanics.support import hull_margin, hull_of
 
-BESIDE, IN_FRONT, BEHIND = (cast("int", np.int64(way)) for way in range(3))
+BESIDE, IN_FRONT, BEHIND, DOWN = (cast("int", np.int64(way)) for way in range(4))
 LONGEST_S = 0.5  # of a step that catches
 _SOONEST_S = 0.1  # in which a foot in the air lands
+_LANDS_S = 0.04  # in which one does that comes down at once
 _SLACK_M = 0.02  # so near past the other foot is past it, too
 _TRY_S = 0.02
+_TRY_NEXT_S = 0.04
+_LIFTS_S = 0.02  # from where a foot has landed to where the other one is lifted
 _INSET_M = 0.008  # the zero-moment point stays so far inside a sole
 _BEYOND_M = 0.015  # the foot lands a little beyond the DCM
 _LAG_S = 0.05  # in which a foot gathers speed
@@ -44,6 +47,9 @@ class Reach(NamedTuple):
             does.
         inwards: How far on its own side of the DCM a foot lands that crosses [m]: what is left
             drives the robot to the side of the other one, which is free to step.
+        down_s: Shortest time in which a foot that is in the air comes down, for the other one to
+            step.
+        close: How far aside of that it is then [m]; at 0 none comes down so.
     """
 
     ahead: float
@@ -56,6 +62,8 @@ class Reach(NamedTuple):
     apart: float = 0.13
     across: float = 0.0
     inwards: float = 0.0
+    down_s: float = 0.1
+    close: float = 0.0
 
 
 class Step(NamedTuple):
@@ -66,7 +74,8 @@ class Step(NamedTuple):
         time_s: How long it takes [s].
         place: Where it lands: x, y [m] and yaw [rad], shape (3,).
         missing_m: How far the DCM will be outside the soles then [m].
-        way: `BESIDE`, or on which way it crosses the other foot's: `IN_FRONT`, `BEHIND`.
+        way: `BESIDE`; on which way it crosses the other foot's: `IN_FRONT`, `BEHIND`; or `DOWN`:
+            at once, for the other foot to step.
     """
 
     side: int
@@ -155,16 +164,14 @@ def landing_place(
         way: On which way it goes there.
     """
     sole = outline(corners[1 - side], stands, _INSET_M)
-    zmp_x, zmp_y = nearest_inside(hull_of(sole), dcm[0], dcm[1])
-    growth = np.exp(rate * time_s)
-    then_x, then_y = zmp_x + (dcm[0] - zmp_x) * growth, zmp_y + (dcm[1] - zmp_y) * growth
+    then_x, then_y = _dcm_then(sole, dcm, rate, time_s)
     away = 1.0 if side == 0 else -1.0
     x, y = turn_in_plane(then_x - stands[0], then_y - stands[1], -stands[2])
     farther = 1.0 + _BEYOND_M / (np.hypot(x, y) + 1e-9)
     x, y = farther * x - corners[side, :, 0].mean(), away * farther * y
-    if way == BESIDE:
+    if way in (BESIDE, DOWN):
         x = min(max(x, -reach.behind), reach.ahead)
-        y = min(max(y, reach.narrow), reach.wide)
+        y = min(max(y, reach.narrow if way == BESIDE else reach.close), reach.wide)
     else:
         y = min(max(y + reach.inwards, -reach.across), reach.narrow)
         if way == IN_FRONT:
@@ -175,6 +182,14 @@ def landing_place(
     place = np.array([stands[0] + dx, stands[1] + dy, stands[2]])
     both = hull_of(np.concatenate((sole, outline(corners[side], place, _INSET_M))))
     return place, max(0.0, -hull_margin(both, then_x, then_y))
+
+
+@inner_kernel
+def _dcm_then(sole: FloatArray, dcm: FloatArray, rate: float, time_s: float) -> tuple[float, float]:
+    """Return where a DCM (2,) will be that the corners of a sole (4, 2) brake as they can [m]."""
+    zmp_x, zmp_y = nearest_inside(hull_of(sole), dcm[0], dcm[1])
+    growth = np.exp(rate * time_s)
+    return zmp_x + (dcm[0] - zmp_x) * growth, zmp_y + (dcm[1] - zmp_y) * growth
 
 
 @kernel
@@ -234,6 +249,38 @@ def _hits(ax: float, ay: float, bx: float, by: float, half_x: float, half_y: flo
     return first < last
 
 
+@inner_kernel
+def _price(missing: float, far: float, time_s: float, lag: float, reach: Reach) -> float:
+    """Return what a step costs that misses so much and has so far to go."""
+    hurry = max(0.0, far / max(time_s - lag, _TRY_S) / reach.fastest - 1.0)
+    return _PRICES[0] * missing + _PRICES[1] * hurry + _PRICES[2] * far + _PRICES[3] * time_s
+
+
+@inner_kernel
+def _price_of_next(
+    corners: FloatArray,
+    feet: FloatArray,
+    side: int,
+    place: FloatArray,
+    dcm: FloatArray,
+    rate: float,
+    time_s: float,
+    reach: Reach,
+) -> float:
+    """Return what the other foot's step costs after one foot has come down at a place."""
+    then, best = np.empty(2), np.inf
+    sole = outline(corners[1 - side], feet[1 - side], _INSET_M)
+    then[0], then[1] = _dcm_then(sole, dcm, rate, time_s)
+    for k in range(int((LONGEST_S - reach.soonest) / _TRY_NEXT_S)):
+        next_s = reach.soonest + k * _TRY_NEXT_S
+        there, missing = landing_place(
+            corners, place, 1 - side, then, rate, next_s + _LIFTS_S, reach, BESIDE
+        )
+        far = way_round(place, feet[1 - side], there, reach)[2]
+        best = min(best, _price(missing, far, next_s, _LAG_S, reach))
+    return best
+
+
 @kernel
 def choose_step(
     corners: FloatArray,
@@ -247,7 +294,8 @@ def choose_step(
 ) -> Step:
     """Return the step that catches the DCM best: inside the soles, without hurry, near and soon.
 
-    Feet cross only where the other one could not step, for its foot stood alone.
+    Only where the other one could not step, for its foot stood alone, feet cross, or come down for
+    it to step next; then both steps count.
 
     Args:
         corners: Of both soles in their feet's frames, shape (2, 4, 3) [m].
@@ -257,26 +305,36 @@ def choose_step(
         reach: Where a foot can land, and how soon.
         only: The one foot that can step; -1 for either.
         since_s: For how long that foot has been on its way [s].
-        crosses: Whether the one foot that can step may cross the other.
+        crosses: Whether the one foot that can step was in the air: it may cross the other one, or
+            come down at once.
     """
     best = np.inf
     found = Step(max(only, 0), LONGEST_S, feet[max(only, 0)].copy(), np.inf, BESIDE)
-    soonest = max(reach.soonest - since_s, _SOONEST_S)
     lag = max(_LAG_S - since_s, 0.0)
-    n_ways = 3 if only >= 0 and crosses and reach.across > 0.0 else 1
+    n_ways = 4 if only >= 0 and crosses else 1
     for side in range(2):
         if only == 1 - side:
             continue
         for way in range(n_ways):
+            crossing = way in (IN_FRONT, BEHIND)
+            if (way == DOWN and reach.close == 0.0) or (crossing and reach.across == 0.0):
+                continue
+            soonest = max(reach.soonest - since_s, _SOONEST_S)
+            if way == DOWN:
+                soonest = max(reach.down_s - since_s, _LANDS_S)
             for k in range(int((LONGEST_S - since_s - soonest) / _TRY_S) + 1):
                 time_s = soonest + k * _TRY_S
                 place, missing = landing_place(
                     corners, feet[1 - side], side, dcm, rate, time_s, reach, way
                 )
                 far = way_round(feet[1 - side], feet[side], place, reach)[2]
-                hurry = max(0.0, far / (time_s - lag) / reach.fastest - 1.0)
-                price = _PRICES[0] * missing + _PRICES[1] * hurry
-                price += _PRICES[2] * far + _PRICES[3] * time_s
+                if way == DOWN:
+                    price = _price(0.0, far, time_s, lag, reach)
+                    if price < best:
+                        later = _price_of_next(corners, feet, side, place, dcm, rate, time_s, reach)
+                        price += min(_PRICES[0] * missing, later)
+                else:
+                    price = _price(missing, far, time_s, lag, reach)
                 if price < best:
                     best = price
                     found = Step(side, time_s, place, missing, way)

@@ -21,6 +21,7 @@ from mplearn_envs.mechanics.support import hull_margin
 from .body_state import LEFT, NEITHER, RIGHT, BodyState, sole_middle
 from .capture import (
     BESIDE,
+    DOWN,
     Reach,
     choose_step,
     landing_place,
@@ -35,9 +36,11 @@ ASTRAY_M = 0.025  # feet so near to their places beside each other are there
 _LEAVES_M = 0.005  # a DCM so near the edge of the soles needs a step
 _INSET_M = 0.01  # where the zero-moment point may be
 _LIFTS_M = 0.015  # so far inside a sole the DCM must be before the other foot is lifted
+_FAR_M = 0.2  # feet so far astray are far apart
 _LOST_M = 0.01  # so far outside of it a step back becomes a step that catches
 _FIXED_S = 0.04  # before it lands the place is not changed any more
 _RESTS_M, _RESTS_S = 0.02, 0.1  # a DCM so near to its goal for so long rests
+_STOOD_S = 0.02  # so long a foot stands before the other one steps
 _SHIFT_M_S = 0.5  # speed of the goal
 _BACK_S = 0.45  # duration of a step back
 _LATE_S = 0.15  # a foot that has not landed so late is taken to stand
@@ -55,6 +58,7 @@ class StepLaw(NamedTuple):
         period_s: Control period [s].
         gain: How fast the DCM returns [1/s].
         reach: Where feet can land, and how soon.
+        hurried: The same where one foot was in the air when the robot was pushed.
         apart: The left foot in the right one's frame, standing: x, y [m] and yaw [rad], shape (3,).
         lift_m: How high a foot is raised [m].
         decides_s: For how long after a foot was raised it may yet take another way [s].
@@ -63,6 +67,7 @@ class StepLaw(NamedTuple):
     period_s: float
     gain: float
     reach: Reach
+    hurried: Reach
     apart: FloatArray
     lift_m: float
     decides_s: float
@@ -74,8 +79,8 @@ class StepState(NamedTuple):
     Attributes:
         phase: What is going on (`STANDS`, `SHIFTS`: the weight goes to one foot, `SWINGS`); which
             foot steps, 0 left, 1 right; whether it steps back and not to catch; how many steps were
-            taken; on which way the foot goes (`BESIDE`); and whether it may cross the other one,
-            for it was in the air when that was pushed; shape (6,).
+            taken; on which way the foot goes (`BESIDE`); whether it may cross the other one,
+            for it was in the air when that was pushed; and whether any foot was; shape (7,).
         time: Time in this phase, how long the step lasts, and for how long the weight has rested,
             shape (3,) [s].
         place: Where the foot lands: x, y [m] and yaw [rad], shape (3,).
@@ -96,7 +101,7 @@ class StepState(NamedTuple):
 
 def new_step_state() -> StepState:
     """Return what is remembered at first: nothing."""
-    return StepState(*(np.zeros(n) for n in (6, 3, 3, 2, 4, 4, 4)))
+    return StepState(*(np.zeros(n) for n in (7, 3, 3, 2, 4, 4, 4)))
 
 
 @kernel
@@ -129,9 +134,9 @@ def begin_stepping(
         part[:] = 0.0
     stepping.goal[:] = now.dcm
     if up >= 0:
-        step = choose_step(robot.corners, now.feet, now.dcm, now.rate, law.reach, up, 0.0)
+        step = choose_step(robot.corners, now.feet, now.dcm, now.rate, law.hurried, up, 0.0)
         _lift(robot, stepping, now, up, step.time_s, step.place)
-        stepping.phase[4], stepping.phase[5] = step.way, 1.0
+        stepping.phase[4], stepping.phase[5], stepping.phase[6] = step.way, 1.0, 1.0
 
 
 @kernel
@@ -169,20 +174,43 @@ def plan_step(
             stepping.goal[:] = now.dcm
     if stepping.phase[0] != SWINGS:
         hull = support_hull(robot.corners, now.feet, NEITHER, 0.0)
-        landed = stepping.phase[3] == 0.0 or stepping.phase[0] == SHIFTS or stepping.time[0] > 0.02
+        landed = stepping.phase[3] == 0.0 or stepping.phase[0] == SHIFTS
+        landed = landed or stepping.phase[6] == 1.0 or stepping.time[0] > _STOOD_S
         if landed and hull_margin(hull, now.dcm[0], now.dcm[1]) < _LEAVES_M:
-            step = choose_step(robot.corners, now.feet, now.dcm, now.rate, law.reach, NEITHER, 0.0)
+            reach = _reach_of(law, stepping)
+            step = choose_step(robot.corners, now.feet, now.dcm, now.rate, reach, NEITHER, 0.0)
             _lift(robot, stepping, now, step.side, step.time_s, step.place)
             stepping.phase[4] = step.way
-    if stepping.phase[0] == SHIFTS:
-        side = int(stepping.phase[1])
-        over = support_hull(robot.corners, now.feet, side, _LIFTS_M)
-        if hull_margin(over, now.dcm[0], now.dcm[1]) > 0.0:
-            _lift(robot, stepping, now, side, _BACK_S, _beside(law, now.feet, side))
-            stepping.phase[2], stepping.phase[4] = 1.0, BESIDE  # back
+    if stepping.phase[0] != SWINGS:
+        side = _goes_back(law, stepping, now)
+        if side >= 0:
+            over = support_hull(robot.corners, now.feet, side, _LIFTS_M)
+            if hull_margin(over, now.dcm[0], now.dcm[1]) > 0.0:
+                _lift(robot, stepping, now, side, _BACK_S, _beside(law, now.feet, side))
+                stepping.phase[2], stepping.phase[4] = 1.0, BESIDE  # back
     if stepping.phase[0] == SWINGS:
         return _on_one_foot(law, robot, stepping, now)
     return _on_both_feet(law, robot, stepping, now)
+
+
+@inner_kernel
+def _reach_of(law: StepLaw, stepping: StepState) -> Reach:
+    """Return where feet can land, and how soon."""
+    return law.hurried if stepping.phase[6] == 1.0 else law.reach
+
+
+@inner_kernel
+def _goes_back(law: StepLaw, stepping: StepState, now: BodyState) -> int:
+    """Return the side of the foot that steps back once the weight is over the other, -1 for none.
+
+    After a step that caught, far aside, of who hurries, the other foot follows without rest.
+    """
+    if stepping.phase[0] == SHIFTS:
+        return int(stepping.phase[1])
+    caught = stepping.phase[6] == 1.0 and stepping.phase[2] == 0.0
+    if caught and stepping.time[0] > _STOOD_S and _astray(law, now.feet) > _FAR_M:
+        return 1 - int(stepping.phase[1])
+    return -1
 
 
 @inner_kernel
@@ -224,7 +252,7 @@ def _on_one_foot(
                 now.feet,
                 now.dcm,
                 now.rate,
-                law.reach,
+                _reach_of(law, stepping),
                 side,
                 stepping.time[0],
                 stepping.phase[5] == 1.0,
@@ -239,7 +267,7 @@ def _on_one_foot(
                 now.dcm,
                 now.rate,
                 left,
-                law.reach,
+                _reach_of(law, stepping),
                 int(stepping.phase[4]),
             )
             stepping.place[:] = place
@@ -335,7 +363,8 @@ def _swing(
             change[i] = (speed * (via - at[i]) / near - rate[i]) / _TURNS_S
     half = 0.45 * stepping.time[1]
     height = floor + robot.stance.foot_position[int(stepping.phase[1]), 2]
-    rises = stepping.time[0] < half and at[2] < height + law.lift_m  # a raised foot comes down
+    rises = stepping.time[0] < half and stepping.phase[4] != DOWN
+    rises = rises and at[2] < height + law.lift_m  # a raised foot comes down
     height += law.lift_m if rises else -_DOWN_M
     until = max(half - stepping.time[0] if rises else left, _FIXED_S)
     change[2] = _towards(at[2], rate[2], height, until)

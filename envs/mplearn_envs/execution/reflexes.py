@@ -51,10 +51,12 @@ LONGEST_S = 8.0  # after the end of a plan for which the robot may still be on i
 RESTS_S = 0.3
 _BLEND_S = 0.5
 _PAST_M = 0.02  # between soles that pass each other
+_BESIDE_M = 0.01  # between soles where one comes down beside the other
 _CROSS_M = 0.06  # as much more a foot is ahead of the other one so that legs can cross
 _DROP_M = 0.35  # who steps may be so much lower
 _TUNED: dict[str, Any] = {  # on pushes at the chest of the humanoid
     "reach": Reach(0.5, 0.4, 0.16, 0.62, 2.2, 0.24, across=0.1, inwards=0.05),
+    "hurried_s": 0.2,
     "decides_s": 0.1,
     "gain": 4.0,
     "lift_m": 0.035,
@@ -164,10 +166,13 @@ class Reflexes:
         ground = self.reference.ground
         long, wide = np.ptp(self.reference.corners[..., :2], axis=1).max(axis=0) + _PAST_M
         period_s = float(self._model.opt.timestep)
+        reach = _TUNED["reach"]._replace(clear=float(long) + _CROSS_M, apart=float(wide))
+        close_m = float(wide) - _PAST_M + _BESIDE_M
         self.law = StepLaw(
             period_s,
             _TUNED["gain"],
-            _TUNED["reach"]._replace(clear=float(long) + _CROSS_M, apart=float(wide)),
+            reach,
+            reach._replace(soonest=_TUNED["hurried_s"], close=close_m),
             np.append(ground[0, :2] - ground[1, :2], 0.0),
             _TUNED["lift_m"],
             _TUNED["decides_s"],

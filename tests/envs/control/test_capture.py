@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from mplearn_envs.control.capture import (
     BEHIND,
     BESIDE,
+    DOWN,
     IN_FRONT,
     Reach,
     choose_step,
@@ -168,6 +169,28 @@ def test_who_crosses_lands_on_the_side_of_the_foot_that_crosses(corners, side):
     (straight, _), (inwards, missing) = places
     assert own * (inwards[1] - straight[1]) == pytest.approx(0.05)
     assert inwards[0] == straight[0] and missing < 0.02
+
+
+COMING_DOWN = CROSSING._replace(soonest=0.2, close=0.12)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_who_falls_beyond_the_foot_that_stands_comes_down_for_it_to_step(corners, side):
+    """No single step reaches there: two do, by the pendulum's differential equation."""
+    beyond = -1.0 if side == 0 else 1.0
+    dcm = FEET[1 - side, :2] + np.array([0.05, 0.09 * beyond])
+    step = choose_step(corners, FEET, dcm, RATE, COMING_DOWN, side)
+    assert step.way == DOWN
+    assert beyond * (FEET[1 - side, 1] - step.place[1]) >= COMING_DOWN.close - 1e-12
+    sole = support_hull(corners, FEET, side, 0.008)
+    zmp = np.array(nearest_inside(sole, *dcm))
+    then = solve_ivp(lambda _, x: RATE * (x - zmp), (0.0, step.time_s), dcm, rtol=1e-10).y[:, -1]
+    feet = FEET.copy()
+    feet[side] = step.place
+    second = choose_step(corners, feet, then, RATE, COMING_DOWN, -1)
+    assert second.side == 1 - side and second.missing_m < 0.01
+    single = choose_step(corners, FEET, dcm, RATE, COMING_DOWN, side, crosses=False)
+    assert single.missing_m > 0.05 and single.way == BESIDE
 
 
 def test_a_foot_on_its_way_is_sooner_there(corners):

@@ -74,6 +74,21 @@ def test_who_is_pushed_on_one_foot_puts_the_other_one_down_or_across(
     assert not simulation.perform(planner.hold(report.end, 1.0)).fallen
 
 
+@pytest.mark.parametrize("share", [0.2, 0.5])
+def test_who_is_pushed_past_the_foot_that_stands_comes_down_and_steps_with_that(
+    robot, planner, simulation, share
+):
+    """The left foot is in the air: it comes down, the right one steps aside, the left follows."""
+    simulation.reset()
+    plan = planner.plan(rest_reference(robot), planner.motion(sweep({}, KICK, 0.8), RATE_HZ), 0.5)
+    aloft = np.flatnonzero(plan.up == 0) * (len(plan.commands) // (len(plan.q) - 1))
+    start = int(aloft[int(share * len(aloft))])
+    push = _push(simulation, np.radians(-90.0), 24.0)
+    report = simulation.perform(plan, pushes=push._replace(steps=np.array([[start, start + 25]])))
+    assert not report.fallen and report.n_steps >= 3
+    assert not simulation.perform(planner.hold(report.end, 1.0)).fallen
+
+
 def test_small_push_needs_no_step(robot, planner, simulation):
     simulation.reset()
     report = simulation.perform(
