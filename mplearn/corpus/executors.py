@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
+from numbers import Integral
 from typing import Any, Protocol, TypeVar
 
 from ..errors import InvalidValueError
@@ -44,11 +45,35 @@ class Executor(Protocol):
 def room(executor: Executor) -> int:
     """Return how much an executor is given at once, so that what waits outlives its workers.
 
+    Raises:
+        InvalidValueError: It has ``jobs``, which are no number from 1 on.
+
     Example:
         >>> room(Processes(jobs=2)), room(Here()) > 1000
         (2, True)
     """
-    return int(getattr(executor, "jobs", sys.maxsize))
+    jobs = getattr(executor, "jobs", sys.maxsize)
+    if not isinstance(jobs, Integral) or jobs < 1:
+        raise InvalidValueError(f"an executor's jobs must be a number from 1 on, not {jobs!r:.40}")
+    return int(jobs)
+
+
+def workers(executor: Executor | None, jobs: int) -> Executor:
+    """Return who does the work: an executor of one's own, so many processes, or this one for 0.
+
+    Raises:
+        InvalidValueError: The executor cannot be given work, or ``jobs`` is negative.
+
+    Example:
+        >>> type(workers(None, 0)).__name__, type(workers(Here(), 4)).__name__
+        ('Here', 'Here')
+    """
+    if executor is None:
+        return Processes(jobs) if jobs else Here()
+    if not callable(getattr(executor, "submit", None)):
+        raise InvalidValueError(f"an executor has submit(work, *args): {executor!r:.60} has not")
+    room(executor)
+    return executor
 
 
 class Here:

@@ -6,14 +6,16 @@ the number of workers, the order in which they are done, and how often they die 
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import shutil
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -33,7 +35,7 @@ from ..mocap import TakeFiles, find_takes
 from ..state import from_plain, to_plain
 from ..store import learner_of
 from .dealing import SHARD_TAKES, Shard, deal
-from .executors import Executor, Here, Processes, room
+from .executors import Executor, room, workers
 from .progress import Progress
 from .reading import Reading, probe
 from .shard import ShardJournal, ShardReport, ShardTask, learn_shard
@@ -123,7 +125,7 @@ def learn_corpus(
 
     Raises:
         RecordingError: There are no recordings, or none can be learned.
-        InvalidValueError: ``into`` was made with other rules.
+        InvalidValueError: ``into`` was made with other rules, or nobody can be given the work.
         CorpusError: Workers die, whatever they are given.
         StoreError: A store cannot be opened.
         StoreWriteError: A store, or what is beside it, cannot be written: the disk is full. Nothing
@@ -144,6 +146,7 @@ def learn_corpus(
     """
     folder, into = Path(folder).absolute(), Path(into).absolute()  # workers may be elsewhere
     reading = reading or Reading()
+    own = workers(executor, jobs)
     found = find_takes(folder)
     takes = [take for take in found.takes if not people or take.person in people]
     if not takes:
@@ -153,7 +156,6 @@ def learn_corpus(
         into.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StoreError(f"there cannot be a folder {into}: {error.strerror}") from error
-    own = executor or (Processes(jobs) if jobs else Here())
     unreadable = {name: str(error) for name, error in found.unreadable.items()}
     try:
         plan = _planned(into, takes, reading, rate_hz, configure, shard_takes, own)
@@ -269,7 +271,8 @@ class _Run:
         """Learn and merge."""
         self._learn()
         began = time.monotonic()
-        learner = None if self._stop.is_set() else self._merge()
+        with _uncollected():
+            learner = None if self._stop.is_set() else self._merge()
         merging_s = time.monotonic() - began
         progress = self._progress()
         self._show(progress)
@@ -433,12 +436,25 @@ def merge_files(parts: Sequence[Path], to: Path, person: str) -> None:
         MPLearnError: One cannot be read.
         StoreWriteError: The file cannot be written.
     """
-    state = merged_state((_learner_of(part) for part in parts), [person] * len(parts))
-    file = replace(FILES, compression=0)  # it is read once, and goes
+    with _uncollected():
+        state = merged_state((_learner_of(part) for part in parts), [person] * len(parts))
+        file = replace(FILES, compression=0)  # it is read once, and goes
+        try:
+            file.write(to, to_plain(state, whole=True))
+        except MPLearnError as error:
+            raise StoreWriteError(str(error)) from error
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Look for no garbage meanwhile: nearly all that is made when stores are read stays."""
+    before = gc.isenabled()
+    gc.disable()
     try:
-        file.write(to, to_plain(state, whole=True))
-    except MPLearnError as error:
-        raise StoreWriteError(str(error)) from error
+        yield
+    finally:
+        if before:
+            gc.enable()
 
 
 def _learner_of(path: Path) -> MotionLearner:

@@ -16,7 +16,7 @@ from ..library import PrimitiveLibrary
 from ..mocap import TakeFiles, find_takes
 from ..recording import are_markers
 from ..tables import RecognisedSegment, SegmentTable, recognise_recording
-from .executors import Executor, Here, Processes, room
+from .executors import Executor, room, workers
 from .reading import Reading
 from .shard import DEATHS
 
@@ -69,6 +69,7 @@ def recognise_corpus(
         show: Called with how many takes are done, and of how many.
 
     Raises:
+        InvalidValueError: Nobody can be given the work.
         RecordingError: There are no recordings.
         LibraryError: There is no such library.
 
@@ -89,13 +90,13 @@ def recognise_corpus(
         >>> found.table.column("name")[:3], found.n_takes
         (['P1', 'P2', 'P1'], 1)
     """
+    own = workers(executor, jobs)
     library, folder = Path(library).absolute(), Path(folder).absolute()  # workers may be elsewhere
     known = PrimitiveLibrary.load(library)
     observe = "robot" if known.body else "positions" if are_markers(known.channels) else "channels"
     asked = reading or Reading()
     reading = Reading(observe, asked.hints, asked.names)  # type: ignore[arg-type]
     found = find_takes(folder)
-    own = executor or (Processes(jobs) if jobs else Here())
     try:
         done = _all(library, found.takes, reading, own, show)
     finally:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Annotated, Any
 
@@ -308,15 +308,20 @@ class Chain:
             n_frames: Frames that were seen here before.
         """
         for seen in other._segments:
-            segment = replace(
-                seen.segment,
-                start=seen.segment.start + n_frames,
-                end=seen.segment.end + n_frames,
-                decided_at=seen.segment.decided_at + n_frames,
+            old = seen.segment
+            segment = Segment(
+                old.start + n_frames,
+                old.end + n_frames,
+                old.confidence,
+                old.decided_at + n_frames,
+                old.still,
+                old.cause,
             )
-            like = None if seen.like is None else seen.like + n_segments
-            new = replace(seen, number=seen.number + n_segments, segment=segment, like=like)
-            self._segments.append(new)
+            number, like = seen.number + n_segments, seen.like
+            like = None if like is None else like + n_segments
+            self._segments.append(
+                SeenSegment(number, seen.primitive, seen.follows, segment, seen.nearest, like)
+            )
 
     def rename(self, new_id: Mapping[int, int]) -> None:
         """Let primitives have other names; those without a name are none any more."""

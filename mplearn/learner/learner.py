@@ -135,6 +135,11 @@ class MotionLearner:
         return max(self._person, 0)
 
     @property
+    def latest_person(self) -> int:
+        """Number of who moved last; -1 as long as nobody did."""
+        return self._person
+
+    @property
     def observer(self) -> MotionObserver | None:
         """What turns the stream's markers into features; None where channels are learned."""
         return None if self.watching is None else self.watching.observer

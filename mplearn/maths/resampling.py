@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..errors import InvalidValueError
-from ..recording import FloatArray
+from ..recording import FloatArray, IntArray
 from .compiling import njit
 
 _ROUNDING = 1e-6  # of a place [frame]
@@ -35,12 +37,52 @@ def interpolate_linearly(frames: FloatArray, places: FloatArray) -> FloatArray:
         raise InvalidValueError(
             f"places must lie in [0, {last}], not {places.min()} to {places.max()}"
         )
-    return _interpolated(np.array(frames, np.float64, order="C", copy=None), places)
+    found = np.empty((len(places), frames.shape[1]))
+    _interpolate(np.array(frames, np.float64, order="C", copy=None), places, found)
+    return found
+
+
+def interpolate_each(motions: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
+    """Return many motions, shape (T, D) each, at shares of their time, as `interpolate_linearly`.
+
+    Args:
+        motions: At least one.
+        shares: Shape (P,), in [0, 1].
+
+    Returns:
+        Shape (n, P, D).
+
+    Raises:
+        InvalidValueError: A share lies outside, or a motion has no frames.
+
+    Example:
+        >>> motions = [np.array([[0.0], [1.0]]), np.array([[0.0], [4.0], [6.0]])]
+        >>> interpolate_each(motions, np.array([0.0, 0.5]))[:, :, 0]
+        array([[0. , 0.5],
+               [0. , 4. ]])
+    """
+    if len(shares) and not (shares.min() >= 0.0 and shares.max() <= 1.0):
+        raise InvalidValueError(f"shares must lie in [0, 1], not {shares.min()} to {shares.max()}")
+    lengths = np.array([len(motion) for motion in motions])
+    if not lengths.min(initial=1):
+        raise InvalidValueError(f"motion {lengths.argmin()} has no frames")
+    frames = np.ascontiguousarray(np.concatenate(motions), np.float64)
+    return _interpolated_each(frames, lengths, shares)
 
 
 @njit(cache=True)
-def _interpolated(frames: FloatArray, places: FloatArray) -> FloatArray:
-    found = np.empty((len(places), frames.shape[1]))
+def _interpolated_each(frames: FloatArray, lengths: IntArray, shares: FloatArray) -> FloatArray:
+    found = np.empty((len(lengths), len(shares), frames.shape[1]))
+    start = 0
+    for k, length in enumerate(lengths):
+        _interpolate(frames[start : start + length], shares * (length - 1), found[k])
+        start += length
+    return found
+
+
+@njit(cache=True)
+def _interpolate(frames: FloatArray, places: FloatArray, found: FloatArray) -> None:
+    """Write frames at fractional places, shape (P, D)."""
     for p, place in enumerate(places):
         low = int(np.floor(place))
         high = min(low + 1, len(frames) - 1)
@@ -50,7 +92,6 @@ def _interpolated(frames: FloatArray, places: FloatArray) -> FloatArray:
             before = frames[low, d]
             value = before + share * (frames[high, d] - before)
             found[p, d] = value if value == value else frames[nearer, d]
-    return found
 
 
 def stretch(frames: FloatArray, n_frames: int) -> FloatArray:

@@ -139,9 +139,9 @@ def _merged(learners: Iterable[MotionLearner], names: Sequence[str]) -> tuple[Mo
         n_frames += each.n_frames
     chain.correct(merged.moved)
     chain.count_late(merged.placed)
-    person = first.state().person
+    person = first.latest_person
     for each, own in zip(all_of_them, people, strict=True):
-        person = own.get(each.state().person, person)
+        person = own.get(each.latest_person, person)
     first.adopt(merged.tree, chain, n_frames, person)
     return first, True
 

@@ -65,7 +65,9 @@ def solve(table: ShapeTable, known: Known, n_people: int, config: PeopleConfig) 
     for _ in range(_ROUNDS):
         levels = postures - offsets[known.people]
         direct, image = table.distances(levels, known.slots, config.posture)
-        unit = unit_of(direct[np.ix_(known.firm, known.firm)], known.people[known.firm], config)
+        firm = np.flatnonzero(known.firm)
+        sure = direct if len(firm) == len(direct) else direct[np.ix_(firm, firm)]
+        unit = unit_of(sure, known.people[firm], config)
         if not np.isfinite(unit):
             groups = _together(known.together)
             break
@@ -89,13 +91,24 @@ def unit_of(matrix: FloatArray, people: IntArray, config: PeopleConfig) -> float
         people: Whose leaf each is, shape (n,).
         config: The rules.
     """
-    own = (people[:, None] == people) & ~np.eye(len(people), dtype=np.bool_)
-    nearest = np.where(own, matrix, np.inf).min(axis=1, initial=np.inf)
+    nearest = _nearest_own(matrix, people)
     known = np.isfinite(nearest)
     if not known.any():
         return math.inf
-    share = min(1.0, (1.0 + float(own.sum(axis=1)[known].mean())) / config.repertoire)
+    others = np.bincount(people)[people] - 1.0  # of the same person
+    share = min(1.0, (1.0 + float(others[known].mean())) / config.repertoire)
     return float(np.median(nearest[known])) * float(np.cbrt(share))
+
+
+@njit(cache=True)
+def _nearest_own(matrix: FloatArray, people: IntArray) -> FloatArray:
+    """Return the distance of each leaf from the nearest other one of its person; inf for none."""
+    nearest = np.full(len(people), np.inf)
+    for i in range(len(people)):
+        for j in range(len(people)):
+            if people[i] == people[j] and i != j:
+                nearest[i] = min(nearest[i], matrix[i, j])
+    return nearest
 
 
 def tension(nearest: float, second: float, reach: float) -> float:

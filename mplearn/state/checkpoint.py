@@ -97,40 +97,46 @@ def resumed(kind: type[T], document: bytes, part: Callable[[str], bytes]) -> T:
         >>> resumed(SegmenterState, written.document, written.new.__getitem__).n_frames
         0
     """
-    seen: dict[str, Any] = {}
-
-    def plain(value: Any) -> Any:
-        if isinstance(value, list):
-            return [at(f"[{i}]", item) for i, item in enumerate(value)]
-        if not isinstance(value, dict):
-            return value
-        if _KEY not in value:
-            return {name: at(name, item) for name, item in value.items()}
-        key = value[_KEY]
-        if not isinstance(key, str):
-            raise StateError(f"a part must be named by its key, not {key!r:.60}")
-        if key not in seen:
-            data = _fetched(part, key)
-            if hash_of(data) != key:
-                raise StateError(f"part {key} is damaged: its content has another key")
-            content = plain(from_bytes(data))
-            seen[key] = Blob(content) if isinstance(content, np.ndarray) else content
-        return seen[key]
-
-    def at(place: str, value: Any) -> Any:
-        if not isinstance(value, (dict, list)):
-            return value
-        try:
-            return plain(value)
-        except StateError as error:
-            raise error.below(place) from None
-
     try:
         content = from_bytes(document)
         whole = isinstance(content, dict) and content.keys() == {_WHOLE}
-        return from_plain(kind, plain(content[_WHOLE] if whole else content), whole=whole)
+        plain = _put_together(content[_WHOLE] if whole else content, part, {})
+        return from_plain(kind, plain, whole=whole)
     except RecursionError as error:
         raise StateError("its parts are nested too deep") from error
+
+
+def _put_together(value: Any, part: Callable[[str], bytes], seen: dict[str, Any]) -> Any:
+    """Return plain values with parts in the place of their keys; ``seen`` are those so far."""
+    if isinstance(value, list):
+        return [
+            _below(f"[{i}]", item, part, seen) if isinstance(item, (dict, list)) else item
+            for i, item in enumerate(value)
+        ]
+    if not isinstance(value, dict):
+        return value
+    if _KEY not in value:
+        return {
+            name: _below(name, item, part, seen) if isinstance(item, (dict, list)) else item
+            for name, item in value.items()
+        }
+    key = value[_KEY]
+    if not isinstance(key, str):
+        raise StateError(f"a part must be named by its key, not {key!r:.60}")
+    if key not in seen:
+        data = _fetched(part, key)
+        if hash_of(data) != key:
+            raise StateError(f"part {key} is damaged: its content has another key")
+        content = _put_together(from_bytes(data), part, seen)
+        seen[key] = Blob(content) if isinstance(content, np.ndarray) else content
+    return seen[key]
+
+
+def _below(place: str, value: Any, part: Callable[[str], bytes], seen: dict[str, Any]) -> Any:
+    try:
+        return _put_together(value, part, seen)
+    except StateError as error:
+        raise error.below(place) from None
 
 
 def key_of(part: Part) -> str:

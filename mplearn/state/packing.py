@@ -25,32 +25,35 @@ def packed(content: Any) -> tuple[Any, bytes]:
         StateError: The content holds something else.
     """
     blob = bytearray()
-    known: dict[tuple[str, bytes], int] = {}
+    return _packed(content, blob, {}), bytes(blob)
 
-    def pack(value: Any) -> Any:
-        if isinstance(value, np.ndarray):
-            narrow = _narrowest(value)
-            data = narrow.tobytes()
-            key = (narrow.dtype.str, data)
-            if key not in known:
-                known[key] = len(blob)
-                blob.extend(data)
-            return {ARRAY: [known[key], narrow.dtype.str, value.dtype.str, list(value.shape)]}
-        if isinstance(value, dict):
-            if not all(isinstance(key, str) for key in value):
-                raise StateError(f"keys must be strings, not {list(value)[:3]}")
-            return {key: pack(item) for key, item in value.items()}
-        if isinstance(value, (list, tuple)):
-            return [pack(item) for item in value]
-        if isinstance(value, np.generic):
-            value = value.item()
-        if isinstance(value, float) and not math.isfinite(value):
-            return pack(np.array(value))
-        if value is None or isinstance(value, (str, bool, int, float)):
-            return value
-        raise StateError(f"a state cannot hold a {type(value).__name__}")
 
-    return pack(content), bytes(blob)
+def _packed(value: Any, blob: bytearray, known: dict[tuple[str, bytes], int]) -> Any:
+    """Return a value of what `packed` returns; ``known`` are places of arrays in the blob.
+
+    No function inside that one, which would be a cycle, and keep all bytes until it is found.
+    """
+    if isinstance(value, np.ndarray):
+        narrow = _narrowest(value)
+        data = narrow.tobytes()
+        key = (narrow.dtype.str, data)
+        if key not in known:
+            known[key] = len(blob)
+            blob.extend(data)
+        return {ARRAY: [known[key], narrow.dtype.str, value.dtype.str, list(value.shape)]}
+    if isinstance(value, dict):
+        if not all(isinstance(key, str) for key in value):
+            raise StateError(f"keys must be strings, not {list(value)[:3]}")
+        return {key: _packed(item, blob, known) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_packed(item, blob, known) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return _packed(np.array(value), blob, known)
+    if value is None or isinstance(value, (str, bool, int, float)):
+        return value
+    raise StateError(f"a state cannot hold a {type(value).__name__}")
 
 
 def unpacked(body: Any, blob: bytes | memoryview) -> Any:
@@ -59,25 +62,25 @@ def unpacked(body: Any, blob: bytes | memoryview) -> Any:
     Raises:
         StateError: They describe none.
     """
-    seen: dict[tuple[Any, ...], Any] = {}
-
-    def unpack(value: Any) -> Any:
-        if isinstance(value, list):
-            return [unpack(item) for item in value]
-        if not isinstance(value, dict):
-            return value
-        if ARRAY not in value:
-            return {key: unpack(item) for key, item in value.items()}
-        offset, narrow, dtype, shape = value[ARRAY]
-        key = (offset, narrow, dtype, *shape)
-        if key not in seen:
-            seen[key] = _array(blob, offset, narrow, dtype, shape)
-        return seen[key]
-
     try:
-        return unpack(body)
+        return _unpacked(body, blob, {})
     except (ValueError, TypeError, LookupError, OverflowError, RecursionError) as error:
         raise StateError(f"holds malformed arrays: {error}") from error
+
+
+def _unpacked(value: Any, blob: bytes | memoryview, seen: dict[tuple[Any, ...], Any]) -> Any:
+    """Return a value of what `unpacked` returns; ``seen`` are the arrays so far."""
+    if isinstance(value, list):
+        return [_unpacked(item, blob, seen) for item in value]
+    if not isinstance(value, dict):
+        return value
+    if ARRAY not in value:
+        return {key: _unpacked(item, blob, seen) for key, item in value.items()}
+    offset, narrow, dtype, shape = value[ARRAY]
+    key = (offset, narrow, dtype, *shape)
+    if key not in seen:
+        seen[key] = _array(blob, offset, narrow, dtype, shape)
+    return seen[key]
 
 
 def as_json(value: Any) -> bytes:

@@ -26,7 +26,7 @@ from typing import (
 import numpy as np
 
 from ..errors import MPLearnError, StateError
-from .declared import Blob, SharedState, State
+from .declared import Blob, State
 from .fields import (
     LARGEST,
     WHOLE,
@@ -87,7 +87,7 @@ def from_plain(kind: type[T], value: Any, *, whole: bool = False) -> T:
 
 
 def validated(state: T) -> T:
-    """Return a typed state after checking all that it holds; shared parts are checked once.
+    """Return a typed state after checking all that it holds, once: states never change.
 
     Raises:
         StateError: Something in it is wrong; its place says where.
@@ -424,7 +424,6 @@ def _dataclass(kind: type) -> Reader:
                 raise StateError(str(error)) from error
         if isinstance(made, State):
             made.check()
-        if isinstance(made, SharedState):
             object.__setattr__(made, "_checked", True)
         return made
 

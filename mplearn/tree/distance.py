@@ -97,6 +97,20 @@ class Distance(ABC):
             weights: Weight of each point, shape (P,).
         """
 
+    def pairwise(self, exemplars: Exemplar, others: Exemplar, weights: FloatArray) -> FloatArray:
+        """Return how far each of some exemplars is from the one of others beside it, shape (n,).
+
+        Args:
+            exemplars: Many, stacked.
+            others: As many.
+            weights: Weight of each point, shape (P,).
+        """
+        found = np.empty(len(exemplars.own))
+        for k in range(len(found)):
+            one = Exemplar(*(part[k, ...] for part in exemplars))
+            found[k] = self.divergence(one, others, np.array([k]), weights)[0]
+        return found
+
     def length(self, divergence: FloatArray | float) -> FloatArray:
         """Return divergences on the scale of the rules; what is below 0 by chance counts as 0."""
         return np.asarray(np.maximum(divergence, 0.0) ** self.power)
@@ -124,6 +138,10 @@ class LikelihoodDistance(Distance):
     ) -> FloatArray:
         """Return eq. 5 in both directions, averaged, per unit of weight."""
         return _likelihood(exemplar, others, rows, weights)
+
+    def pairwise(self, exemplars: Exemplar, others: Exemplar, weights: FloatArray) -> FloatArray:
+        """Return the divergences of exemplars from those beside them, all in one loop."""
+        return _pairwise_likelihood(exemplars, others, weights)
 
 
 class MonteCarloDistance(Distance):
@@ -318,6 +336,18 @@ def _likelihood(
     for k, row in enumerate(rows):
         forth = exemplar.own.item() - _score(exemplar.columns, _of_many(others, row), weights)
         back = others.own[row] - _score(others.columns[row], mine, weights)
+        out[k] = 0.5 * (forth + back) / mass
+    return out
+
+
+@njit(cache=True)
+def _pairwise_likelihood(exemplars: Exemplar, others: Exemplar, weights: FloatArray) -> FloatArray:
+    mass = weights.sum()
+    out = np.empty(len(exemplars.own))
+    for k in range(len(out)):
+        mine, theirs = _of_many(exemplars, k), _of_many(others, k)
+        forth = exemplars.own[k] - _score(exemplars.columns[k], theirs, weights)
+        back = others.own[k] - _score(others.columns[k], mine, weights)
         out[k] = 0.5 * (forth + back) / mass
     return out
 

@@ -453,6 +453,20 @@ def test_workers_that_die_at_once_end_it(folder: Path, tmp_path: Path) -> None:
         learn_corpus(folder, tmp_path / "s", executor=Dying())
 
 
+@pytest.mark.parametrize("jobs", [0, -1, 1.5, "two"])
+def test_an_executor_that_takes_nothing_is_refused_before_anything_is_read(
+    jobs: Any, tmp_path: Path
+) -> None:
+    executor = SimpleNamespace(submit=Here().submit, close=Here().close, jobs=jobs)
+    with pytest.raises(InvalidValueError, match="jobs must be a number from 1 on"):
+        learn_corpus(tmp_path / "nothing", tmp_path / "s", executor=executor)
+    with pytest.raises(InvalidValueError, match="jobs must be a number from 1 on"):
+        recognise_corpus(tmp_path / "no.mplearn", tmp_path / "nothing", executor=executor)
+    with pytest.raises(InvalidValueError, match=r"has submit\(work, \*args\)"):
+        learn_corpus(tmp_path / "nothing", tmp_path / "s", executor=4)  # type: ignore[arg-type]
+    assert not (tmp_path / "s").exists()
+
+
 def test_the_tree_merges_as_merging_does(folder: Path, alone: bytes, tmp_path: Path) -> None:
     stores = tmp_path / "s"
     learn_corpus(folder, stores, jobs=0)

@@ -8,7 +8,12 @@ from scipy.interpolate import interp1d, make_interp_spline
 
 from mplearn.errors import InvalidValueError
 from mplearn.maths.easing import minimum_jerk, smooth_step
-from mplearn.maths.resampling import bridge_gaps, interpolate_linearly, stretch
+from mplearn.maths.resampling import (
+    bridge_gaps,
+    interpolate_each,
+    interpolate_linearly,
+    stretch,
+)
 from mplearn.maths.splines import interpolate
 
 
@@ -55,6 +60,22 @@ def test_there_is_nothing_before_the_first_frame_or_behind_the_last(place):
         interpolate_linearly(np.zeros((3, 1)), np.array([0.0, place]))
     with pytest.raises(InvalidValueError, match="places"):
         stretch(np.zeros((0, 1)), 4)
+
+
+def test_many_motions_are_interpolated_as_one_by_one():
+    rng = np.random.default_rng(0)
+    motions = [rng.normal(size=(n, 3)) for n in (1, 2, 40, 7)]
+    motions[2][10:13] = np.nan
+    shares = np.append(rng.uniform(size=20), [0.0, 1.0])
+    together = interpolate_each([*motions[:3], np.asfortranarray(motions[3])], shares)
+    for motion, found in zip(motions, together, strict=True):
+        expected = interpolate_linearly(motion, shares * (len(motion) - 1))
+        np.testing.assert_array_equal(found, expected)
+    for bad in (-0.01, 1.01, np.nan):
+        with pytest.raises(InvalidValueError, match=r"shares must lie in \[0, 1\]"):
+            interpolate_each(motions, np.array([bad]))
+    with pytest.raises(InvalidValueError, match="motion 1 has no frames"):
+        interpolate_each([motions[0], np.zeros((0, 3))], shares)
 
 
 @settings(deadline=None)

@@ -63,6 +63,19 @@ def test_it_is_symmetric_deterministic_and_zero_on_itself(name: str) -> None:
     assert (matrix[~np.eye(N, dtype=bool)] > 0).all()
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_pairs_are_as_far_apart_as_one_by_one(name: str) -> None:
+    config = TreeConfig(distance=name)
+    bank, exemplars = banked(config)
+    weights = forms.weights(config.normalisation)
+    one = Exemplar(*map(np.stack, zip(*exemplars, strict=True)))
+    other = Exemplar(*(part[::-1].copy() for part in one))
+    found = bank.distance.pairwise(one, other, weights)
+    for k in range(N):
+        expected = bank.distance.divergence(exemplars[k], other, np.array([k]), weights)
+        assert found[k] == expected[0]
+
+
 def test_generated_sequences_say_what_training_sequences_say() -> None:
     """Of models whose segments were their own means, both forms measure the same differences."""
     bank, exemplars = banked(TreeConfig())

@@ -90,8 +90,11 @@ def run(args: argparse.Namespace) -> int | None:
 
 def _export(args: argparse.Namespace) -> None:
     from mplearn_envs.export import RobotModel, export, format_of, perform
+    from mplearn_envs.export.exporting import check_place
 
     format = format_of(args.to)
+    if args.out is not None and args.clips > 1:  # before it takes its time
+        check_place(format, args.out, args.clips)
     robot = _robot(args.robot)
     done = perform(
         args.library,

@@ -11,6 +11,7 @@ from mplearn.errors import InvalidValueError
 
 from .format import Format
 from .motion import RobotMotion
+from .registry import formats
 from .robot_model import RobotModel
 from .sidecar import sidecar_path, write_sidecar
 
@@ -54,18 +55,12 @@ def export(
     """
     if not motions:
         raise InvalidValueError("there is no motion to export")
+    check_place(format, out, len(motions))
     ready = [motion.resampled(rate_hz or format.rate_hz) for motion in motions]
     if format.many or len(ready) == 1:
-        if not out.name.lower().endswith(format.suffix):
-            raise InvalidValueError(
-                f"{format.name} is written to a file that ends with {format.suffix}, not to "
-                f"{out.name!r}"
-            )
         out.parent.mkdir(parents=True, exist_ok=True)
         jobs = [(out, ready)]
     else:
-        if out.is_file():
-            raise InvalidValueError(f"{out} is a file: {len(ready)} motions need a folder")
         out.mkdir(parents=True, exist_ok=True)
         jobs = [
             (out / f"{name}{format.suffix}", [motion])
@@ -81,6 +76,31 @@ def export(
         format.write(path, part, model)
         write_sidecar(path, format.name, part, model)
     return tuple(path for path, _ in jobs)
+
+
+def check_place(format: Format, out: Path, n: int) -> None:
+    """Refuse a place that is not what so many motions are written to: a file, or a folder of files.
+
+    Raises:
+        InvalidValueError: It is not.
+    """
+    if format.many or n == 1:
+        if not out.name.lower().endswith(format.suffix):
+            raise InvalidValueError(
+                f"{format.name} is written to a file that ends with {format.suffix}, not to "
+                f"{out.name!r}"
+            )
+    elif out.is_file():
+        raise InvalidValueError(f"{out} is a file: {n} motions need a folder")
+    elif out.suffix and not out.is_dir() and out.suffix.lower() in _suffixes():
+        raise InvalidValueError(
+            f"{out.name!r} is the name of one file: {n} motions are {n} files of {format.name}; "
+            f"give a folder to write them into, such as {out.stem!r}"
+        )
+
+
+def _suffixes() -> set[str]:
+    return {each.suffix for each in formats().values()}
 
 
 def file_name(text: str) -> str:

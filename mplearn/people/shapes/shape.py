@@ -7,7 +7,7 @@ its joint angles, so a person's size and place have fallen away already.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
@@ -39,14 +39,14 @@ class ShapeState(SharedState):
     movement: Annotated[FloatArray, Array("pd")]
 
 
-def shape_of(exemplars: Iterable[FloatArray], config: NormalisationConfig) -> Shape:
+def shape_of(exemplars: Sequence[FloatArray], config: NormalisationConfig) -> Shape:
     """Return the shape of one motion's executions.
 
     Args:
         exemplars: Segments, shape (L, D) each; NaN counts for nothing.
         config: How segments are normalised.
     """
-    points = np.array([normalisation.points_of(frames, config) for frames in exemplars])
+    points = normalisation.points_of_each(exemplars, config)
     seen = ~np.isnan(points)
     mean = np.where(seen, points, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
     weights = normalisation.weights(config)
@@ -64,9 +64,3 @@ def mirrored(shape: Shape, mirror: MirrorMap) -> Shape:
     """Return the mirror image of a shape."""
     movement = mirror.apply(shape.movement.reshape(-1, len(mirror.sign)))
     return Shape(mirror.apply(shape.posture), movement.ravel())
-
-
-def squares(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the squared distances between rows, shape (n, D) and (m, D) to (n, m)."""
-    lengths = np.einsum("nd,nd->n", a, a)[:, None] + np.einsum("md,md->m", b, b)
-    return np.asarray(np.maximum(lengths - 2 * a @ b.T, 0.0))

@@ -10,7 +10,7 @@ from ...maths.compiling import njit
 from ...maths.sums import LANES, row_squares
 from ...recording import FloatArray, IntArray
 from ...tree import MirrorMap
-from .shape import Shape, ShapeState, mirrored, squares
+from .shape import Shape, ShapeState, mirrored
 
 
 class ShapeTable:
@@ -49,17 +49,14 @@ class ShapeTable:
             self._note(slot, shape)
         new = np.array(slots, np.int64)
         others = np.setdiff1d(np.arange(self._used), new)
-        within, beyond, back = np.ix_(new, new), np.ix_(new, others), np.ix_(others, new)
         mine, theirs = self._movements[new], self._movements[others]
-        self._direct[within] = _among(mine)
-        self._direct[beyond] = across = _across(mine, theirs)
-        self._direct[back] = across.T
+        _put_among(mine, new, self._direct)
+        _put_both_ways(_across(mine, theirs), new, others, self._direct)
         if self.mirror is not None:
             images = self._images[new]
-            across = _across(mine, images)
-            self._mirrored[within] = 0.5 * (across + across.T)
+            _put_mean(_across(mine, images), new, self._mirrored)
             across = 0.5 * (_across(images, theirs) + _across(mine, self._images[others]))
-            self._mirrored[beyond], self._mirrored[back] = across, across.T
+            _put_both_ways(across, new, others, self._mirrored)
         return slots
 
     def put(self, slot: int, shape: Shape) -> None:
@@ -109,11 +106,11 @@ class ShapeTable:
             slots: Where they are, shape (n,).
             posture: Weight of the postures.
         """
-        direct = _rooted(squares(levels, levels), self._direct, slots, posture)
+        direct = _rooted(levels, levels, self._direct, slots, posture)
         if self.mirror is None:
             return direct, np.full_like(direct, np.inf)
         images = self.mirror.apply(levels)
-        return direct, _rooted(squares(images, levels), self._mirrored, slots, posture)
+        return direct, _rooted(images, levels, self._mirrored, slots, posture)
 
     def distances_to(
         self, shape: Shape, levels: FloatArray, slots: IntArray, posture: float
@@ -155,39 +152,76 @@ def stacked(shapes: Sequence[Shape]) -> ShapeTable:
     return table
 
 
-@njit(cache=True)
 def _rooted(
-    postures: FloatArray, movements: FloatArray, slots: IntArray, weight: float
+    postures: FloatArray, others: FloatArray, movements: FloatArray, slots: IntArray, weight: float
 ) -> FloatArray:
-    """Return distances of squared ones of postures, (n, n), which they take the place of.
+    """Return the distances of shapes from others in the same slots, (n, n).
 
     Args:
-        postures: Those, of the shapes of some slots.
-        movements: Those of movements, of all slots.
+        postures: Those of the ones, shape (n, D).
+        others: Those of the others, shape (n, D).
+        movements: Squared distances of movements, of all slots.
         slots: Which, shape (n,).
         weight: Of postures.
     """
+    lengths, theirs = (np.einsum("nd,nd->n", each, each) for each in (postures, others))
+    return _root_of(2 * postures @ others.T, lengths, theirs, movements, slots, weight)
+
+
+@njit(cache=True)
+def _root_of(
+    products: FloatArray,
+    lengths: FloatArray,
+    theirs: FloatArray,
+    movements: FloatArray,
+    slots: IntArray,
+    weight: float,
+) -> FloatArray:
+    """Write distances into twice the products of postures, given their squared lengths."""
     for i, one in enumerate(slots):
         for j, other in enumerate(slots):
-            postures[i, j] = np.sqrt(weight * postures[i, j] + movements[one, other])
-    return postures
+            square = max(lengths[i] + theirs[j] - products[i, j], 0.0)
+            products[i, j] = np.sqrt(weight * square + movements[one, other])
+    return products
 
 
 _BLOCK = 32  # rows that the processor's cache holds twice
 
 
 @njit(cache=True)
-def _among(rows: FloatArray) -> FloatArray:
-    """Return the squared distances of all rows from each other as `_row` does, shape (n, n)."""
+def _put_among(rows: FloatArray, slots: IntArray, out: FloatArray) -> None:
+    """Put the squared distances of all rows from each other, as `_row` has them, at their slots."""
     n = len(rows)
-    out = np.zeros((n, n))
     for start in range(0, n, _BLOCK):
         for first in range(0, start + 1, _BLOCK):
             for i in range(start, min(start + _BLOCK, n)):
                 end = min(first + _BLOCK, i)
                 if end > first:
-                    out[i, first:end] = out[first:end, i] = _row(rows[first:end], rows[i])
-    return out
+                    found = _row(rows[first:end], rows[i])
+                    for k, j in enumerate(slots[first:end]):
+                        out[slots[i], j] = out[j, slots[i]] = found[k]
+    for slot in slots:
+        out[slot, slot] = 0.0
+
+
+@njit(cache=True)
+def _put_mean(across: FloatArray, slots: IntArray, out: FloatArray) -> None:
+    """Put the mean of each distance and the one back at the slots of both, block by block."""
+    n = len(slots)
+    for start in range(0, n, _BLOCK):
+        for first in range(0, start + 1, _BLOCK):
+            for i in range(start, min(start + _BLOCK, n)):
+                for j in range(first, min(first + _BLOCK, i + 1)):
+                    mean = 0.5 * (across[i, j] + across[j, i])
+                    out[slots[i], slots[j]] = out[slots[j], slots[i]] = mean
+
+
+@njit(cache=True)
+def _put_both_ways(across: FloatArray, slots: IntArray, others: IntArray, out: FloatArray) -> None:
+    """Put distances between some slots and others, shape (n, m), and back."""
+    for i, one in enumerate(slots):
+        for j, other in enumerate(others):
+            out[one, other] = out[other, one] = across[i, j]
 
 
 @njit(cache=True)

@@ -128,11 +128,8 @@ class ExemplarBank:
         postures = normalisation.mean_postures(points, self.config.normalisation)
         still = np.broadcast_to(postures[:, None], points.shape)
         both = self._modelled(np.concatenate([points, still]), np.tile(durations, 2))
-        own = Exemplar(*(part[:n] for part in both))
-        for k in range(n):
-            one = Exemplar(*(part[k, ...] for part in own))
-            apart = self.distance.divergence(one, both, np.array([n + k]), self._weights)
-            own.extent[k] = self.distance.length(apart)[0]
+        own, held = (Exemplar(*(part[at] for part in both)) for at in (slice(n), slice(n, None)))
+        own.extent[:] = self.distance.length(self.distance.pairwise(own, held, self._weights))
         return own
 
     def _modelled(self, points: FloatArray, durations: FloatArray) -> Exemplar:

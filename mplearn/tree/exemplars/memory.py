@@ -224,7 +224,7 @@ class SegmentMemory:
     def _model_all(self, segments: Sequence[tuple[int, FloatArray]]) -> None:
         """Model many segments at once, which is quicker."""
         config = self.config.normalisation
-        points = np.stack([normalisation.points_of(frames, config) for _, frames in segments])
+        points = normalisation.points_of_each([frames for _, frames in segments], config)
         lengths = np.array([len(frames) for _, frames in segments])
         seen = normalisation.centred(points, config)
         try:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
 
-from ...maths.resampling import interpolate_linearly
+from ...maths.resampling import interpolate_each, interpolate_linearly
 from ...recording import FloatArray
 from ..config import NormalisationConfig
 
@@ -27,6 +28,11 @@ def weights(config: NormalisationConfig) -> FloatArray:
 def points_of(frames: FloatArray, config: NormalisationConfig) -> FloatArray:
     """Return the P points of a segment (T, D) that are compared, not yet centred."""
     return interpolate_linearly(frames, _passed(config) * (len(frames) - 1))
+
+
+def points_of_each(segments: Sequence[FloatArray], config: NormalisationConfig) -> FloatArray:
+    """Return those of many segments, stacked, shape (n, P, D), which is quicker."""
+    return interpolate_each(segments, _passed(config))
 
 
 @lru_cache(maxsize=32)

@@ -267,6 +267,11 @@ def test_many_motions_need_a_folder_and_get_names_of_their_own(tmp_path: Path) -
         export(done.motions[:1], model, format_of("unitree"), tmp_path / "folder.csv")
     with pytest.raises(InvalidValueError, match=r"ends with \.npz"):
         export(done.motions[:1], model, format_of("mjlab"), tmp_path / "walk")
+    for name in ("all.npz", "all.CSV"):  # what looks like a file is none
+        with pytest.raises(InvalidValueError, match=r"3 files of mjlab; give a folder .* 'all'"):
+            export(done.motions, model, format_of("mjlab"), tmp_path / name)
+        assert not (tmp_path / name).exists()
+    assert len(export(done.motions, model, format_of("mjlab"), tmp_path / "all.2")) == 3
     assert taken.read_text() == "mine"
 
 
