@@ -45,7 +45,7 @@ class Label(NamedTuple):
 
 def read_label(label: str) -> list[Label]:
     """Return the ways to read a label, the likeliest first."""
-    plain = label.rsplit(":", 1)[-1].strip()
+    plain = re.split(r"[:|]", label)[-1].strip()
     spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", plain)
     words = [word for word in re.split(r"[^a-z0-9]+", spaced.lower()) if word]
     ways: list[Label] = []
@@ -97,7 +97,7 @@ def landmarks_of(labels: tuple[str, ...], naming: Naming) -> dict[str, tuple[str
         naming: How they are named; see `naming_of`.
     """
     sided, middle = map(_lookup, _TABLES[naming])
-    cut = max(map(len, labels), default=0) <= CUT
+    cut = are_cut(labels)
     found: dict[str, tuple[str, ...]] = {}
     for label in labels:
         ways = [(stem, side, sided if side else middle) for stem, side in read_label(label)]
@@ -117,6 +117,32 @@ def landmarks_of(labels: tuple[str, ...], naming: Naming) -> dict[str, tuple[str
                 begun.sort(key=lambda found: found[0])
                 found[label] = tuple(dict.fromkeys(chain(*(names for _, names in begun))))
     return found
+
+
+def are_cut(labels: tuple[str, ...]) -> bool:
+    """Whether labels may have been cut to four letters."""
+    return max(map(len, labels), default=0) <= CUT
+
+
+def beside_joints(
+    read: dict[str, tuple[str, ...]], labels: tuple[str, ...]
+) -> dict[str, tuple[str, ...]]:
+    """Return what labels of skin name where joints are beside them, as OpenCap has both.
+
+    Of two labels that name one landmark (``RKnee``, ``r_knee_study``), the one that pose estimators
+    call a joint is that joint; so are, then, all that are called so (``RHip``, ``RWrist``).
+    """
+    joints = landmarks_of(labels, "joints")
+    claims: dict[tuple[str, ...], list[str]] = {}
+    for label, places in read.items():
+        claims.setdefault(places, []).append(label)
+    contested = {
+        label
+        for places, rivals in claims.items()
+        for label in rivals
+        if joints.get(label, places) != places and any(r not in joints for r in rivals)
+    }
+    return read | joints if len(contested) >= len(_LIMBS) else read
 
 
 def _sided(names: tuple[str, ...], side: str) -> tuple[str, ...]:

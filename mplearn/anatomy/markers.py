@@ -19,16 +19,18 @@ from ..mocap.options import option
 from ..recording import FloatArray, Recording
 from .body_map import BodyMap
 from .facing import check_facing
-from .labels import landmarks_of, naming_of, without_shared_ends
+from .labels import are_cut, beside_joints, landmarks_of, naming_of, without_shared_ends
 
 SOME_FRAMES = 120  # of a recording are looked at
 TRUNK, FEWEST_ON_TRUNK = ("pelvis", "abdomen", "chest", "clavicle_l", "clavicle_r"), 4
 FEWEST = 6  # landmarks; fewer are no person
+ON_ARMS = ("upper_arm", "forearm", "hand")
 ODD = 1.6  # how many times farther apart than on a person two markers of a segment may be
 ODD_BY_JOINT = 1.25  # the same for markers of two segments that a joint joins
 ODD_M = 0.06  # and how much
 LEVEL = 0.15  # of the stature: as high as its landmark, at most so far off
 FLAT_NECK = 0.03  # of the stature: a neck no higher above the shoulders is their middle
+HIGH_NECK = 0.25  # of the way from hips to shoulders: a neck farther above these is not its base
 FLAT_PELVIS = 0.012  # of the stature: a pelvis farther from the middle of the hips is not that
 HEADS = (0.4, 1.7)  # how far the middle of the skull is on the way to a head: to its top, or base
 SHOULDERS, HIPS = ("shoulder_l", "shoulder_r"), ("hip_l", "hip_r")
@@ -66,6 +68,9 @@ def recognise_markers(recording: Recording, names: Mapping[str, str] | None = No
     plain = without_shared_ends(rest)
     naming = naming_of(plain)
     read = landmarks_of(plain, naming)
+    if naming == "skin":
+        read = beside_joints(read, plain)
+    cut = are_cut(plain)
     pairs = zip(rest, plain, strict=True)
     candidates = {label: read[short] for label, short in pairs if short in read}
     found = {label: place for label, place in names.items() if place and label in labels}
@@ -73,7 +78,10 @@ def recognise_markers(recording: Recording, names: Mapping[str, str] | None = No
     for label in _settled_first(candidates, naming, seen):
         free = [place for place in candidates[label] if place not in found.values()]
         if naming == "skin" and len(candidates[label]) > 1:
-            free = [p for p in free if abs(_level(p) - heights.get(label, 0.5)) < LEVEL]
+            off = {place: abs(_level(place) - _own_level(label, heights, found)) for place in free}
+            free = [place for place in free if off[place] < LEVEL]
+            if not cut:  # else the shortest name that begins so is likelier
+                free.sort(key=off.__getitem__)
         if free:
             found[label] = _of_the_toes(free, label, found, at)
     warnings: list[str] = []
@@ -158,6 +166,29 @@ def _level(place: str) -> float:
     """Return how high a landmark is on a person who stands, as a share of the stature."""
     landmarks, places = _places()
     return float(places[landmarks.names.index(place), 2] / human_body().height_m)
+
+
+def _on_arm(place: str) -> bool:
+    """Whether a landmark goes anywhere with the arm."""
+    landmarks, _ = _places()
+    return landmarks.bodies[landmarks.names.index(place)].startswith(ON_ARMS)
+
+
+def _own_level(label: str, heights: Mapping[str, float], found: Mapping[str, str]) -> float:
+    """Return how high a marker is as a share of the stature, by what is known of others.
+
+    Where little is known, as a share of the height of the highest marker.
+    """
+    height = heights.get(label, 0.5)
+    sure = [
+        (heights[other], _level(place))
+        for other, place in found.items()
+        if other in heights and not _on_arm(place)
+    ]
+    own, levels = np.array(sure).reshape(-1, 2).T
+    if len(sure) < FEWEST or np.ptp(own) < 0.5:
+        return height
+    return float(np.polyval(np.polyfit(own, levels, 1), height))
 
 
 def _heights(labels: tuple[str, ...], some: FloatArray) -> dict[str, float]:
@@ -260,9 +291,17 @@ def _usual(one: str, other: str) -> float:
 def _drop_middles(found: dict[str, str], at: Mapping[str, FloatArray]) -> None:
     """Leave out a neck that lies between the shoulders, as pose estimators call their middle.
 
-    And a pelvis that does not lie between the hips: skeletons often begin above it.
+    Also one that is its middle or top, as depth cameras have it, and not its base; and a pelvis
+    that does not lie between the hips: skeletons often begin above it.
     """
     label_of = {place: label for label, place in found.items()}
+    if label_of.keys() >= {"neck", *SHOULDERS, *HIPS}:
+        shoulders, hips = (
+            0.5 * (at[label_of[left]] + at[label_of[right]]) for left, right in (SHOULDERS, HIPS)
+        )
+        neck = label_of["neck"]
+        if _apart(at[neck], shoulders) > HIGH_NECK * _apart(shoulders, hips):
+            del found[neck], label_of["neck"]
     for place, (left, right), middle, near in (
         ("neck", SHOULDERS, False, FLAT_NECK),
         ("pelvis", HIPS, True, FLAT_PELVIS),

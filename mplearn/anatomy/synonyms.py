@@ -98,16 +98,16 @@ SKIN_MIDDLE = {
     "head_front": "headfront frontalhead fronthead front frhd forehead fhead glab",
     "head_rear": "headrear rearhead headback rear backhead bhead occiput",
     "nose": "nose",
-    "c7": "c7 cv7 c7study spinetop t1 neckback nape cerv7 cvii",
+    "c7": "c7 cv7 c7study spinetop backtop t1 neckback nape cerv7 cvii",
     "t2": "t2 tv2 spinethoracic2 t3",
     "t8": "t8 tv8 t7 tv7 mai t6 t5",
-    "t10": "t10 tv10 strnback midback back backtop t9",
+    "t10": "t10 tv10 strnback midback back t9",
     "l1": "t12 tv12 l1 lv1 spinethoracic12",
     "l3": "l3 lv3 l2 lv2 l4 lv4",
     "l5": "l5 lv5 l5s1",
     "jugular_notch": (
         "clav sjn ij jn sternum stern strntop clavicle suprasternal ijn manubrium "
-        "incisura sternalnotch sn"
+        "incisura sternalnotch sn chest"
     ),
     "xiphoid": "strn sxs xiphoid px xip xp chest xiph proc strnlow sxp",
     "sacrum": (

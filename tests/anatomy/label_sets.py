@@ -113,6 +113,37 @@ _SPORTS = {
         "#ToeTip": "toe_tip",
     }.items()
 }
+# as OptiTrack's documentation of Motive's sets places them
+_MOTIVE = {
+    "HeadTop": "head_top",
+    "HeadFront": "head_front",
+    "BackTop": "c7",
+    "Chest": "jugular_notch",
+    "BackLeft": "scapula_l",
+    "BackRight": "scapula_r",
+} | {
+    label.replace("#", side): f"{place}_{side.lower()}"
+    for side in "LR"
+    for label, place in {
+        "#ShoulderTop": "acromion",
+        "#ShoulderBack": "shoulder_back",
+        "#UArmHigh": "upper_arm",
+        "#ElbowOut": "elbow_outer",
+        "#WristOut": "wrist_little",
+        "#WristIn": "wrist_thumb",
+        "#HandOut": "knuckle_little",
+        "Waist#Front": "iliac_front",
+        "Waist#Back": "iliac_back",
+        "#Thigh": "thigh_outer",
+        "#KneeOut": "knee_outer",
+        "#Shin": "shank_front",
+        "#AnkleOut": "ankle_outer",
+        "#Heel": "heel_back",
+        "#ToeIn": "metatarsal1",
+        "#ToeOut": "metatarsal5",
+        "#ToeTip": "toe_tip",
+    }.items()
+}
 _OPENCAP = {"C7_study": "c7"} | {
     label.replace("#", side): f"{place}_{side.lower()}"
     for side in "rL"
@@ -228,7 +259,9 @@ SETS = {
     "cast": _CAST,
     "joint centres": _JOINT_CENTRES,
     "sports": _SPORTS,
+    "motive": _MOTIVE,
     "opencap": _OPENCAP,
+    "opencap, joints beside": _OPENPOSE | _OPENCAP,
     "openpose": _OPENPOSE,
     "mediapipe": _MEDIAPIPE,
     "plug_in_gait_virtual": {f"Anna:{label}": place for label, place in _PLUG_IN_GAIT.items()}

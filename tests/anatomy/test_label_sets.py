@@ -42,6 +42,22 @@ def test_key_points_are_the_same_person(truth, name, noise_m):
     assert np.median(points) < 15.0
 
 
+@pytest.mark.parametrize("rise", [0.6, 1.0])
+def test_the_middle_of_a_neck_is_not_its_base(truth, rise):
+    """Depth cameras have a point there; it bent the trunk by 20 deg."""
+    recording = labelled("kinect", truth.body, truth.postures, 25.0, off_m=0.0)
+    at = recording.marker_names.index
+    markers = recording.markers.copy()
+    shoulders = markers[:, [at("ShoulderLeft"), at("ShoulderRight")]].mean(axis=1)
+    base = shoulders + 0.5 * (markers[:, at("Head")] - shoulders)
+    markers[:, at("Neck")] = base + rise * (markers[:, at("Head")] - base)
+    high = replace(recording, frames=markers.reshape(len(markers), -1))
+    body = recognise(high)
+    assert "Neck" in body.left_out
+    angles, points = truth.errors(body.apply(high))
+    assert np.median(angles) < 3.0 and np.median(points) < 15.0
+
+
 def test_points_that_lie_on_each_other_end_nothing(truth):
     recording = labelled("joints of SMPL", truth.body, truth.postures[:5], 25.0, off_m=0.0)
     one = np.repeat(recording.markers[:, :1], len(recording.marker_names), axis=1)

@@ -58,7 +58,8 @@ def spelling(draw: st.DrawFn) -> dict[str, object]:
         "time": draw(
             st.sampled_from(
                 [("time", 1.0), ("Time (s)", 1.0), ("timestamp_ms", 1e-3), ("Time [ms]", 1e-3),
-                 ("t", 1.0), ("Timestamp", 1e-3), ("time_us", 1e-6), ("TIME", 1.0)]
+                 ("t", 1.0), ("Timestamp", 1e-3), ("time_us", 1e-6), ("TIME", 1.0),
+                 ("timestamp_usec", 1e-6), ("time_nanos", 1e-9)]
             )
         ),
         "frame": draw(st.sampled_from(["", "frame", "Frame#", "Frame Number", "index", "Sample"])),
@@ -326,7 +327,10 @@ def test_what_names_of_columns_mean() -> None:
 
 
 @pytest.mark.parametrize("version", ["1.23", "3.0"])
-@pytest.mark.parametrize(("units", "scale"), [("Meters", 1.0), ("Millimeters", 1000.0)])
+@pytest.mark.parametrize(
+    ("units", "scale"),
+    [("Meters", 1.0), ("Millimeters", 1000.0), ("Millimètres", 1000.0), ("Zentimeter", 100.0)],
+)
 def test_motive(tmp_path: Path, version: str, units: str, scale: float) -> None:
     points = person(20, 8)
     points[3:6, 1] = np.nan

@@ -79,14 +79,15 @@ _TIME = re.compile(
     rf"(?:{_WHOSE_TIME}{_SEP}?)*"
     rf"(time|times|zeit|temps|tiempo|tempo|tijd|zeitstempel|timestamps?|time{_SEP}?stamps?|t|unix|"
     rf"epoch|elapsed|elapsed{_SEP}?time|clock|secs?|seconds|ms|msec|milliseconds)"
-    rf"({_SEP}?(s|secs?|seconds?|ms|msecs?|milliseconds|us|microseconds|ns|nanoseconds|mean|unix))*$",
+    rf"({_SEP}?(s|secs?|seconds?|ms|msecs?|millis|milliseconds|us|usecs?|micros|microseconds|ns|nsecs?|"
+    rf"nanos|nanoseconds|mean|unix))*$",
     re.I,
 )
 _TIME_UNITS = {
     **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), 1.0),
-    **dict.fromkeys(("ms", "msec", "msecs", "milliseconds"), 1e-3),
-    **dict.fromkeys(("us", "microseconds"), 1e-6),
-    **dict.fromkeys(("ns", "nanoseconds"), 1e-9),
+    **dict.fromkeys(("ms", "msec", "msecs", "millis", "milliseconds"), 1e-3),
+    **dict.fromkeys(("us", "usec", "usecs", "micros", "microseconds"), 1e-6),
+    **dict.fromkeys(("ns", "nsec", "nsecs", "nanos", "nanoseconds"), 1e-9),
 }
 _FRAME = re.compile(
     rf"(unnamed: ?0|#|index|idx|row|sample|samples|field|item)$|(sub)?{_SEP}?frames?{_SEP}?"

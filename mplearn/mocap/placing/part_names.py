@@ -67,7 +67,7 @@ class Place:
 @cache
 def place_of(name: str) -> Place:
     """Return where a marker or joint sits, as far as its name tells."""
-    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name.split(":")[-1])
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", re.split(r"[:|/]", name)[-1])
     plain = re.sub(r"[^a-z0-9]+", "_", spaced.lower()).strip("_")
     joined = plain.replace("_", "")
     spellings = (joined, plain)  # in one piece, T10 of Anna_T10 would look like the end of joint10

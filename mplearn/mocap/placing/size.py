@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from unicodedata import normalize
 
 import numpy as np
 
@@ -138,7 +139,8 @@ def named_unit(text: str) -> float | None:
         >>> named_unit("Millimeters"), named_unit("[m]"), named_unit("furlongs")
         (0.001, 1.0, None)
     """
-    plain = "".join(c for c in _ANGLES_TOO.sub("", text.lower()) if c.isalpha())
+    decomposed = normalize("NFD", _ANGLES_TOO.sub("", text.lower()))  # accents by themselves
+    plain = "".join(c for c in decomposed if c.isalpha())
     if plain in UNITS_M:
         return UNITS_M[plain]
     if len(plain) < 2:
@@ -165,15 +167,19 @@ def said_unit(path: Path, text: str, hints: Hints) -> float | None:
 
 _ANGLES_TOO = re.compile(r"\W*(?:deg|degrees?|rad|radians?|°)\W*$")  # one text for both
 _SAYS_NOTHING = re.compile(r"|\W+|n/?a|none|null|unknown|undefined|unspecified|units?|arbitrary")
+# fmt: off
 _WORDS = (
     (("um", "µm", "μm", "micrometers", "micrometres", "microns"), 1e-6),
-    (("millimeters", "millimetres", "mms", "milimeters", "milimetres"), 0.001),
-    (("centimeters", "centimetres", "cms"), 0.01),
-    (("decimeters", "decimetres"), 0.1),
-    (("meters", "metres", "mtrs"), 1.0),
-    (("inches", "inchs"), 0.0254),
+    (("millimeters", "millimetres", "mms", "milimeters", "milimetres",
+      "milimetros", "millimetri", "мм", "毫米"), 0.001),
+    (("centimeters", "centimetres", "cms", "zentimeter", "centimetros", "centimetri", "см",
+      "厘米"), 0.01),
+    (("decimeters", "decimetres", "dezimeter"), 0.1),
+    (("meters", "metres", "mtrs", "metros", "metri"), 1.0),
+    (("inches", "inchs", "zoll", "pouces"), 0.0254),
     (("feet", "foot"), 0.3048),
 )
+# fmt: on
 
 
 def _unit_of_an_adult(points: FloatArray, names: tuple[str, ...]) -> float | None:
