@@ -163,11 +163,11 @@ class _Archive(ABC):
 class _Zip(_Archive):
     def __init__(self, path: Path) -> None:
         self._file = zipfile.ZipFile(path)
-        files = [info for info in self._file.infolist() if not info.is_dir()]
+        files = [i for i in self._file.infolist() if i.filename and not i.is_dir()]
         if any(info.flag_bits & _ENCRYPTED for info in files):
             raise ArchiveError("it is encrypted", "an archive that needs no password")
         _refuse_endless(path.stat().st_size, (info.file_size for info in files))
-        self._named = {_plain(info.filename): info for info in files}
+        self._named = {name: info for info in files if (name := _plain(info.filename))}
         self.files = {
             name: Member(info.compress_size, info.file_size) for name, info in self._named.items()
         }
@@ -190,8 +190,8 @@ class _Tar(_Archive):
                     raise tarfile.ReadError("a file ends before it begins")
                 before = archive.offset
                 archive.members = []  # type: ignore[attr-defined] # else it keeps all of them
-                if info.isreg() and not info.issparse():
-                    self._at[_plain(info.name)] = info.offset_data, info.size
+                if info.isreg() and not info.issparse() and (name := _plain(info.name)):
+                    self._at[name] = info.offset_data, info.size
         _refuse_endless(self._file.seek(0, os.SEEK_END), (size for _, size in self._at.values()))
         self.files = {name: Member(size, size) for name, (_, size) in self._at.items()}
 

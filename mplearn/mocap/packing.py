@@ -5,6 +5,7 @@ from __future__ import annotations
 import bz2
 import gzip
 import lzma
+import struct
 import tarfile
 import zipfile
 import zlib
@@ -24,7 +25,10 @@ DAMAGE = (
     tarfile.TarError,
     RuntimeError,
     ValueError,
-    KeyError,
+    LookupError,
+    struct.error,
+    OverflowError,  # sizes and places that no file has
+    MemoryError,
 )
 """What reading of damaged, encrypted or cut off files and archives raises."""
 

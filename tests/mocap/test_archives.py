@@ -203,6 +203,22 @@ def test_names_in_an_archive_lead_nowhere_else(tmp_path: Path) -> None:
     assert [take.name for take in open_recordings(tmp_path / "a.zip")] == names
 
 
+def test_a_file_without_a_name_is_none(tmp_path: Path) -> None:
+    text = write_bvh(tmp_path / "a").read_bytes()
+    with ZipFile(tmp_path / "a.zip", "w") as made:
+        for name in ("n", "..", "walk.bvh"):
+            made.writestr(name, text)
+    path = tmp_path / "a.zip"
+    data = bytearray(path.read_bytes())
+    at = data.index(b"PK\1\2")
+    data[at + 28] = 0  # length of the first name in the directory
+    del data[at + 46]
+    end = data.index(b"PK\5\6")
+    data[end + 12] -= 1  # that of the directory
+    path.write_bytes(data)
+    assert [take.name for take in open_recordings(path)] == ["a"]
+
+
 def test_what_expands_without_end_is_refused(tmp_path: Path) -> None:
     ends = tmp_path / "a.tar.gz"
     with tarfile.open(ends, "w:gz") as tar:
