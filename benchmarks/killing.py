@@ -224,9 +224,9 @@ def main() -> None:
         took = time.perf_counter() - start
     print(
         f"killed {times} times in {took:.0f} s and {n / RATE_HZ:.0f} s of stream, "
-        f"{where['in a checkpoint']} times in a checkpoint and as many more as "
-        f"{where['in a migration']} in a migration, {where['ended']} times after its end: each "
-        "time the state was, bit for bit, that of a run without end, and nothing written was lost"
+        f"{where['in a checkpoint']} of them in a checkpoint, {where['ended']} after its end, and "
+        f"{where['in a migration']} times more in a migration: each time the state was, bit for "
+        "bit, that of a run without end, and nothing written was lost"
     )
 
 
