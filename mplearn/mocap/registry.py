@@ -15,6 +15,11 @@ ENTRY_POINTS = "mplearn.readers"
 """Group of the entry points by which an installed package brings readers (classes) of its own."""
 
 _XML = re.compile(r"<\?XML[^>]*>\s*")
+_HDF5 = (
+    "its CSV instead: of DeepLabCut by analyze_videos_converth5_to_csv, of SLEAP by File > Export "
+    "Analysis CSV or sleap-convert --format analysis.csv"
+)
+_EXPORTED = {".h5": _HDF5, ".hdf5": _HDF5, ".slp": _HDF5}  # what programs also write as a table
 _TELLING = 256  # bytes, in which formats that name themselves do
 
 _registered: list[Reader] = []  # the latest is asked first
@@ -105,9 +110,8 @@ def reader_for(path: Path) -> Reader:
         fitting = [r for r in readers() if suffix(path) in r.suffixes]
         if not fitting:
             read_bytes(path)  # tells what was saved instead of a recording
-            raise bad_file(
-                path, f"unknown suffix {suffix(path)!r}", f"one of {', '.join(suffixes())}"
-            )
+            expected = _EXPORTED.get(suffix(path), f"one of {', '.join(suffixes())}")
+            raise bad_file(path, f"unknown suffix {suffix(path)!r}", expected)
         found = fitting[-1]
     return found
 

@@ -400,6 +400,11 @@ def test_unknown_suffix_and_unreadable_folders(tmp_path: Path) -> None:
     other.write_bytes(b"film")
     with pytest.raises(RecordingError, match=r"unknown suffix '\.mp4'.*\.c3d"):
         open_recording(other)
+    for name in ("mouse.h5", "mouse.slp"):  # which DeepLabCut and SLEAP write as tables, too
+        (tmp_path / name).write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(64))
+        with pytest.raises(RecordingError, match=r"unknown suffix.*its CSV instead: of DeepLabCut"):
+            open_recording(tmp_path / name)
+        (tmp_path / name).unlink()
     with pytest.raises(RecordingError, match=rf"{re.escape(str(tmp_path))}.*nothing readable"):
         open_recordings(tmp_path)
     with pytest.raises(RecordingError, match="no such file or folder"):
