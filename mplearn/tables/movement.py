@@ -13,26 +13,29 @@ import numpy as np
 from ..errors import RecordingError
 from ..extras import require
 from ..library import RecognisedSegment, SegmentTable
-from ..recording import Recording, marker_channels
+from ..recording import Recording
 
 NONE = -1
 """Stands for no primitive."""
 
+_AXES = (("x", "y", "z"), ("ahead", "left", "up"), ("ahead", "left"))  # the latter from the body
+
 
 def as_dataset(recording: Recording, table: SegmentTable) -> Any:
-    """Return a recording of markers with its segments as an `xarray.Dataset`.
+    """Return a recording of markers, or of key points, with its segments as an `xarray.Dataset`.
 
     Args:
-        recording: Markers, M of them.
+        recording: Markers, M of them, or key points of an animal as they are read.
         table: Its segments.
 
     Returns:
-        ``position``, shape (time T, space 3, keypoints M, individuals 1) [m]; ``primitive``, shape
+        ``position``, shape (time T, space 3, keypoints M, individuals 1) [m], or of key points,
+        whose space is ahead, left (and up) of the body [body lengths]; ``primitive``, shape
         (time T, individuals 1), -1 where there is none; and the columns of the table along the
         dimension ``segments``. ``time`` is in seconds.
 
     Raises:
-        RecordingError: The recording holds no markers.
+        RecordingError: The recording holds neither.
         MissingDependencyError: xarray is not installed (extra ``tables``).
 
     Example:
@@ -46,8 +49,9 @@ def as_dataset(recording: Recording, table: SegmentTable) -> Any:
         ((100, 3, 1, 1), 3)
     """
     xarray = require("xarray", "tables")
-    names = recording.marker_names
-    position = recording.markers.transpose(0, 2, 1)[..., None]
+    names, axes = _points_of(recording)
+    points = recording.frames.reshape(len(recording), len(names), len(axes))
+    position = points.transpose(0, 2, 1)[..., None]
     primitive = np.full((len(recording), 1), NONE, dtype=np.int32)
     for row in table:
         at = slice(round(row.start_s * recording.rate_hz), round(row.end_s * recording.rate_hz))
@@ -63,7 +67,7 @@ def as_dataset(recording: Recording, table: SegmentTable) -> Any:
         },
         coords={
             "time": np.arange(len(recording)) / recording.rate_hz,
-            "space": ["x", "y", "z"],
+            "space": list(axes),
             "keypoints": list(names),
             "individuals": [recording.person or "individual_0"],
         },
@@ -76,6 +80,19 @@ def as_dataset(recording: Recording, table: SegmentTable) -> Any:
             "person": recording.person,
         },
     )
+
+
+def _points_of(recording: Recording) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names of points, and the axes in which each is given."""
+    for axes in _AXES[1:]:
+        names = tuple(channel.rpartition(".")[0] for channel in recording.channels[:: len(axes)])
+        if recording.channels == _channels(names, axes):
+            return names, axes
+    return recording.marker_names, _AXES[0]
+
+
+def _channels(names: tuple[str, ...], axes: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(f"{name}.{axis}" for name in names for axis in axes)
 
 
 def _column(table: SegmentTable, name: str) -> Any:
@@ -103,7 +120,9 @@ def from_dataset(dataset: Any) -> tuple[Recording, SegmentTable]:
         (('C7.x', 'C7.y', 'C7.z'), 'down')
     """
     try:
-        names = tuple(str(name) for name in dataset["keypoints"].values)
+        names, axes = (
+            tuple(str(name) for name in dataset[along].values) for along in ("keypoints", "space")
+        )
         position = dataset["position"].transpose("time", "keypoints", "space", "individuals")
         frames = np.asarray(position.values[..., 0], dtype=np.float64).reshape(len(position), -1)
         columns = {
@@ -114,7 +133,7 @@ def from_dataset(dataset: Any) -> tuple[Recording, SegmentTable]:
         recording = Recording(
             frames,
             float(attrs["fps"]),
-            marker_channels(names),
+            _channels(names, axes),
             str(attrs["name"]),
             str(attrs["person"]),
         )

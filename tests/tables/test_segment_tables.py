@@ -154,6 +154,24 @@ def test_a_data_set_in_the_dimensions_of_movement(tmp_path: Path) -> None:
         from_dataset(xarray.Dataset())
 
 
+@pytest.mark.parametrize("axes", [("ahead", "left"), ("ahead", "left", "up")])
+def test_key_points_seen_from_the_body_are_a_data_set(axes: tuple[str, ...]) -> None:
+    pytest.importorskip("xarray")
+    channels = tuple(f"{name}.{axis}" for name in ("snout", "tail.base") for axis in axes)
+    frames = np.arange(10.0 * len(channels)).reshape(10, -1)
+    recording = Recording(frames, 5.0, channels, "mouse", "ind1")
+    data = as_dataset(recording, ROWS[:2])
+    assert data["space"].values.tolist() == list(axes)
+    tail = data["position"].sel(keypoints="tail.base", space="left", individuals="ind1")
+    np.testing.assert_array_equal(tail.values, frames[:, len(axes) + 1])
+    same, table = from_dataset(data)
+    assert (same.channels, table) == (channels, ROWS[:2])
+    np.testing.assert_array_equal(same.frames, frames)
+    angles = Recording(frames[:, :2], 5.0, ("hip", "knee"))
+    with pytest.raises(RecordingError, match="no markers"):
+        as_dataset(angles, ROWS[:2])
+
+
 @pytest.mark.parametrize("ending", FORMATS)
 def test_what_is_no_table_is_refused(ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"no{ending}"
