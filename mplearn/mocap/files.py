@@ -13,7 +13,7 @@ from pathlib import Path
 from zipfile import ZipExtFile
 
 from ..errors import RecordingError
-from .archives import (
+from .packed.archives import (
     ArchiveError,
     Member,
     archive_of,
@@ -21,7 +21,7 @@ from .archives import (
     open_member,
     recordings_in,
 )
-from .packing import DAMAGE, STARTS, most_unpacked, packing, unpacked_name, unpacking
+from .packed.packing import DAMAGE, STARTS, most_unpacked, packing, unpacked_name, unpacking
 
 _LONGEST_SHOWN = 300  # characters of what a file holds
 _LARGE_BYTES = 8_000_000

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import RecordingError
-from .archives import is_archive, named_archive
 from .files import bad_file, is_file, is_folder, may_be_read, read_bytes, suffix, within
+from .packed.archives import is_archive, named_archive
 from .registry import suffixes
 
 

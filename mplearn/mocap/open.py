@@ -15,7 +15,6 @@ import numpy as np
 
 from ..errors import RecordingError, RecordingWarning
 from ..recording import ReadReport, Recording
-from .archives import archive_kind, archive_of, is_archive
 from .files import bad_file, contents, is_file, is_folder, may_be_read, size_of, stem, within
 from .folders import folders_in, no_files
 from .keypoints.tables import DeepLabCutReader, KeyPointsReader, SLEAPReader
@@ -28,6 +27,7 @@ from .markers.qualisys import QualisysReader
 from .markers.trc import TRCReader
 from .markers.ui_prmd import UIPRMDReader
 from .markers.xdf import XDFReader
+from .packed.archives import archive_kind, archive_of, is_archive
 from .people import each_person
 from .placing.handedness import right_handed
 from .placing.level import leveled, told_of_lean, turn_to_level

@@ -18,7 +18,7 @@ from numpy.lib import format as npy
 from ...errors import RecordingError
 from ...recording import FloatArray
 from ..files import bad_file, head, read_bytes
-from ..packing import most_unpacked
+from ..packed.packing import most_unpacked
 
 RATES = (
     *("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps", "mocap_fps"),

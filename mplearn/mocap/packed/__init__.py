@@ -1,0 +1,1 @@
+"""Files that are packed: one by one, or many in an archive."""
