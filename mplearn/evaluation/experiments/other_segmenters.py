@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import pairwise
@@ -35,11 +36,14 @@ def ours(frames: FloatArray, rate_hz: float) -> list[int]:
     return [segment.end for segment in segmenter.segment(frames)][:-1]
 
 
-def pelt(frames: FloatArray, _: float) -> list[int]:
-    """Return the change points of ruptures' PELT, at the penalty of the BIC."""
+def pelt(frames: FloatArray, _: float, noise: float = 1.0) -> list[int]:
+    """Return the change points of ruptures' PELT, at the penalty of the BIC.
+
+    That takes the variance of noise, which nobody knows, as a share of that of all.
+    """
     library: Any = import_module("ruptures")
     n, width = frames.shape
-    penalty = float(np.log(n) * width * frames.var(axis=0).mean())
+    penalty = float(np.log(n) * width * noise * frames.var(axis=0).mean())
     found = library.Pelt().fit(frames).predict(pen=penalty)
     return [int(each) for each in found][:-1]
 
@@ -77,6 +81,8 @@ PEERS: Mapping[str, tuple[str, bool, Callable[[FloatArray, float], list[int]]]] 
     {
         "ours": ("", True, ours),
         "ruptures, PELT": ("ruptures", False, pelt),
+        "PELT, noise 10 %": ("ruptures", False, partial(pelt, noise=0.1)),
+        "PELT, noise 1 %": ("ruptures", False, partial(pelt, noise=1e-2)),
         "claspy, ClaSP": ("claspy", False, clasp),
         "stumpy, FLOSS": ("stumpy", True, floss),
     }
@@ -140,7 +146,8 @@ def segmenter_table(takes: Iterable[Recording]) -> Table:
     note = (
         f"The same takes, seen as a learner sees them, at {RATE_HZ:g} Hz. Ours is the default "
         "segmenter; the others are run with their own defaults, PELT, which has none, at the "
-        "penalty of the Bayesian information criterion; FLOSS on-line on the channel that moves "
+        "penalty of the Bayesian information criterion, with all variance, or a share of it, for "
+        "that of noise; FLOSS on-line on the channel that moves "
         "most, with windows of a second and a memory of ten. Cycles as in the table of rhythm: "
         "wanted are 2 cuts a cycle. ClaSP and FLOSS look for changes of the activity rather than "
         "for turns: changes found are those between labelled activities with a cut within half a "

@@ -163,7 +163,8 @@ def boundary_peers_table(takes: Iterable[Recording]) -> Table:
         f"{len(seen)} takes of repeated movements, seen as a learner sees them, at "
         f"{BOUNDARY_HZ:g} Hz. True boundaries are the joins of repetitions and the reversal inside "
         f"each; matched one to one within {TOLERANCE_S} s. Ours is the default segmenter, on-line; "
-        "PELT has the penalty of the Bayesian information criterion, the others their defaults. "
+        "PELT has the penalty of the Bayesian information criterion, with all variance, or a share "
+        "of it, for that of noise; the others have their defaults. "
         "ClaSP and FLOSS look for changes of the activity, not for turns of a motion."
     )
     return Table(
