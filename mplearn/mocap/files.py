@@ -123,12 +123,11 @@ def contents(path: Path) -> list[Path]:
     Raises:
         RecordingError: It cannot be looked into.
     """
-    archive, _ = archive_of(path / "file") or (path, "")
+    archive, file = archive_of(path / "file") or (path, "file")
     try:
-        inside = [archive / name for name in recordings_in(archive)]
+        return [archive / name for name in recordings_in(archive, file.rpartition("/")[0])]
     except ArchiveError as error:
         raise bad_file(archive, error.found, error.expected) from error
-    return [file for file in inside if path in file.parents]
 
 
 def size_of(path: Path) -> int:
@@ -183,7 +182,9 @@ def read_bytes(path: Path) -> bytes:
         limit = most_unpacked(size) if how or inside else size
         with _opened(path) as file:
             data = _start(file, limit + 1)
-    except (*DAMAGE, ArchiveError) as error:
+    except ArchiveError as error:
+        raise bad_file(path, error.found, error.expected) from error
+    except DAMAGE as error:
         if (how or inside) and not (isinstance(error, OSError) and error.errno):
             whole = f"{how} file" if how else "archive"
             raise bad_file(path, f"damaged ({error})", f"a whole {whole}") from error

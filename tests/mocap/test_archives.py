@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bz2
+import gc
 import gzip
 import io
 import lzma
@@ -20,6 +21,7 @@ from mocap_writers import bvh_values, write, write_amc, write_asf, write_bvh, wr
 
 from mplearn.errors import RecordingError
 from mplearn.mocap import find_takes, open_recording, open_recordings, open_takes, take_names
+from mplearn.mocap.packed.archives import members, open_member, recordings_in
 
 pytestmark = pytest.mark.filterwarnings("ignore::mplearn.errors.RecordingWarning")
 
@@ -108,6 +110,63 @@ def encrypted(path: Path) -> None:
     for start, flags in ((b"PK\3\4", 6), (b"PK\1\2", 8)):
         data[data.index(start) + flags] |= 1
     path.write_bytes(data)
+
+
+def changed(path: Path, at: dict[bytes, int], to: int) -> None:
+    """Set a byte of the last file's headers in an archive, in front of it and in the directory."""
+    data = bytearray(path.read_bytes())
+    for start, place in at.items():
+        data[data.rindex(start) + place] = to
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("at", "to", "says"),
+    [
+        ({b"PK\3\4": 6, b"PK\1\2": 8}, 1, "encrypted; expected an archive .* no password"),
+        ({b"PK\3\4": 8, b"PK\1\2": 10}, 9, "method 9.*; expected one packed by deflate"),
+    ],
+)
+def test_one_file_that_cannot_be_unpacked_costs_no_other(
+    tmp_path: Path, at: dict[bytes, int], to: int, says: str
+) -> None:
+    text = write_bvh(tmp_path / "a").read_bytes()
+    path = tmp_path / "a.zip"
+    with ZipFile(path, "w") as made:
+        for name in ("walks/one.bvh", "walks/two.bvh"):
+            made.writestr(name, text)
+    changed(path, at, to)
+    takes = open_takes(path)
+    assert [take.name for take in takes.recordings] == ["walks/one"]
+    assert list(takes.unreadable) == ["walks/two"]
+    with pytest.raises(RecordingError, match=f"walks/two.bvh: .*{says}"):
+        open_recording(path / "walks" / "two.bvh")
+
+
+def test_an_archive_stays_open_while_a_file_in_it_is_read(tmp_path: Path) -> None:
+    """Of many archives only the latest are kept open, and threads may read others."""
+    text = bytes(100_000)
+    for k in range(9):
+        with tarfile.open(tmp_path / f"{k}.tar", "w") as tar:
+            info = tarfile.TarInfo("a.bvh")
+            info.size = len(text)
+            tar.addfile(info, io.BytesIO(text))
+    with open_member(tmp_path / "0.tar", "a.bvh") as file:
+        start = file.read(1)
+        for k in range(1, 9):
+            assert list(members(tmp_path / f"{k}.tar")) == ["a.bvh"]
+        gc.collect()
+        assert start + file.read() == text
+
+
+def test_what_lies_in_a_folder_of_an_archive(tmp_path: Path) -> None:
+    names = ["a.bvh", "a.d/x.bvh", "a/b/c.bvh", "a/b.bvh", "a/b-c.bvh", "a0/d.bvh", "\u00e9/e.bvh"]
+    with ZipFile(tmp_path / "a.zip", "w") as made:
+        for name in names:
+            made.writestr(name, "HIERARCHY")
+    for folder in ("", "a", "a.d", "a/b", "a0", "\u00e9", "b"):
+        wanted = [n for n in sorted(names) if not folder or n.startswith(f"{folder}/")]
+        assert list(recordings_in(tmp_path / "a.zip", folder)) == wanted
 
 
 def nested(path: Path) -> None:

@@ -9,9 +9,10 @@ import tarfile
 import tempfile
 import zipfile
 from abc import ABC, abstractmethod
+from bisect import bisect_left
 from collections.abc import Iterable
 from contextlib import suppress
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path, PurePosixPath
 from threading import Lock
 from typing import IO, NamedTuple, cast
@@ -34,6 +35,7 @@ _WORKBOOK = "[Content_Types].xml"  # of programs for offices
 _LIBRARY = "header.json"  # of a library of primitives
 _ENCRYPTED = 1  # flag of a file in a zip archive
 _PIECE = 65_536
+_AFTER_SLASH = chr(ord("/") + 1)
 
 
 class ArchiveError(Exception):
@@ -107,24 +109,36 @@ def members(archive: Path) -> dict[str, Member]:
     Raises:
         ArchiveError: It cannot be looked into, or is something else that is packed so.
     """
-    files = _opened(archive).files
-    if _WORKBOOK in files:
-        raise ArchiveError("it is a file of an office program", "a table saved as CSV")
-    if next(iter(files), "") == _LIBRARY:
-        raise ArchiveError(
-            "it is a library of primitives, not a recording", "a recording of motion"
-        )
-    return files
+    return _of_recordings(archive).files
 
 
-def recordings_in(archive: Path) -> tuple[str, ...]:
-    """Return the files in an archive that may be recordings, in order; see `members`."""
-    return tuple(sorted(name for name in members(archive) if not _BESIDE.search(name)))
+def recordings_in(archive: Path, folder: str = "") -> tuple[str, ...]:
+    """Return the files in an archive, or a folder in it, that may be recordings, in order.
+
+    See `members`.
+    """
+    names = _of_recordings(archive).recordings
+    if not folder:
+        return names
+    first = bisect_left(names, f"{folder}/")  # those in a folder follow each other
+    return names[first : bisect_left(names, f"{folder}{_AFTER_SLASH}")]
 
 
 def open_member(archive: Path, name: str) -> io.BufferedIOBase:
     """Open a file in an archive; see `members`."""
     return _opened(archive).open(name)
+
+
+def _of_recordings(path: Path) -> _Archive:
+    """Open an archive that is not something else that is packed so; see `members`."""
+    archive = _opened(path)
+    if _WORKBOOK in archive.files:
+        raise ArchiveError("it is a file of an office program", "a table saved as CSV")
+    if next(iter(archive.files), "") == _LIBRARY:
+        raise ArchiveError(
+            "it is a library of primitives, not a recording", "a recording of motion"
+        )
+    return archive
 
 
 def _opened(path: Path) -> _Archive:
@@ -155,6 +169,11 @@ class _Archive(ABC):
 
     files: dict[str, Member]
 
+    @cached_property
+    def recordings(self) -> tuple[str, ...]:
+        """What in it may be a recording, in order."""
+        return tuple(sorted(name for name in self.files if not _BESIDE.search(name)))
+
     @abstractmethod
     def open(self, name: str) -> io.BufferedIOBase:
         """Open a file in it."""
@@ -164,8 +183,8 @@ class _Zip(_Archive):
     def __init__(self, path: Path) -> None:
         self._file = zipfile.ZipFile(path)
         files = [i for i in self._file.infolist() if i.filename and not i.is_dir()]
-        if any(info.flag_bits & _ENCRYPTED for info in files):
-            raise ArchiveError("it is encrypted", "an archive that needs no password")
+        if files and all(info.flag_bits & _ENCRYPTED for info in files):
+            raise _encrypted()
         _refuse_endless(path.stat().st_size, (info.file_size for info in files))
         self._named = {name: info for info in files if (name := _plain(info.filename))}
         self.files = {
@@ -173,7 +192,18 @@ class _Zip(_Archive):
         }
 
     def open(self, name: str) -> io.BufferedIOBase:
-        return cast("io.BufferedIOBase", self._file.open(self._named[name]))
+        info = self._named[name]
+        if info.flag_bits & _ENCRYPTED:
+            raise _encrypted()
+        try:
+            return cast("io.BufferedIOBase", self._file.open(info))
+        except NotImplementedError as error:
+            how = f"it is packed in a way (method {info.compress_type}) that is not read"
+            raise ArchiveError(how, "one packed by deflate, as most are") from error
+
+
+def _encrypted() -> ArchiveError:
+    return ArchiveError("it is encrypted", "an archive that needs no password")
 
 
 class _Tar(_Archive):
@@ -200,23 +230,27 @@ class _Tar(_Archive):
             self._file.close()
 
     def open(self, name: str) -> io.BufferedIOBase:
-        return io.BufferedReader(_Part(self._file, self._lock, *self._at[name]))
+        return io.BufferedReader(_Part(self, *self._at[name]))
+
+    def read(self, at: int, n_bytes: int) -> bytes:
+        """Return bytes from a place on, whoever else reads others."""
+        with self._lock:
+            self._file.seek(at)
+            return self._file.read(n_bytes)
 
 
 class _Part(io.RawIOBase):
-    """A part of a file, of which others read other parts."""
+    """A file in an archive, which stays open as long as this is read."""
 
-    def __init__(self, file: IO[bytes], lock: Lock, begin: int, size: int) -> None:
-        self._file, self._lock, self._at, self._end = file, lock, begin, begin + size
+    def __init__(self, archive: _Tar, begin: int, size: int) -> None:
+        self._archive, self._at, self._end = archive, begin, begin + size
 
     def readable(self) -> bool:
         return True
 
     def readinto(self, into: object) -> int:
         view = memoryview(cast("bytearray", into))
-        with self._lock:
-            self._file.seek(self._at)
-            found = self._file.read(min(len(view), self._end - self._at))
+        found = self._archive.read(self._at, min(len(view), self._end - self._at))
         view[: len(found)] = found
         self._at += len(found)
         return len(found)
