@@ -122,7 +122,7 @@ def _one_watch(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _whole(content: Any) -> Any:
-    """Bring the content of a file up to date that left out what had its usual value."""
+    """Bring the content of a file up to date that lacks what has a usual value."""
     return to_plain(from_plain(LearnerState, content), whole=True)
 
 
@@ -130,7 +130,7 @@ FILES = FileFormat(
     "mplearn-learner",
     "learner",
     StateError,
-    3,
-    migrations={1: _one_watch, 2: _whole},
+    4,
+    migrations={1: _one_watch, 2: _whole, 3: _whole},
     compression=1,
 )

@@ -4,10 +4,12 @@
 drawn with seed 7, and says what became of them.
 """
 
+import hashlib
 import sys
 import warnings
 from collections import Counter
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
@@ -19,8 +21,10 @@ from mplearn.errors import LibraryError, StateError
 from mplearn.evaluation.observing import observe
 from mplearn.evaluation.streams import join_people
 from mplearn.learner import LearnerState
+from mplearn.learner.learner_state import FILES as LEARNER_FILES
 from mplearn.library.content import FILES, LibraryState
 from mplearn.state import checkpoint, from_bytes, from_plain, resumed, to_bytes, to_plain
+from mplearn.state.checkpoint import _WHOLE
 from mplearn.store import Freeze, LifelongLearner, Merge, Note, Rename
 from mplearn.store.life_state import LifeState
 
@@ -135,6 +139,57 @@ def test_a_damaged_checkpoint_is_refused_or_the_same(life):
     counts, silent = tried_checkpoint(life, 300)
     assert not silent
     assert counts["refused"] > 260
+
+
+def before_trees_knew_what_follows(content):
+    """Take out of a whole learner what is in none that was kept before (`TreeState.follows`)."""
+    for each in content["tree"]["trees"]:
+        assert len(each["tree"].pop("follows"))
+
+
+def test_what_was_whole_before_there_was_a_field_opens_without_it(life, learner, tmp_path):
+    state = life.state()
+    part = checkpoint(state).new.__getitem__
+    mark, content = document_of(state)
+    before_trees_knew_what_follows(content["learner"])
+    with pytest.raises(StateError, match=r"tree\.follows: is missing"):
+        resumed(LifeState, to_bytes({mark: content}), part)
+    opened = LifelongLearner.from_state(resumed(LifeState, to_bytes({"$whole": content}), part))
+    again = document_of(opened.state())[1]
+    assert not any(len(each["tree"].pop("follows")) for each in again["learner"]["tree"]["trees"])
+    assert same(again, content)
+    plain = to_plain(learner.state(), whole=True)
+    before_trees_knew_what_follows(plain)
+    replace(LEARNER_FILES, schema=3, migrations={}).write(tmp_path / "old.mplearner", plain)
+    loaded = MotionLearner.load(tmp_path / "old.mplearner")
+    assert loaded.snapshot().version == learner.snapshot().version
+
+
+def fields_below(kind, found):
+    """Note the fields of a type, and of all that it can hold."""
+    names = [each.name for each in fields(kind)] if is_dataclass(kind) else []
+    names += getattr(kind, "_fields", ())
+    if names and kind.__name__ not in found:
+        found[kind.__name__] = sorted(names)
+        for each in get_type_hints(kind).values():
+            fields_below(each, found)
+    for each in get_args(kind):
+        fields_below(each, found)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("kind", "version", "known"),
+    [
+        (LearnerState, LEARNER_FILES.schema, (4, "cfafff162dce")),
+        (LibraryState, FILES.schema, (2, "64161995acd0")),
+        (LifeState, _WHOLE, ("$whole 2", "c7005ab4df1b")),
+    ],
+)
+def test_who_adds_a_field_says_how_what_was_kept_without_it_opens(kind, version, known):
+    """With other fields the version is another, and a migration, or a mark of then, knows this."""
+    text = repr(sorted(fields_below(kind, {}).items()))
+    assert (version, hashlib.sha256(text.encode()).hexdigest()[:12]) == known
 
 
 def test_an_older_document_may_leave_out_what_is_newer(life):
