@@ -68,8 +68,9 @@ class BufferedSource(Source):
         self._source, self._arrived = source, arrived
         self._most_bytes = most_bytes
         self._spill = _Spill(None if folder is None else path_of("folder", folder))
-        self._waiting: deque[Block | Change | _Spilled] = deque()
+        self._waiting: deque[tuple[float, Block | Change | _Spilled]] = deque()  # since when
         self._newest: list[Block] = []  # will be one block
+        self._newest_s = 0.0  # since when the first of them waits
         self._n_waiting, self._rate_hz = 0, 0.0
         self._in_memory, self._n_bytes = 0, 0
         self._held = False  # nothing is read, for it could not be written to a file
@@ -112,7 +113,7 @@ class BufferedSource(Source):
                 return []
             if not self._waiting:
                 self._seal()
-            item = self._waiting.popleft()
+            since_s, item = self._waiting.popleft()
             size = item.n_bytes if isinstance(item, _Spilled) else _size(item)
             self._n_bytes -= size
             self._in_memory -= 0 if isinstance(item, _Spilled) else size
@@ -122,7 +123,7 @@ class BufferedSource(Source):
                 return [item]
             self._n_waiting -= len(item)
             block = self._spill.read(item) if isinstance(item, _Spilled) else item
-        return [*self._behind(block), block]
+        return [*self._behind(since_s, float(block.times_s[0])), block]
 
     def close(self) -> None:
         """End the stream; what still waits is counted as not read."""
@@ -134,7 +135,7 @@ class BufferedSource(Source):
         self._source.close()
         with self._changed:
             self._seal()
-            unread = sum(_n_came(each) for each in self._waiting)
+            unread = sum(_n_came(each) for _, each in self._waiting)
             self.tally.unread += unread
             self.tally.frames -= unread
             self._n_waiting = self._n_bytes = self._in_memory = 0
@@ -156,6 +157,7 @@ class BufferedSource(Source):
         self._arrived()
 
     def _put(self, item: Block | Change) -> None:
+        now_s = time.monotonic()
         with self._changed:
             self._changed.wait_for(
                 lambda: self._closed or not (self._held or self._n_bytes >= self._most_bytes)
@@ -163,10 +165,11 @@ class BufferedSource(Source):
             is_first = not (self._waiting or self._newest)
             if isinstance(item, Change):
                 self._seal()
-                self._waiting.append(item)
+                self._waiting.append((now_s, item))
             else:
                 if not self._continues(item):
                     self._seal()
+                self._newest_s = self._newest_s if self._newest else now_s
                 self._newest.append(item)
                 self._n_waiting += len(item)
                 self._rate_hz = item.rate_hz
@@ -189,18 +192,19 @@ class BufferedSource(Source):
         """Make one of the newest blocks, and put it where there is room."""
         if not self._newest:
             return
-        block, self._newest = _joined(self._newest), []
+        block, since_s, self._newest = _joined(self._newest), self._newest_s, []
         if self._in_memory <= _IN_MEMORY_BYTES:
-            self._waiting.append(block)
+            self._waiting.append((since_s, block))
             return
         try:
-            self._waiting.append(self._spill.write(block))
+            self._waiting.append((since_s, self._spill.write(block)))
             self._in_memory -= _size(block)
         except OSError as error:
-            self._waiting.append(block)
+            self._waiting.append((since_s, block))
             if not self._held:
                 text = f"what waits cannot be written to a file ({error.strerror}): not all is read"
-                self._waiting.append(Change("behind", text, float(block.times_s[-1])))
+                told = Change("behind", text, float(block.times_s[-1]))
+                self._waiting.append((time.monotonic(), told))
             self._held = True
 
     # ---- for who reads
@@ -208,12 +212,12 @@ class BufferedSource(Source):
     def _is_ready(self) -> bool:
         return bool(self._waiting or self._newest) or self._finished or self._closed
 
-    def _behind(self, block: Block) -> list[Change]:
-        """Say that whoever reads is slower than the frames come, or no longer."""
-        came = block.arrived_s[~block.gaps]
-        if not len(came):
-            return []
-        late_s, time_s = time.monotonic() - float(came[0]), float(block.times_s[0])
+    def _behind(self, since_s: float, time_s: float) -> list[Change]:
+        """Say that whoever reads is slower than the frames come, or no longer.
+
+        What the source itself held back, until it knew the body, is nobody's fault.
+        """
+        late_s = time.monotonic() - since_s
         was, self._late_s = self._late_s, max(self._late_s, late_s)
         if was < BEHIND_S <= late_s:
             text = f"frames are read {late_s:.1f} s after they came; what comes meanwhile waits"

@@ -74,6 +74,8 @@ def test_nothing_that_waits_is_lost_or_changed(
 ) -> None:
     monkeypatch.setattr(buffered, "_IN_MEMORY_BYTES", in_memory)
     monkeypatch.setattr(buffered, "_FILE_BYTES", 3_000)
+    monkeypatch.setattr(buffered, "BEHIND_S", 1e-9)
+    monkeypatch.setattr(buffered, "CAUGHT_UP_S", 0.0)
     for seed in range(4):
         items = items_of(seed)
         late = taken_late(Given(items))
@@ -87,7 +89,7 @@ def test_nothing_that_waits_is_lost_or_changed(
             if isinstance(block, Block):
                 assert block.lost == np.count_nonzero(block.gaps)
         assert texts_of(late, "names") == texts_of(items, "names")
-        assert len(texts_of(late, "behind")) == 1  # five seconds, from the first frame on
+        assert len(texts_of(late, "behind")) == 1  # from the first frame on
 
 
 def test_what_waits_is_joined_up_to_half_a_second() -> None:
@@ -165,6 +167,18 @@ def test_an_error_of_the_source_comes_after_all_before_it() -> None:
                 seen += waiting.read()
         assert waiting.ended
     np.testing.assert_array_equal(frames_of(seen), frames)
+
+
+def test_only_who_reads_late_is_told_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(buffered, "BEHIND_S", 0.3)
+    given = blocks(STREAM, np.zeros((200, 3)))
+    held_back = [replace(b, arrived_s=np.full(len(b), time.monotonic() - 4.0)) for b in given]
+    with BufferedSource(Given(held_back)) as waiting:
+        assert not texts_of(list(waiting), "behind")  # the source knew the body only then
+    with BufferedSource(Given(held_back)) as waiting:
+        time.sleep(0.4)
+        (said,) = texts_of(list(waiting), "behind")
+    assert "after they came; what comes meanwhile waits" in said
 
 
 def test_who_comes_in_time_gets_blocks_as_they_come() -> None:
