@@ -376,7 +376,7 @@ class PrimitiveTree:
             return Placement(-1, ROOT, False, np.inf, np.inf, refused=reason)
         structure, bank, number = self._structure, self._memory.bank, self.n_seen
         self.n_seen += 1
-        self._memory.remember(number, frames.copy(), follows=goes_on)
+        self._memory.remember(number, frames.copy(), follows=goes_on and number > 0)
         matches, distances = structure.index.look(bank[number], bank)
         distance, ratio = (matches[0].distance, matches[0].ratio) if matches else (np.inf, np.inf)
         node = self.node(matches[0].node if ratio <= 1 else ROOT)

@@ -155,3 +155,13 @@ def test_a_part_that_came_before_its_motion_was_known_becomes_no_primitive(
         assert len(tree.leaves) == 6
         tree.insert(motion(kind, rng)[:24])  # what it goes on with is still to come
         assert len(tree.leaves) == 6 + born
+
+
+def test_a_first_segment_follows_none_whatever_is_said_of_it() -> None:
+    rng = np.random.default_rng(0)
+    tree, again = (PrimitiveTree(TreeConfig(), D, RATE_HZ) for _ in range(2))
+    for kind in (0, 1, 0, 1):
+        tree.insert(motion(kind, rng), goes_on=True)
+    assert tree.state().follows.tolist() == [1, 2, 3]
+    again.load_state(tree.state())
+    assert again.state() == tree.state()
