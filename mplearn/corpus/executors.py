@@ -53,16 +53,20 @@ def room(executor: Executor) -> int:
         (2, True)
     """
     jobs = getattr(executor, "jobs", sys.maxsize)
-    if not isinstance(jobs, Integral) or jobs < 1:
+    if not _is_count(jobs):
         raise InvalidValueError(f"an executor's jobs must be a number from 1 on, not {jobs!r:.40}")
     return int(jobs)
+
+
+def _is_count(jobs: object) -> bool:
+    return isinstance(jobs, Integral) and int(jobs) >= 1
 
 
 def workers(executor: Executor | None, jobs: int) -> Executor:
     """Return who does the work: an executor of one's own, so many processes, or this one for 0.
 
     Raises:
-        InvalidValueError: The executor cannot be given work, or ``jobs`` is negative.
+        InvalidValueError: The executor cannot be given work, or ``jobs`` is no number from 0 on.
 
     Example:
         >>> type(workers(None, 0)).__name__, type(workers(Here(), 4)).__name__
@@ -121,9 +125,9 @@ class Processes:
     """
 
     def __init__(self, jobs: int) -> None:
-        if jobs < 1:
-            raise InvalidValueError(f"jobs must be at least 1, not {jobs}")
-        self.jobs = jobs
+        if not _is_count(jobs):
+            raise InvalidValueError(f"jobs must be a whole number, at least 1, not {jobs!r:.40}")
+        self.jobs = int(jobs)
         self._pool: ProcessPoolExecutor | None = None
 
     def submit(self, work: Callable[..., T], *args: Any) -> Future[T]:

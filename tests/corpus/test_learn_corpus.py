@@ -462,6 +462,8 @@ def test_an_executor_that_takes_nothing_is_refused_before_anything_is_read(
         learn_corpus(tmp_path / "nothing", tmp_path / "s", executor=executor)
     with pytest.raises(InvalidValueError, match="jobs must be a number from 1 on"):
         recognise_corpus(tmp_path / "no.mplearn", tmp_path / "nothing", executor=executor)
+    with pytest.raises(InvalidValueError, match="jobs must be a whole number, at least 1"):
+        learn_corpus(tmp_path / "nothing", tmp_path / "s", jobs=jobs or -2)
     with pytest.raises(InvalidValueError, match=r"has submit\(work, \*args\)"):
         learn_corpus(tmp_path / "nothing", tmp_path / "s", executor=4)  # type: ignore[arg-type]
     assert not (tmp_path / "s").exists()
