@@ -269,6 +269,14 @@ class Skills:
                 self._following[key] = self._check.judge_plan(plan)
             return self._following[key]
 
+    def judge_plan(self, plan: Plan) -> tuple[Problem, ...]:
+        """Return why a plan from anywhere cannot be performed; empty where it can.
+
+        What came before may have moved the feet: where one primitive may follow another, the plan
+        of it from there may be none.
+        """
+        return self._check.judge_plan(plan)
+
     def foreknown_s(self, before: int, after: int) -> float | None:
         """Return what `transition_s` does where that was found out before; None elsewhere."""
         return self._foreknown.transitions_s.get((before, after))
