@@ -75,7 +75,7 @@ class BufferedSource(Source):
         self._in_memory, self._n_bytes = 0, 0
         self._held = False  # nothing is read, for it could not be written to a file
         self._finished = self._closed = False
-        self._error: Exception | None = None
+        self._error: BaseException | None = None
         self._late_s = 0.0  # how late frames were taken, at most, since that was said
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._run, name=f"read {source.name}", daemon=True)
@@ -102,7 +102,7 @@ class BufferedSource(Source):
         """Return what came first of what waits: a block or a change; see `Source.read`.
 
         Raises:
-            Exception: What the source raised when it was read; all before was returned.
+            BaseException: What the source raised when it was read; all before was returned.
         """
         with self._changed:
             self._changed.wait_for(self._is_ready, timeout_s)
@@ -149,7 +149,7 @@ class BufferedSource(Source):
             while not (self._closed or self._source.ended):
                 for item in self._source.read(WAIT_S):
                     self._put(item)
-        except Exception as error:  # of a source of somebody else
+        except BaseException as error:  # of a source of somebody else, whatever it raises
             self._error = error
         with self._changed:
             self._finished = True

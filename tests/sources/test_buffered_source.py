@@ -148,13 +148,14 @@ def test_no_more_waits_than_is_allowed_and_what_is_left_is_counted() -> None:
         BufferedSource(Given([]), most_bytes=0)
 
 
-def test_an_error_of_the_source_comes_after_all_before_it() -> None:
+@pytest.mark.parametrize("kind", [RuntimeError, SystemExit, KeyboardInterrupt])
+def test_an_error_of_the_source_comes_after_all_before_it(kind: type[BaseException]) -> None:
     class Broken(Given):
         ended = False
 
         def read(self, timeout_s: float | None = None) -> list[Block | Change]:
             if not self._items:
-                raise RuntimeError("the cable is out")
+                raise kind("the cable is out")
             return super().read()
 
     frames = np.arange(30.0).reshape(10, 3)
@@ -162,7 +163,7 @@ def test_an_error_of_the_source_comes_after_all_before_it() -> None:
     with BufferedSource(Broken(blocks(STREAM, frames)), arrived=came.set) as waiting:
         assert came.wait(5.0)
         seen: list[Block | Change] = []
-        with pytest.raises(RuntimeError, match="the cable is out"):
+        with pytest.raises(kind, match="the cable is out"):
             while not waiting.ended:
                 seen += waiting.read()
         assert waiting.ended

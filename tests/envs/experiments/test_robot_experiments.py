@@ -15,6 +15,7 @@ from mplearn_envs.experiments import (
 from mplearn_envs.experiments.model_error import disturb
 from mplearn_envs.experiments.survival import pushed
 from mplearn_envs.robot import humanoid
+from mplearn_envs.skills.skills import Skills
 
 
 def test_random_walks_count_what_happened():
@@ -37,6 +38,24 @@ def test_any_primitive_may_follow_any_other():
     feasible, learned = (int(number) for number in row[1].split(" of "))
     assert feasible == learned - 1 and row[6].startswith("jump: flight")
     assert 0 < int(row[2]) < feasible
+
+
+def test_what_the_verdict_on_its_plan_refuses_is_not_performed(monkeypatch):
+    asked = []
+
+    def every_other(self, plan):
+        asked.append(plan)
+        return ("no",) if len(asked) % 2 else ()
+
+    performed = []
+    perform = Simulation.perform
+    monkeypatch.setattr(Skills, "judge_plan", every_other)
+    monkeypatch.setattr(
+        Simulation, "perform", lambda self, plan: (performed.append(plan), perform(self, plan))[1]
+    )
+    (row,) = learned_table([("me", standing_library())], seeds=(1,), n_primitives=4).rows
+    assert row[3] == "1 x 4" and row[7] == "4 of 8"
+    assert list(map(id, performed)) == list(map(id, asked[1::2]))
 
 
 def test_the_model_error_is_what_was_asked_for():
