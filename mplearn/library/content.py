@@ -71,8 +71,8 @@ class LibraryState(State):
 
 
 def _whole(content: Any) -> Any:
-    """Bring the content of a file up to date that left out what had its usual value."""
+    """Bring the content of a file up to date that lacks what has a usual value."""
     return to_plain(from_plain(LibraryState, content), whole=True)
 
 
-FILES = FileFormat("mplearn-library", "library", LibraryError, 2, migrations={1: _whole})
+FILES = FileFormat("mplearn-library", "library", LibraryError, 3, migrations={1: _whole, 2: _whole})

@@ -27,6 +27,7 @@ from .markers.qualisys import QualisysReader
 from .markers.trc import TRCReader
 from .markers.ui_prmd import UIPRMDReader
 from .markers.xdf import XDFReader
+from .options import option
 from .packed.archives import archive_kind, archive_of, is_archive
 from .people import each_person
 from .placing.handedness import right_handed
@@ -340,9 +341,12 @@ def _named(path: Path, folder: Path) -> str:
 
 def _nothing_readable(path: Path) -> RecordingError:
     what = "an archive" if is_archive(path) else "a folder"
-    return NothingReadableError(
-        f"{path}: {what} with nothing readable; expected files named {', '.join(suffixes())}"
-    )
+    found = f"{path}: {what} with nothing readable; expected files named {', '.join(suffixes())}"
+    inside = [each.name for each in path.iterdir() if each.is_dir()] if path.is_dir() else []
+    if inside:
+        few = ", ".join(sorted(inside)[:3]) + (", ..." if len(inside) > 3 else "")
+        found = f"{found} (what is in folders of it, {few}, is found by {option('jobs')})"
+    return NothingReadableError(found)
 
 
 def _takes(path: Path) -> dict[str, TakeFiles]:

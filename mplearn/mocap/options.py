@@ -16,11 +16,13 @@ _COMMAND_LINE = {
     "level": "--level",
     "names": "--map",
     "person": "--person",
+    "jobs": "--jobs",
 }
 _PYTHON = {  # what is no hint, or takes one value alone
     "names": "names={...}",
     "person": "Recording.person",
     "level": "Hints(level=True)",
+    "jobs": "find_takes",
 }
 _on_command_line: ContextVar[bool] = ContextVar("_on_command_line", default=False)
 

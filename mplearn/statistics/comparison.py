@@ -12,10 +12,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import comb
+from typing import Any
 
 import numpy as np
 
 from ..errors import InvalidValueError
+from ..extras import require
 from ..recording import BoolArray, FloatArray, IntArray
 from .measures import Measure
 from .transitions import Transitions
@@ -49,6 +51,8 @@ class Comparison:
         >>> found = compare(Measure("duration [s]", people, ("bow",), seconds), groups)
         >>> found.groups, found.sizes, round(found.p_value, 3)
         (('old', 'young'), (3, 3), 0.1)
+        >>> found.to_pandas().loc["bow", ["mean of old", "mean of young"]].round(2).tolist()
+        [2.0, 1.0]
     """
 
     what: str
@@ -61,6 +65,28 @@ class Comparison:
     adjusted: FloatArray
     p_value: float
     permutations: int
+
+    def to_pandas(self) -> Any:
+        """Return a `pandas.DataFrame`: a row for each of the names.
+
+        Its columns are the mean of each group, ``statistic``, ``p_value`` and ``adjusted``.
+
+        Raises:
+            MissingDependencyError: pandas is not installed (extra ``tables``).
+        """
+        pandas = require("pandas", "tables")
+        means = {
+            f"mean of {group}": mean for group, mean in zip(self.groups, self.means, strict=True)
+        }
+        found = {"statistic": self.statistics, "p_value": self.p_values, "adjusted": self.adjusted}
+        return pandas.DataFrame(means | found, self.names).rename_axis(self.what)
+
+    def __repr__(self) -> str:
+        """Return what was compared, and what came of it."""
+        groups = " with ".join(
+            f"{n} {name!r}" for name, n in zip(self.groups, self.sizes, strict=True)
+        )
+        return f"Comparison({self.what}, {groups}: p = {self.p_value:.3g})"
 
 
 def compare(

@@ -8,11 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from ..errors import InvalidValueError
+from ..extras import require
 from ..library import RecognisedSegment, SegmentTable
 from ..recording import FloatArray
 
@@ -38,6 +39,8 @@ class Measure:
         >>> tempo = Measure("duration [s]", ("anna", "ben"), ("bow",), np.array([[1.2], [0.9]]))
         >>> float(tempo.of("ben", "bow"))
         0.9
+        >>> tempo.to_pandas()["bow"].to_dict()
+        {'anna': 1.2, 'ben': 0.9}
     """
 
     name: str
@@ -48,6 +51,21 @@ class Measure:
     def of(self, unit: str, primitive: str) -> float:
         """Return the value of a unit and a primitive."""
         return float(self.values[self.units.index(unit), self.primitives.index(primitive)])
+
+    def to_pandas(self) -> Any:
+        """Return a `pandas.DataFrame`: a row a unit, a column a primitive.
+
+        Raises:
+            MissingDependencyError: pandas is not installed (extra ``tables``).
+        """
+        pandas = require("pandas", "tables")
+        frame = pandas.DataFrame(self.values, self.units, self.primitives)
+        return frame.rename_axis(index="unit", columns=self.name)
+
+    def __repr__(self) -> str:
+        """Return what was measured, and of how many."""
+        n_units, n_primitives = len(self.units), len(self.primitives)
+        return f"Measure({self.name!r}, {n_units} units, {n_primitives} primitives)"
 
 
 def grouped(table: SegmentTable, unit: Unit) -> dict[str, dict[str, list[RecognisedSegment]]]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
+from ..extras import require
 from ..library import SegmentTable
 from ..recording import FloatArray
 from .measures import Unit, grouped, names_of
@@ -28,6 +30,8 @@ class Transitions:
         >>> counts = np.array([[[0.0, 3.0], [1.0, 1.0]]])
         >>> Transitions(("anna",), ("bow", "rise"), counts).matrix("anna").tolist()
         [[0.0, 1.0], [0.5, 0.5]]
+        >>> Transitions(("anna",), ("bow", "rise"), counts).to_pandas().iloc[0].to_dict()
+        {'unit': 'anna', 'before': 'bow', 'after': 'rise', 'times': 3}
     """
 
     units: tuple[str, ...]
@@ -43,6 +47,32 @@ class Transitions:
         counts = self.counts[chosen].sum(axis=0)
         with np.errstate(invalid="ignore"):
             return np.asarray(counts / counts.sum(axis=1, keepdims=True))
+
+    def to_pandas(self) -> Any:
+        """Return a `pandas.DataFrame`: a row for each unit and pair that it was seen to take.
+
+        Its columns are ``unit``, ``before``, ``after`` and ``times``.
+
+        Raises:
+            MissingDependencyError: pandas is not installed (extra ``tables``).
+        """
+        pandas = require("pandas", "tables")
+        unit, before, after = np.nonzero(self.counts)
+        names = np.array(self.primitives, dtype=object)
+        return pandas.DataFrame(
+            {
+                "unit": np.array(self.units, dtype=object)[unit],
+                "before": names[before],
+                "after": names[after],
+                "times": self.counts[unit, before, after].astype(np.int64),
+            }
+        )
+
+    def __repr__(self) -> str:
+        """Return how many transitions of how many were counted."""
+        n_units, n_primitives = len(self.units), len(self.primitives)
+        counted = f"{self.counts.sum():.0f} of {n_primitives} primitives"
+        return f"Transitions({counted}, {n_units} units)"
 
 
 def transitions(

@@ -14,8 +14,11 @@ from mplearn.errors import LibraryError
 from mplearn.library.content import FILES
 from mplearn.state import to_plain
 from mplearn.state.packing import packed
+from mplearn.tree import TreeConfig
 
 OLD = Path(__file__).parent / "data" / "people-schema-1.mplearn"  # five motions by three people
+YOUNG = OLD.with_name("young-schema-2.mplearn")  # four motions, before `sequence_extent` was there
+GROWN = OLD.with_name("grown-schema-2.mplearn")  # and after
 EMBEDDED = Path(mplearn_envs.__file__).parent / "data" / "default.mplearn"
 
 
@@ -47,6 +50,26 @@ def test_what_is_read_is_written_again(path, tmp_path):
     assert header["schema"] == 1
     lean = packed(to_plain(replace(again.state(), version="")))  # as the older code wrote it
     assert lean == (header["content"], blob)
+
+
+@pytest.mark.parametrize(
+    ("path", "version", "lacking"),
+    [(YOUNG, "2037f0f68582a0de", {"sequence_extent"}), (GROWN, "b0e36102be391f0e", set())],
+)
+def test_a_whole_file_opens_whether_or_not_it_has_the_newest_setting(path, version, lacking):
+    with zipfile.ZipFile(path) as archive:
+        header = json.loads(archive.read("header.json"))
+    assert header["schema"] == 2
+    known = header["content"]["recogniser"]["config"].keys()
+    newest = to_plain(TreeConfig(), whole=True).keys()
+    assert newest - known == lacking
+    library = PrimitiveLibrary.load(path)
+    assert library.version == version
+    assert library.names == ("P1", "P2", "P3", "P4")
+    for id in library.ids:
+        assert library.recognise(library[id].exemplars[0]).primitive == id
+    distances = [library.recognise(library[id].exemplars[0]).distance for id in library.ids]
+    assert distances == pytest.approx([1.490466e-3, 1.4685e-5, 2.81136e-4, 4.2871e-5], abs=1e-8)
 
 
 def test_an_older_file_that_is_damaged_is_refused_with_the_place(tmp_path):

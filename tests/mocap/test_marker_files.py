@@ -407,6 +407,9 @@ def test_unknown_suffix_and_unreadable_folders(tmp_path: Path) -> None:
         (tmp_path / name).unlink()
     with pytest.raises(RecordingError, match=rf"{re.escape(str(tmp_path))}.*nothing readable"):
         open_recordings(tmp_path)
+    (tmp_path / "anna").mkdir()
+    with pytest.raises(RecordingError, match=r"in folders of it, anna, is found by find_takes"):
+        open_recordings(tmp_path)
     with pytest.raises(RecordingError, match="no such file or folder"):
         open_recordings(tmp_path / "none")
     with pytest.raises(RecordingError, match="first row holds numbers"):

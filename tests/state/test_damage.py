@@ -182,7 +182,7 @@ def fields_below(kind, found):
     ("kind", "version", "known"),
     [
         (LearnerState, LEARNER_FILES.schema, (4, "cfafff162dce")),
-        (LibraryState, FILES.schema, (2, "64161995acd0")),
+        (LibraryState, FILES.schema, (3, "64161995acd0")),
         (LifeState, _WHOLE, ("$whole 2", "c7005ab4df1b")),
     ],
 )

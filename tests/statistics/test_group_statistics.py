@@ -55,6 +55,32 @@ def test_primitives_come_in_the_order_in_which_people_count() -> None:
     assert list(durations(table).primitives) == list(transitions(table).primitives) == order
 
 
+def test_measures_and_comparisons_go_into_tables_as_they_are() -> None:
+    took = durations(TABLE)
+    frame = took.to_pandas()
+    assert frame.index.tolist() == ["anna", "ben"]
+    assert frame.columns.tolist() == ["bow", "lift"]
+    assert np.array_equal(frame.to_numpy(), took.values, equal_nan=True)
+    assert frame.loc["anna", "bow"] == pytest.approx((1.0 + 2.0 + 1.5) / 3)
+    steps = transitions(TABLE)
+    rows = steps.to_pandas().to_dict("records")
+    assert rows == [
+        {"unit": "anna", "before": "bow", "after": "lift", "times": 1},
+        {"unit": "anna", "before": "lift", "after": "bow", "times": 1},
+    ]
+    people = tuple("abcdef")
+    groups = {who: "old" if who < "d" else "young" for who in people}
+    values = np.arange(12.0).reshape(6, 2) ** 2
+    found = compare(Measure("tempo", people, ("bow", "lift"), values), groups)
+    frame = found.to_pandas()
+    assert frame.index.tolist() == ["bow", "lift"]
+    assert frame["mean of young"].tolist() == values[3:].mean(axis=0).tolist()
+    assert frame["adjusted"].tolist() == found.adjusted.tolist()
+    assert repr(found) == f"Comparison(tempo, 3 'old' with 3 'young': p = {found.p_value:.3g})"
+    assert repr(took) == "Measure('duration [s]', 2 units, 2 primitives)"
+    assert repr(steps) == "Transitions(2 of 2 primitives, 2 units)"
+
+
 def test_measures_are_what_one_counts() -> None:
     assert repetitions(TABLE).of("anna", "bow") == 3
     assert repetitions(TABLE).of("ben", "bow") == 0

@@ -178,8 +178,9 @@ def recognise_in_chunks(args: argparse.Namespace) -> None:
         table.add_row(printable(name) if name else "unknown", str(times))
     console.print(table)
     known = len(found.table) - names[""]
+    takes = "1 take" if found.n_takes == 1 else f"{found.n_takes} takes"
     console.print(
-        f"{known} of {len(found.table)} segments recognised in {found.n_takes} takes; written to "
+        f"{known} of {len(found.table)} segments recognised in {takes}; written to "
         f"{printable(str(args.to))}",
         markup=False,
     )
