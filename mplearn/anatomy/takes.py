@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -18,14 +19,16 @@ from .labels import names_skin, without_shared_ends
 from .markers import recognise_markers
 from .skeletons import recognise_skeleton
 
+LEAST_SHARE = 2 / 3  # of the points of takes that are joined, that each of them must have
+
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
     """Takes as points of one body.
 
     Attributes:
-        recordings: Those in which a body was recognised. Takes of one marker set have the same
-            channels: a point that one lacks is NaN there.
+        recordings: Those in which a body was recognised. Takes of one marker set that have most
+            points in common have the same channels: a point that one lacks is NaN there.
         maps: How each was recognised, by its name.
         marker_sets: Marker set of each, by its name: ``"landmarks"`` for skeletons.
         refused: Why not, by name, for the others.
@@ -110,7 +113,7 @@ def as_bodies(
     names: Mapping[str, str] | None = None,
     strict: bool = False,
 ) -> Bodies:
-    """Recognise the body in each take, and join takes of one marker set by the places of the body.
+    """Recognise the body in each take, and join takes of like markers by the places of the body.
 
     A learner takes all of them, those of other sets too (`MotionLearner.begin_stream`).
 
@@ -147,15 +150,38 @@ def as_bodies(
         first = next(iter(refused.values()))
         raise BodyError(f"no body in any of {len(recordings)} takes; the first: {first}")
     sets = {each.name: find_marker_set(each.marker_names).name for each in found}
-    points: dict[str, dict[str, None]] = {}
-    for each in found:
-        points.setdefault(sets[each.name], {}).update(dict.fromkeys(each.marker_names))
+    points = _joined([(sets[each.name], each.marker_names) for each in found])
     return Bodies(
-        tuple(_with_points(each, tuple(points[sets[each.name]])) for each in found),
+        tuple(_with_points(each, names) for each, names in zip(found, points, strict=True)),
         MappingProxyType(maps),
         MappingProxyType(sets),
         MappingProxyType(refused),
     )
+
+
+def _joined(takes: Sequence[tuple[str, tuple[str, ...]]]) -> list[tuple[str, ...]]:
+    """Return for each take, of a marker set and with points of it, with which points it is learned.
+
+    Takes join, those of the most usual points first, as long as each of them has most of all points
+    that they have together: whoever lacks more of them could not be measured.
+    """
+    groups: dict[str, list[list[tuple[str, ...]]]] = {}  # of points of takes, by marker set
+    for (of_set, names), _ in Counter(takes).most_common():
+        of_same = groups.setdefault(of_set, [])
+        for group in of_same:
+            least = min(len(each) for each in (*group, names))
+            if least >= LEAST_SHARE * len(set(names).union(*group)):
+                group.append(names)
+                break
+        else:
+            of_same.append([names])
+    joined = {
+        (of_set, names): tuple(dict.fromkeys(name for each in group for name in each))
+        for of_set, of_same in groups.items()
+        for group in of_same
+        for names in group
+    }
+    return [joined[take] for take in takes]
 
 
 def _with_points(recording: Recording, names: tuple[str, ...]) -> Recording:

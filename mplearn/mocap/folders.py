@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import RecordingError
-from .files import bad_file, is_file, is_folder, may_be_read, read_bytes, suffix, within
+from .files import bad_file, is_file, is_folder, may_be_read, read_bytes, stem, suffix, within
 from .packed.archives import is_archive, named_archive
-from .registry import suffixes
+from .registry import instead_of, suffixes
 
 
 class FoundFolders(NamedTuple):
@@ -62,11 +62,37 @@ def folders_in(path: Path) -> FoundFolders:
     return FoundFolders(tuple(sorted(found)), closed)
 
 
+def folders_of_recordings(path: Path) -> tuple[str, ...]:
+    """Return the names of the folders in a folder in which, how deep ever, recordings may lie.
+
+    Example:
+        >>> Path("takes", "anna").mkdir(parents=True, exist_ok=True)
+        >>> Path("takes", "notes").mkdir(exist_ok=True)
+        >>> _ = Path("takes", "anna", "walk.bvh").write_text("HIERARCHY")
+        >>> folders_of_recordings(Path("takes"))
+        ('anna',)
+    """
+    folders: list[str]
+    _, folders, _ = next(os.walk(path), ("", [], []))  # nothing where it may not be read
+    own = (name for name in sorted(folders) if not name.startswith("."))
+    return tuple(name for name in own if _holds_recordings(path / name))
+
+
+def _holds_recordings(folder: Path) -> bool:
+    known = suffixes()
+    return any(
+        suffix(Path(name)) in known or named_archive(Path(name))
+        for _, _, names in os.walk(folder)
+        for name in names
+    )
+
+
 def no_files(folder: Path) -> dict[str, RecordingError]:
     """Return why not, by name, for what a folder holds that is called as recordings are.
 
-    Links that lead nowhere, pipes and devices, files that may not be read, and what is called as
-    archives are and is none, or lies in one.
+    Links that lead nowhere, pipes and devices, files that may not be read, what is called as
+    archives are and is none, or lies in one, and what programs also write as a table that is not
+    beside it.
 
     Example:
         >>> import os
@@ -77,9 +103,15 @@ def no_files(folder: Path) -> dict[str, RecordingError]:
         linked/walk.csv: a link to elsewhere.csv, where nothing is; expected a recording
     """
     found = {}
-    for each in within(folder):
+    inside = within(folder)
+    tables = [each.name for each in inside if suffix(each) in suffixes()]
+    for each in inside:
         if named_archive(each) and not is_archive(each) and may_be_read(each):
             found[each.name] = _no_archive(each)
+            continue
+        if (instead := instead_of(each)) and is_file(each):
+            if not any(name.startswith(stem(each)) for name in tables):
+                found[each.name] = bad_file(each, "not read", instead)
             continue
         if suffix(each) in suffixes() or named_archive(each):
             problem = _problem(each)

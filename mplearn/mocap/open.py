@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import RecordingError, RecordingWarning
 from ..recording import ReadReport, Recording
 from .files import bad_file, contents, is_file, is_folder, may_be_read, size_of, stem, within
-from .folders import folders_in, no_files
+from .folders import folders_in, folders_of_recordings, no_files
 from .keypoints.tables import DeepLabCutReader, KeyPointsReader, SLEAPReader
 from .labels import labels_beside
 from .markers.c3d import C3DReader
@@ -172,6 +172,8 @@ class Takes:
     Attributes:
         recordings: Those that can be read, in order of their names.
         unreadable: Why not, by name, for the others.
+        folders: Names of the folders in it that may hold recordings, too, and are not looked into;
+            `find_takes` does.
 
     Example:
         >>> from pathlib import Path
@@ -186,6 +188,7 @@ class Takes:
 
     recordings: tuple[Recording, ...]
     unreadable: Mapping[str, RecordingError]
+    folders: tuple[str, ...] = ()
 
 
 def open_takes(
@@ -221,7 +224,7 @@ def open_takes(
     if not found:
         first = next(iter(unreadable.values()))
         raise RecordingError(f"none of {len(takes)} takes can be read; the first: {first}")
-    return Takes(tuple(found), MappingProxyType(unreadable))
+    return Takes(tuple(found), MappingProxyType(unreadable), folders_of_recordings(Path(path)))
 
 
 def take_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
@@ -342,7 +345,8 @@ def _named(path: Path, folder: Path) -> str:
 def _nothing_readable(path: Path) -> RecordingError:
     what = "an archive" if is_archive(path) else "a folder"
     found = f"{path}: {what} with nothing readable; expected files named {', '.join(suffixes())}"
-    inside = [each.name for each in path.iterdir() if each.is_dir()] if path.is_dir() else []
+    inside: list[str]
+    _, inside, _ = next(os.walk(path), ("", [], []))  # nothing where it may not be read
     if inside:
         few = ", ".join(sorted(inside)[:3]) + (", ..." if len(inside) > 3 else "")
         found = f"{found} (what is in folders of it, {few}, is found by {option('jobs')})"

@@ -78,6 +78,11 @@ def suffixes() -> tuple[str, ...]:
     return tuple(sorted({ending for reader in readers() for ending in reader.suffixes}))
 
 
+def instead_of(path: Path) -> str:
+    """Return what is read instead of a file that programs also write as a table; else nothing."""
+    return "" if suffix(path) in suffixes() else _EXPORTED.get(suffix(path), "")
+
+
 def reader_of(path: Path, *, any_suffix: bool = False) -> Reader | None:
     """Return the reader that takes a file; None for none.
 
@@ -110,7 +115,7 @@ def reader_for(path: Path) -> Reader:
         fitting = [r for r in readers() if suffix(path) in r.suffixes]
         if not fitting:
             read_bytes(path)  # tells what was saved instead of a recording
-            expected = _EXPORTED.get(suffix(path), f"one of {', '.join(suffixes())}")
+            expected = instead_of(path) or f"one of {', '.join(suffixes())}"
             raise bad_file(path, f"unknown suffix {suffix(path)!r}", expected)
         found = fitting[-1]
     return found

@@ -4,6 +4,7 @@ import asyncio
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -14,11 +15,15 @@ import numpy as np
 import pytest
 
 from mplearn.demonstrator import demonstrate
-from mplearn.learner import LearnerConfig, MotionLearner
+from mplearn.learner import Event, LearnerConfig, MotionLearner
 from mplearn.library import PrimitiveLibrary
-from mplearn.recording import Recording
+from mplearn.recording import FloatArray, Recording
 from mplearn.sources import Block, Change, Source, Stream, Tally, source_kinds
+from mplearn.sources.buffered import BEHIND_S
+from mplearn.sources.inbox import CAPACITY
 from mplearn.sources.played import PlayedSource
+from mplearn.sources.sending import open_sender
+from mplearn.store import LifelongLearner
 from mplearn_agents.cli import main
 from mplearn_agents.learning.live import SOURCES, learn_live
 from mplearn_agents.terminal.event_lines import change_text
@@ -250,3 +255,43 @@ def test_the_first_wish_to_stop_is_noted_and_the_second_interrupts() -> None:
             os.kill(os.getpid(), signal.SIGINT)
             time.sleep(1.0)
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_learner_slower_than_the_stream_misses_nothing(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    n = 2 * CAPACITY  # a receiver by itself drops what comes once so many wait as half of these
+    sent = threading.Event()
+    learn_many = LifelongLearner.learn_many
+
+    def slowly(life: LifelongLearner, frames: FloatArray) -> list[Event]:
+        assert sent.wait(60.0)
+        if life.n_frames == 0:
+            time.sleep(1.5 * BEHIND_S)  # until it is said that frames wait
+        return learn_many(life, frames)
+
+    monkeypatch.setattr(LifelongLearner, "learn_many", slowly)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"udp:127.0.0.1:{free.getsockname()[1]}"
+
+    def send() -> None:
+        times = np.arange(n) / 100.0
+        frames = np.sin(times[:, None] * [1.0, 2.0])
+        stream = Stream(("a", "b"), 100.0)
+        with open_sender(address) as sender:
+            for i in range(0, n, 32):
+                part = slice(i, i + 32)
+                sender.send(Block(stream, frames[part], times[part], times[part]))
+                time.sleep(0.002)  # so that the network, too, loses nothing
+        sent.set()
+
+    sending = threading.Timer(0.5, send)
+    sending.start()
+    command = ["learn", "--live", address, "--json", "--seconds", f"{0.75 * n / 100.0}"]
+    assert main([*command, "--out", str(tmp_path / "x.mplearn")]) == 0
+    sending.join()
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert lines[-1]["overrun"] == 0
+    assert lines[-1]["frames"] + lines[-1]["lost"] + lines[-1]["unread"] > CAPACITY
+    assert [line for line in lines if line.get("kind") == "behind"]

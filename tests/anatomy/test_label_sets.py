@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from label_sets import KEY_POINTS, SETS, labelled
 
-from mplearn.anatomy import recognise
+from mplearn.anatomy import as_bodies, recognise
+from mplearn.anatomy.takes import LEAST_SHARE
 from mplearn.errors import BodyError
+from mplearn.learner import FramesLost, LearnerConfig, MotionLearner, SegmentClosed
 from mplearn.mocap import command_line
 from mplearn.recording import marker_channels
 
@@ -152,3 +154,28 @@ def test_nobody_is_mirrored(truth, name):
     mirrored = recording.markers * (1, -1, 1)
     with pytest.raises(BodyError, match="mirrored"):
         recognise(replace(recording, frames=mirrored.reshape(len(mirrored), -1)))
+
+
+def test_takes_of_quite_different_systems_are_learned_together(truth):
+    names = ("cast", "human36m", "sports", "openpose", "opencap", "motive", "bones")
+    takes = [
+        labelled(name, truth.body, truth.postures[:150], truth.markers.rate_hz) for name in names
+    ]
+    without = takes[0].marker_names[1:]  # of which one marker was lost throughout
+    lacking = replace(
+        takes[0],
+        frames=takes[0].frames[:, 3:],
+        channels=marker_channels(without),
+        name="cast without",
+    )
+    bodies = as_bodies([*takes, lacking])
+    assert not bodies.refused
+    channels = {each.name: each.channels for each in bodies.recordings}
+    assert channels["cast"] == channels["cast without"]
+    learner = MotionLearner(LearnerConfig(bodies.recordings[0].channels, truth.markers.rate_hz))
+    for recording in bodies.recordings:
+        seen = [not np.isnan(each).all() for each in recording.markers.swapaxes(0, 1)]
+        assert np.mean(seen) >= LEAST_SHARE
+        events = [event for part in learner.learn_recording(recording, 50) for event in part]
+        assert not [event for event in events if isinstance(event, FramesLost)]
+        assert [event for event in events if isinstance(event, SegmentClosed)]

@@ -262,6 +262,27 @@ def test_names_in_an_archive_lead_nowhere_else(tmp_path: Path) -> None:
     assert [take.name for take in open_recordings(tmp_path / "a.zip")] == names
 
 
+@pytest.mark.parametrize("kind", ["zip", "tar"])
+def test_files_whose_names_are_one_path_are_all_read(tmp_path: Path, kind: str) -> None:
+    path, called = tmp_path / f"a.{kind}", ("a/b.bvh", "a\\b.bvh", "./a/b.bvh", "a/b (2).bvh")
+    files = [
+        (name, write_bvh(tmp_path / "one", bvh_values(10 + k)).read_bytes())
+        for k, name in enumerate(called)
+    ]
+    if kind == "zip":
+        with ZipFile(path, "w") as made:
+            for name, text in files:
+                made.writestr(name, text)
+    else:
+        with tarfile.open(path, "w") as tar:
+            for name, text in files:
+                info = tarfile.TarInfo(name)
+                info.size = len(text)
+                tar.addfile(info, io.BytesIO(text))
+    read = {take.name: len(take) for take in open_recordings(path)}
+    assert read == {"a/b": 10, "a/b (2)": 11, "a/b (3)": 12, "a/b (2) (2)": 13}
+
+
 def test_a_file_without_a_name_is_none(tmp_path: Path) -> None:
     text = write_bvh(tmp_path / "a").read_bytes()
     with ZipFile(tmp_path / "a.zip", "w") as made:

@@ -6,9 +6,11 @@ import os
 from pathlib import Path
 
 import pytest
+from mocap_writers import write_bvh
 
 from mplearn.errors import RecordingError
 from mplearn.mocap import find_takes, open_recordings, open_takes
+from mplearn_agents.cli import main
 
 TABLE = "time_s,elbow\n" + "".join(f"{k / 50:.2f},{k % 7}\n" for k in range(100))
 
@@ -123,3 +125,18 @@ def test_where_nothing_else_is_it_is_said_what_cannot_be_read(tmp_path: Path):
     for read in (find_takes, open_takes):
         with pytest.raises(RecordingError, match=r"gone.csv: a link to nowhere.csv"):
             read(tmp_path)
+
+
+def test_folders_that_are_not_looked_into_are_told(tmp_path: Path, capsys):
+    for folder in ("anna/day 1", "ben", "notes", ".hidden"):
+        (tmp_path / folder).mkdir(parents=True)
+    for name in ("walk", "anna/day 1/bow", "ben/bow", ".hidden/bow"):
+        write_bvh(tmp_path / f"{name}.bvh")
+    (tmp_path / "notes" / "to do.md").write_text("nothing")
+    assert open_takes(tmp_path).folders == ("anna", "ben")
+    assert main(["inspect", str(tmp_path), "--no-picture"]) == 0
+    assert "not looked into, folders in it: anna, ben" in capsys.readouterr().out
+    with pytest.raises(
+        RecordingError, match=r"nothing readable.*in folders of it, day 1, is found by"
+    ):
+        open_takes(tmp_path / "anna")

@@ -18,7 +18,7 @@ from mocap_writers import (
 )
 
 from mplearn.errors import InvalidValueError, RecordingError, RecordingWarning
-from mplearn.mocap import Hints, open_recording, open_recordings, take_names
+from mplearn.mocap import Hints, open_recording, open_recordings, open_takes, take_names
 from mplearn.mocap.markers.ui_prmd import PLUG_IN_GAIT_MARKERS
 from mplearn.mocap.placing.space import to_z_up
 from mplearn.recording import LabelledSegment
@@ -404,6 +404,13 @@ def test_unknown_suffix_and_unreadable_folders(tmp_path: Path) -> None:
         (tmp_path / name).write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(64))
         with pytest.raises(RecordingError, match=r"unknown suffix.*its CSV instead: of DeepLabCut"):
             open_recording(tmp_path / name)
+        with pytest.raises(RecordingError, match=rf"{name}.*its CSV instead: of DeepLabCut"):
+            open_recordings(tmp_path)
+        table = write_csv(tmp_path / "walk.csv")
+        assert list(open_takes(tmp_path).unreadable) == [name]
+        table.rename(tmp_path / "mouse.analysis.csv")  # as it is exported
+        assert not open_takes(tmp_path).unreadable
+        (tmp_path / "mouse.analysis.csv").unlink()
         (tmp_path / name).unlink()
     with pytest.raises(RecordingError, match=rf"{re.escape(str(tmp_path))}.*nothing readable"):
         open_recordings(tmp_path)

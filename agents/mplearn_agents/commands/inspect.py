@@ -9,7 +9,12 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mplearn_agents.recordings.reading import add_reading_arguments, hints_of, say_left_out
+from mplearn_agents.recordings.reading import (
+    add_reading_arguments,
+    hints_of,
+    say_folders,
+    say_left_out,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -53,6 +58,7 @@ def run(args: argparse.Namespace) -> None:
     else:
         for name, error in takes.unreadable.items():
             say_left_out(console, name, error)
+        say_folders(console, takes)
         for each in found:
             _say(console, each)
     _draw(args, found, console)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -113,7 +114,7 @@ def learn_from_source(
             record=args.record,
             **({} if args.speed is None else {"speed": args.speed}),
         )
-        with source:
+        with source, _waiting(source, args) as read:
             console.print(
                 f"learning from {printable(source.name)}; Ctrl-C ends it, and writes "
                 f"{printable(wanted)}",
@@ -124,7 +125,7 @@ def learn_from_source(
             try:
                 with short_pauses():
                     learn_live(
-                        source,
+                        read,
                         stop,
                         _say(),
                         config=configure,
@@ -220,6 +221,15 @@ def learn_live(
     if log.life is not None:
         tell(log.life.end_stream(), time.monotonic(), log.life.learner.config.rate_hz)
     return log
+
+
+def _waiting(source: Source, args: argparse.Namespace) -> Source:
+    """Return the source to read; what comes as fast as it is learned waits by itself."""
+    from mplearn_agents.learning.waiting import waiting_for_learner
+
+    if args.speed == math.inf:
+        return source
+    return waiting_for_learner(source, speed=args.speed, beside=args.store or args.out)
 
 
 def _rate_of(life: LifelongLearner) -> float:

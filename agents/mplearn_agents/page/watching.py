@@ -28,6 +28,7 @@ from mplearn.sources import Block, BufferedSource, Change, Observe, open_source
 from mplearn.store import LifelongLearner, Store
 from mplearn.tree import PrimitiveTree, TreeConfig
 from mplearn_agents.learning.pauses import short_pauses
+from mplearn_agents.learning.waiting import waiting_for_learner
 
 from .figures import CLIP_HZ, motions_of, shapes_of
 from .happenings import happening, tell
@@ -38,7 +39,6 @@ from .shelf import Sender
 from .teaching import do, history
 from .watched_figure import WatchedFigure
 
-_READ_AHEAD, _HELD_UP = 2**17, 2**22  # bytes of a source that waits: to be read, or to send
 STATUS_S, KNOWLEDGE_S = 0.25, 0.2
 _WARM_UP = ("BAR", "BAL") * 4
 _KINDS = 14  # more primitives than are compared one by one
@@ -132,7 +132,12 @@ class Watcher:
             with source:
                 self._outbox.post(self._status(), key="status")
                 _warm_up()
-                with BufferedSource(source, **self._keeping(), arrived=self._arrived) as buffered:
+                with waiting_for_learner(
+                    source,
+                    speed=settings.speed,
+                    beside=Path(settings.store) if settings.store else None,
+                    arrived=self._arrived,
+                ) as buffered:
                     self._watch(buffered)
         finally:
             if self._lifelong is not None:
@@ -146,15 +151,6 @@ class Watcher:
             while self._step():
                 pass
         self._outbox.post(self._status(), key="status")
-
-    def _keeping(self) -> dict[str, Any]:
-        """Return where frames that wait are kept, and how much of them."""
-        if self._settings.speed == math.inf:
-            return {"most_bytes": _READ_AHEAD}
-        if self._settings.source.startswith("ndjson:"):
-            return {"most_bytes": _HELD_UP}
-        store = self._settings.store
-        return {"folder": Path(store).absolute().parent} if store else {}
 
     # ---- threads that read
 

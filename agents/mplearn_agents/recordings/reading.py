@@ -110,15 +110,23 @@ def hints_of(args: argparse.Namespace, *, joint_axes: bool = False) -> Hints:
 
 
 def say_takes(console: Console, takes: Takes) -> None:
-    """Say how the takes of a folder were read, and which could not be."""
+    """Say how the takes of a folder were read, and which could not be, or were not looked for."""
     for name, error in takes.unreadable.items():
         say_left_out(console, name, error)
+    say_folders(console, takes)
     said: dict[str, list[str]] = {}
     for recording in takes.recordings:
         for line in remarks(recording):
             said.setdefault(line, []).append(recording.name)
     for line, names in said.items():  # what is said of many takes is said once
         console.print(printable(f"{_listed(names)}: {line}"), markup=False, highlight=False)
+
+
+def say_folders(console: Console, takes: Takes) -> None:
+    """Say which folders in a folder are not looked into."""
+    if takes.folders:
+        text = f"not looked into, folders in it: {_listed(takes.folders)} (learn --jobs N does)"
+        console.print(printable(text), markup=False, highlight=False, style="yellow")
 
 
 def say_bodies(console: Console, bodies: Bodies) -> None:

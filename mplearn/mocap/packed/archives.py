@@ -10,6 +10,7 @@ import tempfile
 import zipfile
 from abc import ABC, abstractmethod
 from bisect import bisect_left
+from collections import Counter
 from collections.abc import Iterable
 from contextlib import suppress
 from functools import cached_property, lru_cache
@@ -186,7 +187,8 @@ class _Zip(_Archive):
         if files and all(info.flag_bits & _ENCRYPTED for info in files):
             raise _encrypted()
         _refuse_endless(path.stat().st_size, (info.file_size for info in files))
-        self._named = {name: info for info in files if (name := _plain(info.filename))}
+        names = _Names()
+        self._named = {name: info for info in files if (name := names.plain(info.filename))}
         self.files = {
             name: Member(info.compress_size, info.file_size) for name, info in self._named.items()
         }
@@ -214,13 +216,13 @@ class _Tar(_Archive):
         self._lock = Lock()
         self._at: dict[str, tuple[int, int]] = {}
         with tarfile.open(fileobj=self._file, mode="r:") as archive:
-            before = -1
+            before, names = -1, _Names()
             while (info := archive.next()) is not None:
                 if archive.offset <= before:  # a negative size leads back, again and again
                     raise tarfile.ReadError("a file ends before it begins")
                 before = archive.offset
                 archive.members = []  # type: ignore[attr-defined] # else it keeps all of them
-                if info.isreg() and not info.issparse() and (name := _plain(info.name)):
+                if info.isreg() and not info.issparse() and (name := names.plain(info.name)):
                     self._at[name] = info.offset_data, info.size
         _refuse_endless(self._file.seek(0, os.SEEK_END), (size for _, size in self._at.values()))
         self.files = {name: Member(size, size) for name, (_, size) in self._at.items()}
@@ -282,7 +284,25 @@ def _refuse_endless(packed: int, sizes: Iterable[int]) -> None:
         raise ArchiveError(f"expands to more than {limit} bytes", "recordings of motion")
 
 
-def _plain(name: str) -> str:
-    r"""Return a name in an archive, as a path in it: ``.\walks\\one.bvh`` -> ``walks/one.bvh``."""
-    parts = PurePosixPath(name.replace("\\", "/")).parts
-    return "/".join(part for part in parts if part not in ("/", "..", "//"))
+class _Names:
+    """Paths in an archive, each that of one file."""
+
+    def __init__(self) -> None:
+        self._times: Counter[str] = Counter()
+
+    def plain(self, name: str) -> str:
+        r"""Return the path for a name: ``.\walks\\one.bvh`` -> ``walks/one.bvh``; empty for none.
+
+        Of another file that would have the same it is ``walks/one (2).bvh``.
+        """
+        parts = PurePosixPath(name.replace("\\", "/")).parts
+        plain = "/".join(part for part in parts if part not in ("/", "..", "//"))
+        return self._own(plain) if plain else ""
+
+    def _own(self, plain: str) -> str:
+        self._times[plain] += 1
+        if self._times[plain] == 1:
+            return plain
+        folder, slash, file = plain.rpartition("/")
+        stem, dot, suffixes = file.partition(".")
+        return self._own(f"{folder}{slash}{stem} ({self._times[plain]}){dot}{suffixes}")
