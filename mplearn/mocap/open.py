@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import warnings
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -69,6 +69,8 @@ for _reader in (
 ):
     register_reader(_reader)
 
+Read = TypeVar("Read")
+
 
 class NothingReadableError(RecordingError):
     """A folder holds no file that any reader takes."""
@@ -96,7 +98,7 @@ def open_recording(
 
     Returns:
         Markers [m] (z up, NaN where occluded) or angles [rad], with the labels that are known, of
-        all people who are in it (`each_person` tells them apart). Its
+        all people who are in it (`each_person` tells them apart), or the animal seen most. Its
         ``report`` tells how the file was read; what contradicts itself or is in doubt is also
         issued as a `RecordingWarning`.
 
@@ -138,7 +140,8 @@ def open_recordings(
 ) -> tuple[Recording, ...]:
     r"""Read all takes of a folder, in order of their names, or one file.
 
-    A take of several people becomes one for each (`each_person`).
+    A take of several people becomes one for each (`each_person`), one of several animals one for
+    each that is seen at least half as often as the one seen most.
 
     Args:
         path: As for `open_recording`, as the others.
@@ -216,7 +219,7 @@ def open_takes(
         raise next(iter(unreadable.values()))
     for name, take in takes.items():
         try:
-            found.extend(each_person(_read(take, rate_hz, positions, hints)))
+            found.extend(_read_each(take, rate_hz, positions, hints))
         except RecordingError as error:
             if strict or len(takes) == 1:
                 raise
@@ -273,7 +276,7 @@ class TakeFiles:
         Raises:
             RecordingError: The files do not hold what their format promises.
         """
-        return each_person(_read(self, None, positions, hints))
+        return _read_each(self, None, positions, hints)
 
 
 class FoundTakes(NamedTuple):
@@ -454,21 +457,42 @@ def _lies_unpacked(file: Path, archive: Path, several: bool) -> bool:
 def _read(
     take: TakeFiles, rate_hz: float | None, positions: bool, hints: Hints | None
 ) -> Recording:
-    parts = []
-    for file in take.files:
-        # numbers that no one measured overflow: what comes of them is checked, and refused
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            read = _read_by(take.reader, file, hints or Hints(), positions=positions)
-        part = _recording(read, file, take.reader)
-        if not part.labels:
-            part = replace(part, labels=labels_beside(file, part))
-        if part.report is None:
-            part = replace(part, report=ReadReport(take.reader.format, part.rate_hz))
-        if hints is not None and hints.mirrored:
-            part = right_handed(file, part)
-        if archive_of(file) is not None:  # of which folders may hold files of one name
-            part = replace(part, name=take.name)
-        parts.append(part)
+    parts = [
+        _part(take, file, _read_by(take.reader.read, file, hints, positions), hints)
+        for file in take.files
+    ]
+    return _whole(take, parts, rate_hz, hints)
+
+
+def _read_each(
+    take: TakeFiles, rate_hz: float | None, positions: bool, hints: Hints | None
+) -> tuple[Recording, ...]:
+    """Return a recording of each who is in a take."""
+    if len(take.files) > 1:
+        return each_person(_read(take, rate_hz, positions, hints))
+    (file,) = take.files
+    found = _read_by(take.reader.read_each, file, hints, positions)
+    apart = [_whole(take, [_part(take, file, one, hints)], rate_hz, hints) for one in found]
+    return tuple(each for one in apart for each in each_person(one))
+
+
+def _part(take: TakeFiles, file: Path, read: object, hints: Hints | None) -> Recording:
+    """Return what was read of a file, with what is known of it besides."""
+    part = _recording(read, file, take.reader)
+    if not part.labels:
+        part = replace(part, labels=labels_beside(file, part))
+    if part.report is None:
+        part = replace(part, report=ReadReport(take.reader.format, part.rate_hz))
+    if hints is not None and hints.mirrored:
+        part = right_handed(file, part)
+    if archive_of(file) is not None:  # of which folders may hold files of one name
+        part = replace(part, name=take.name)
+    return part
+
+
+def _whole(
+    take: TakeFiles, parts: Sequence[Recording], rate_hz: float | None, hints: Hints | None
+) -> Recording:
     recording = parts[0] if len(parts) == 1 else joined(take.name, parts)
     if hints is not None and hints.level:
         recording = leveled(recording, turn_to_level(take.files[0], recording))
@@ -477,11 +501,14 @@ def _read(
     return recording if rate_hz is None else resample(recording, rate_hz)
 
 
-def _read_by(reader: Reader, file: Path, hints: Hints, *, positions: bool) -> object:
+def _read_by(read: Callable[..., Read], file: Path, hints: Hints | None, positions: bool) -> Read:
     try:
-        return reader.read(file, hints, positions=positions)
+        # numbers that no one measured overflow: what comes of them is checked, and refused
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            return read(file, hints or Hints(), positions=positions)
     except NotADirectoryError as error:
-        own = f"{type(reader).__name__} opens files itself, and cannot open one in an archive"
+        reader = type(getattr(read, "__self__", read)).__name__
+        own = f"{reader} opens files itself, and cannot open one in an archive"
         raise bad_file(file, own, "the archive unpacked, or a reader by read_bytes") from error
 
 

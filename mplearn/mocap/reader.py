@@ -109,6 +109,13 @@ class Reader(ABC):
             RecordingError: The file does not hold what its format promises.
         """
 
+    def read_each(self, path: Path, hints: Hints, *, positions: bool) -> tuple[Recording, ...]:
+        """Read a recording of each who moves in one file, as far as `read` returns one of several.
+
+        By default that is what `read` returns, in which `each_person` may tell people apart.
+        """
+        return (self.read(path, hints, positions=positions),)
+
     def accepts(self, path: Path) -> bool:
         """Whether a file with the right suffix is one of the format, by its name or its start."""
         return True

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from mocap_writers import KEYPOINTS, keypoint_values
 
 from mplearn import LearnerConfig, MotionLearner, open_recording
-from mplearn.errors import RecordingError
-from mplearn.mocap import Hints
+from mplearn.errors import RecordingError, RecordingWarning
+from mplearn.mocap import Hints, find_takes, open_recordings
 from mplearn.mocap.keypoints.egocentric import seen_from_the_body
 from mplearn.recording import FloatArray
 
@@ -119,6 +119,51 @@ def test_of_several_animals_the_one_seen_most_is_read(tmp_path: Path) -> None:
     take = open_recording(tmp_path / "two.csv")
     assert "pictures there are a second" in take.report.notes[0]
     assert (take.person, take.rate_hz, take.report.left_out) == ("bold", 30.0, ("shy",))
+
+
+def test_several_animals_that_are_seen_often_are_a_take_each(tmp_path: Path) -> None:
+    points = mouse(4.0)
+    other = points[::-1]  # does the same backwards, and is seen from frame 30 on
+    rows = [
+        {"track": track, "frame_idx": k, "instance.score": 0.9,
+         **{f"{name}.{axis}": at[k, p, a] * (1, -1)[a] for p, name in enumerate(NAMES)
+            for a, axis in enumerate("xy")}, **{f"{name}.score": 0.9 for name in NAMES}}
+        for track, at, first, last in (("b", other, 30, 200), ("a", points, 0, 200),
+                                       ("c", points, 0, 20))
+        for k in range(first, last)
+    ]  # fmt: skip
+    pandas.DataFrame(rows).to_csv(tmp_path / "pair.analysis.csv", index=False)
+    hints = Hints(rate_hz=RATE_HZ)
+    b, a = open_recordings(tmp_path / "pair.analysis.csv", hints=hints)
+    assert [(each.name, each.person) for each in (b, a)] == [
+        ("pair.analysis (b)", "b"),
+        ("pair.analysis (a)", "a"),
+    ]
+    assert a.report.left_out == b.report.left_out == ("c",)
+    assert "2 animals: b, a" in " ".join(a.report.notes)
+    alone = open_recording(tmp_path / "pair.analysis.csv", hints=hints)
+    assert alone.person == "a"
+    np.testing.assert_array_equal(alone.frames, a.frames)
+    expected, _, _ = seen_from_the_body(points, NAMES, RATE_HZ)
+    np.testing.assert_allclose(a.frames, expected[:200], atol=1e-3)
+    assert np.isnan(b.frames[:30]).all()  # what both do at once has the same time
+    assert np.isfinite(b.frames[30:]).all()
+    (take,) = find_takes(tmp_path).takes
+    assert [each.person for each in take.read(hints=hints)] == ["b", "a"]
+
+
+def test_an_animal_that_cannot_be_read_costs_no_other(tmp_path: Path) -> None:
+    points = mouse(4.0)
+    values = np.concatenate([points, np.full((*points.shape[:2], 1), 0.99)], axis=2)
+    stuck = values * [0.0, 0.0, 1.0]
+    heads = [["net"], ["stuck", "well", "also"], list(NAMES), ["x", "y", "likelihood"]]
+    flat = np.concatenate([each.reshape(len(points), -1) for each in (stuck, values, values)], 1)
+    names = ["scorer", "individuals", "bodyparts", "coords"]
+    columns = pandas.MultiIndex.from_product(heads, names=names)
+    pandas.DataFrame(flat, columns=columns).to_csv(tmp_path / "three.csv")
+    with pytest.warns(RecordingWarning, match=r"stuck is left out: .*one place"):
+        found = open_recordings(tmp_path / "three.csv", hints=Hints(rate_hz=RATE_HZ))
+    assert [each.person for each in found] == ["well", "also"]
 
 
 def test_sleap_has_a_row_for_each_frame_and_track(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import tracemalloc
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import pairwise
@@ -37,9 +38,11 @@ def _ours(postures: FloatArray, rate_hz: float, classes: int, changes: int) -> I
     return find_activities(postures, rate_hz)
 
 
-def _pelt(postures: FloatArray, rate_hz: float, classes: int, changes: int) -> IntArray:
+def _pelt(
+    postures: FloatArray, rate_hz: float, classes: int, changes: int, noise: float = 1.0
+) -> IntArray:
     n, width = postures.shape
-    penalty = float(np.log(n) * width * postures.var(axis=0).mean())
+    penalty = float(np.log(n) * width * noise * postures.var(axis=0).mean())
     ruptures: Any = import_module("ruptures")
     search = ruptures.Pelt(min_size=round(rate_hz)).fit(postures)
     return _grouped(postures, search.predict(pen=penalty), classes)
@@ -73,6 +76,8 @@ METHODS: dict[str, tuple[str, str, Partition]] = {
     "ours, find_activities": ("", "nothing", _ours),
     "ruptures, PELT + Ward": ("ruptures", "number of classes", _pelt),
     "ruptures, kernel + Ward": ("ruptures", "numbers of classes and changes", _kernel),
+    "PELT, noise 10 % + Ward": ("ruptures", "number of classes", partial(_pelt, noise=0.1)),
+    "PELT, noise 1 % + Ward": ("ruptures", "number of classes", partial(_pelt, noise=1e-2)),
     "claspy, ClaSP + Ward": ("claspy", "number of classes", _clasp),
 }
 """By name: the library, what it is told of the truth, and how it works."""
@@ -114,7 +119,8 @@ def activity_peers_table(recordings: Iterable[Recording]) -> Table:
         "The same postures of the same recordings. Ours is run at the recording's rate and told "
         f"nothing; the others at {ACTIVITY_HZ:g} Hz and told what the table says: they find change "
         "points, so their stretches are grouped by Ward's method into the true number of classes. "
-        "PELT has the penalty of the Bayesian information criterion, the kernel is Gaussian with "
+        "PELT has the penalty of the Bayesian information criterion, with all variance, or a share "
+        "of it, for that of noise, the kernel is Gaussian with "
         "ruptures' own width, ClaSP has its defaults. Change points match within 1 %. Time is the "
         "processor's, without importing; memory is the most that was allocated on the way."
     )

@@ -1,17 +1,20 @@
 """Tables of key points: of DeepLabCut [Mathis2018], of SLEAP [Pereira2022], and their like, as CSV.
 
 Names stand in rows of heads above the columns, in one row (``nose.x, nose.y, nose.score``), or a
-row is one point (``frame_idx, track, node, x, y, score``). Of several animals that one is read that
-was seen most.
+row is one point (``frame_idx, track, node, x, y, score``). Of several animals `read` returns the
+one that was seen most, `read_each` all that were seen at least half as often.
 """
 
 from __future__ import annotations
 
 import re
+from abc import abstractmethod
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,10 +39,27 @@ _FRAMES = ("frame_idx", "frame")
 _TRACKS = ("track", "instance", "individual", "animal")
 _NODES = ("node", "bodypart", "keypoint")
 _LOOK = 6  # rows in which heads are looked for
+_OFTEN = 0.5  # of what is seen of one animal most, that is seen of another that is read, too
 _FEWEST = 3  # points that a table must name to be taken for one of key points
 
 
-class DeepLabCutReader(Reader):
+class AnimalReader(Reader):
+    """Reads tables of key points, of one animal or of several."""
+
+    def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
+        """Read the animal that was seen most; see `Reader.read`."""
+        return self._animals(path, hints).seen_most()
+
+    def read_each(self, path: Path, hints: Hints, *, positions: bool) -> tuple[Recording, ...]:
+        """Read all animals that were seen often; see `Reader.read_each`."""
+        return self._animals(path, hints).seen_often()
+
+    @abstractmethod
+    def _animals(self, path: Path, hints: Hints) -> _Animals:
+        """Return the animals in a file."""
+
+
+class DeepLabCutReader(AnimalReader):
     """Reads DeepLabCut's tables: rows of heads, (scorer, individuals,) bodyparts and coords."""
 
     format = "DeepLabCut"
@@ -54,8 +74,7 @@ class DeepLabCutReader(Reader):
         named = {row[0].lower() for row in rows[: at + 1] if row}
         return not named.isdisjoint(_HEADS) or "likelihood" in map(str.lower, rows[at])
 
-    def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
-        """Read the animal that was seen most; see `Reader.read`."""
+    def _animals(self, path: Path, hints: Hints) -> _Animals:
         findings = Findings(self.format)
         rows = _rows(path, findings)
         at = _coords_row([row for _, row in rows[:_LOOK]])
@@ -77,11 +96,10 @@ class DeepLabCutReader(Reader):
         rate_hz = _rate(path, hints, findings)
         tracks = {animal: _points(path, table, points) for animal, points in columns.items()}
         seen = {each: int(np.isfinite(track[0]).sum()) for each, track in tracks.items()}
-        most = _seen_most(seen, findings)
-        return _recording(path, tracks[most], most, rate_hz, findings)
+        return _Animals(path, seen, tracks.__getitem__, rate_hz, findings)
 
 
-class SLEAPReader(Reader):
+class SLEAPReader(AnimalReader):
     """Reads SLEAP's tables: a row for each frame and track, or for each point of them."""
 
     format = "SLEAP"
@@ -95,12 +113,11 @@ class SLEAPReader(Reader):
         head = _Head.of(rows[0])
         return head.is_sleap and bool(head.points)
 
-    def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
-        """Read the track that was seen most; see `Reader.read`."""
+    def _animals(self, path: Path, hints: Hints) -> _Animals:
         return _flat(path, hints, Findings(self.format))
 
 
-class KeyPointsReader(Reader):
+class KeyPointsReader(AnimalReader):
     """Reads other tables of points in a picture: ``nose_x, nose_y, nose_likelihood``, ..."""
 
     format = "key points"
@@ -117,8 +134,7 @@ class KeyPointsReader(Reader):
             and all(not own.keys().isdisjoint(_SURE) for own in flat)
         )
 
-    def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
-        """Read the points; see `Reader.read`."""
+    def _animals(self, path: Path, hints: Hints) -> _Animals:
         return _flat(path, hints, Findings(self.format))
 
 
@@ -165,7 +181,7 @@ class _Head:
         return {(p, c): k for p, each in self.points.items() for c, k in each.items()}
 
 
-def _flat(path: Path, hints: Hints, findings: Findings) -> Recording:
+def _flat(path: Path, hints: Hints, findings: Findings) -> _Animals:
     """Read a table with one row of names."""
     head, lines, body = _named_rows(path, findings)
     coords = head.coords
@@ -178,16 +194,20 @@ def _flat(path: Path, hints: Hints, findings: Findings) -> Recording:
     seen: Counter[str] = Counter()
     for track, n_values in zip(who, np.isfinite(values).sum(axis=1).tolist(), strict=True):
         seen[track] += n_values
-    rate_hz = _rate(path, hints, findings)
-    most = _seen_most(seen, findings)
-    own = [k for k, track in enumerate(who) if track == most]
-    nodes = [body[k][head.node] for k in own] if head.node is not None else [""] * len(own)
-    table, place = _by_node(path, at[own], values[own], nodes, 10 * values.size + 100_000)
-    points: dict[str, dict[str, int]] = {}
-    for node, begin in place.items():
-        for k, (point, coord) in enumerate(coords):
-            points.setdefault(point or node, {})[coord] = begin + k
-    return _recording(path, _points(path, table, points), most, rate_hz, findings)
+    begins, _ = _span(path, at)  # of all: what is done at once has the same time
+
+    def track_of(animal: str) -> Track:
+        own = [k for k, track in enumerate(who) if track == animal]
+        nodes = [body[k][head.node] for k in own] if head.node is not None else [""] * len(own)
+        most = 10 * values.size + 100_000
+        table, place = _by_node(path, at[own], values[own], nodes, begins, most)
+        points: dict[str, dict[str, int]] = {}
+        for node, begin in place.items():
+            for k, (point, coord) in enumerate(coords):
+                points.setdefault(point or node, {})[coord] = begin + k
+        return _points(path, table, points)
+
+    return _Animals(path, seen, track_of, _rate(path, hints, findings), findings)
 
 
 def _named_rows(path: Path, findings: Findings) -> tuple[_Head, list[int], list[list[str]]]:
@@ -204,7 +224,7 @@ def _named_rows(path: Path, findings: Findings) -> tuple[_Head, list[int], list[
 
 
 def _by_node(
-    path: Path, at: FloatArray, values: FloatArray, nodes: list[str], most: int
+    path: Path, at: FloatArray, values: FloatArray, nodes: list[str], first: int, most: int
 ) -> tuple[FloatArray, dict[str, int]]:
     """Return a table with a row for each frame, and the first column of each node in it.
 
@@ -213,9 +233,10 @@ def _by_node(
         at: The frame of each row, shape (R,).
         values: The rows, shape (R, K).
         nodes: The node that each is of.
+        first: The table's first frame.
         most: Numbers that the table may hold.
     """
-    first, last = _span(path, at)
+    _, last = _span(path, at)
     n_values = values.shape[1]
     place = {node: n_values * j for j, node in enumerate(dict.fromkeys(nodes))}
     n_frames, n_columns = last - first + 1, n_values * len(place)
@@ -295,15 +316,6 @@ def _points(path: Path, values: FloatArray, columns: dict[str, dict[str, int]]) 
     return points, tuple(whole), likely
 
 
-def _seen_most(seen: Mapping[str, int], findings: Findings) -> str:
-    """Return the animal that was seen most, and tell which others there are."""
-    most = max(seen, key=lambda each: seen[each])
-    if len(seen) > 1:
-        findings.note(f"of {len(seen)} animals the one that was seen most: {most}")
-        findings.leave_out(each for each in seen if each != most)
-    return most
-
-
 def _rate(path: Path, hints: Hints, findings: Findings) -> float:
     rate_hz = hints.rate_hz or rate_beside(path, findings)
     if rate_hz is None:
@@ -315,14 +327,87 @@ def _rate(path: Path, hints: Hints, findings: Findings) -> float:
     return rate_hz
 
 
-def _recording(
-    path: Path, track: Track, name: str, rate_hz: float, findings: Findings
-) -> Recording:
-    points, names, likelihood = track
-    try:
-        frames, channels, length = seen_from_the_body(points, names, rate_hz, likelihood)
-    except RecordingError as error:
-        raise bad_file(path, str(error), "key points of a body") from error
-    findings.note(f"key points along the body's heading, in body lengths of {length:.4g}")
-    findings.leave_out(each for each in names if f"{each}.ahead" not in channels)
-    return Recording(frames, rate_hz, channels, stem(path), name, report=findings.report(rate_hz))
+@dataclass(frozen=True)
+class _Animals:
+    """The animals in a file.
+
+    Attributes:
+        path: The file.
+        seen: Of each, by name, how many numbers there are.
+        track: Returns the key points of one.
+        rate_hz: Pictures a second [1/s].
+        findings: What was found out on the way.
+    """
+
+    path: Path
+    seen: Mapping[str, int]
+    track: Callable[[str], Track]
+    rate_hz: float
+    findings: Findings
+
+    def seen_most(self) -> Recording:
+        """Return the animal that was seen most, and tell which others there are."""
+        most = max(self.seen, key=lambda each: self.seen[each])
+        if len(self.seen) > 1:
+            self.findings.note(f"of {len(self.seen)} animals the one that was seen most: {most}")
+            self.findings.leave_out(each for each in self.seen if each != most)
+        return self._recording(self._seen(most), most, stem(self.path), self.findings)
+
+    def seen_often(self) -> tuple[Recording, ...]:
+        """Return all animals that were seen at least half as often as the one seen most."""
+        most = max(self.seen.values())
+        often = [each for each, n_seen in self.seen.items() if n_seen >= _OFTEN * most]
+        if len(often) == 1:
+            return (self.seen_most(),)
+        found, problems = {}, {}
+        for animal in often:
+            try:
+                found[animal] = self._seen(animal)
+            except RecordingError as error:
+                problems[animal] = error
+        if not found:
+            raise next(iter(problems.values()))
+        self.findings.note(
+            f"{len(found)} animals: {', '.join(found)}; each is a take of its own "
+            f"({option('person')} picks one)"
+        )
+        self.findings.leave_out(each for each in self.seen if each not in found)
+        for animal, problem in problems.items():
+            self.findings.warn(f"{animal} is left out: {problem}")
+        name = stem(self.path)
+        return tuple(
+            self._recording(seen, who, f"{name} ({who})", deepcopy(self.findings))
+            for who, seen in found.items()
+        )
+
+    def _seen(self, animal: str) -> _Seen:
+        """Return an animal as it is seen from its body."""
+        points, names, likelihood = self.track(animal)
+        try:
+            frames, channels, length = seen_from_the_body(points, names, self.rate_hz, likelihood)
+        except RecordingError as error:
+            raise bad_file(self.path, str(error), "key points of a body") from error
+        hidden = tuple(each for each in names if f"{each}.ahead" not in channels)
+        return _Seen(frames, channels, length, hidden)
+
+    def _recording(self, seen: _Seen, who: str, name: str, findings: Findings) -> Recording:
+        findings.note(f"key points along the body's heading, in body lengths of {seen.length:.4g}")
+        findings.leave_out(seen.hidden)
+        report = findings.report(self.rate_hz)
+        return Recording(seen.frames, self.rate_hz, seen.channels, name, who, report=report)
+
+
+class _Seen(NamedTuple):
+    """An animal as it is seen from its body.
+
+    Attributes:
+        frames: Shape (T, D) [body lengths].
+        channels: Their names, length D.
+        length: Of the body, in the file's unit.
+        hidden: Names of points that were never seen.
+    """
+
+    frames: FloatArray
+    channels: tuple[str, ...]
+    length: float
+    hidden: tuple[str, ...]
