@@ -69,7 +69,7 @@ for _reader in (
 ):
     register_reader(_reader)
 
-Read = TypeVar("Read")
+_Read = TypeVar("_Read")
 
 
 class NothingReadableError(RecordingError):
@@ -501,7 +501,7 @@ def _whole(
     return recording if rate_hz is None else resample(recording, rate_hz)
 
 
-def _read_by(read: Callable[..., Read], file: Path, hints: Hints | None, positions: bool) -> Read:
+def _read_by(read: Callable[..., _Read], file: Path, hints: Hints | None, positions: bool) -> _Read:
     try:
         # numbers that no one measured overflow: what comes of them is checked, and refused
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
