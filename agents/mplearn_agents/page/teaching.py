@@ -60,7 +60,8 @@ def in_words(command: Command, lifelong: LifelongLearner) -> str:
 
     match command:
         case Rename(id, new):
-            return f"{name(id)} is called {literal(new)} now"
+            is_so = id in library and library[id].name == new
+            return f"{f'P{id}' if is_so else name(id)} is called {literal(new)} now"
         case Merge(first, second):
             return f"{name(first)} and {name(second)} are one"
         case Split(id):

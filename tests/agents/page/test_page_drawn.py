@@ -146,7 +146,45 @@ def test_what_is_done_is_read_whole_beside_all_figures(server, new_page):
     assert doing.bounding_box()["x"] > 150
     figures = page.locator("#figures").inner_text()
     assert "53406 ms" in figures and "325.3 s of motion" in figures
+    frame = page.locator("#figures").bounding_box()
+    for each in page.locator("#figures div").all():  # whole, or not at all
+        box = each.bounding_box()
+        assert box["x"] + box["width"] <= frame["x"] + frame["width"] + 1
+        assert box["y"] < frame["y"] + 1 or box["y"] >= frame["y"] + frame["height"]
+    waits = page.locator("#figures div", has_text="of motion").bounding_box()
+    assert waits["y"] < frame["y"] + frame["height"]  # before the source's name
     server.hear({"kind": "status", "source": "made up", "state": "live", "frames": 1})
+
+
+@pytest.mark.parametrize("size", [(390, 844), (768, 1024)])
+def test_on_what_is_held_in_a_hand_panels_lie_below_each_other(server, new_page, size):
+    server.hear(world.bodies())
+    server.hear(world.stream())
+    server.hear(world.knowledge(20, world.HOSTILE))
+    page = new_page(server.url, *size)
+    until(lambda: rows(page).count() == 20, 10)
+    assert page.evaluate("document.documentElement.scrollWidth") == size[0]
+    panels = ("stage", "stream", "now", "progress", "log", "graph", "tree")
+    boxes = [page.locator(f"#{id}").bounding_box() for id in panels]
+    for above, below in itertools.pairwise(boxes):
+        assert above["y"] + above["height"] <= below["y"]
+        assert above["width"] > 0.9 * size[0]
+    for id in ("stage", "graph", "tree"):
+        title, tools = (page.locator(f"#{id} > {what}") for what in ("h2", ".tools"))
+        words = title.evaluate(
+            "(e) => { const r = new Range(); r.selectNodeContents(e);"
+            " return r.getBoundingClientRect().right; }"
+        )
+        assert words <= tools.bounding_box()["x"]
+
+
+def test_a_key_for_the_chosen_one_says_where_none_is(server, new_page):
+    server.hear(world.stream())
+    server.hear(world.knowledge(3))
+    page = new_page(server.url)
+    until(lambda: rows(page).count() == 3, 10)
+    page.keyboard.press("n")
+    until(lambda: "Choose a primitive first" in page.locator("#notes").inner_text(), 5)
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (1920, 1080)])

@@ -232,6 +232,9 @@ def test_each_request_is_a_command_and_can_be_undone(taught):
     assert said.endswith("is called {{7} now")  # which stands for no primitive
     said, _ = teaching.do(life, {"do": "undo"}, "Anna")
     assert said == f"undone: {before[1][0]} is called {{{{7}} now"
+    said, _ = teaching.do(life, {"do": "redo"}, "Anna")
+    assert said == f"done again: P{a} is called {{{{7}} now"  # not: {7} is called {7}
+    teaching.do(life, {"do": "undo"}, "Anna")
 
 
 @pytest.mark.parametrize(

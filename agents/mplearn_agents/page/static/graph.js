@@ -239,7 +239,8 @@ export class Graph {
       const out = unit(cx - from.x, cy - from.y); way = unit(to.x - cx, to.y - cy);
       const head = 2.2 + 2.2 * weight;
       let begin = beyond(from, out.x, out.y, r, size), end = beyond(to, -way.x, -way.y, r, size);
-      if (begin + end > length - 2 * head) { begin = r + 1; end = r + 2; }
+      if (begin + end > length - 2 * head) begin = r + 1; // rather the tail under a name than the tip
+      if (begin + end > length - 2 * head) end = r + 2;
       tip = { x: to.x - way.x * end, y: to.y - way.y * end };
       const sx = from.x + out.x * begin, sy = from.y + out.y * begin;
       d = `M${f(sx)} ${f(sy)}Q${f(cx)} ${f(cy)} ${f(tip.x - way.x * head)} ${f(tip.y - way.y * head)}`;

@@ -261,18 +261,21 @@ function searched(text) {
   mark();
 }
 
+// Do something with the chosen primitive; where none is (another teacher may have merged it), say so.
+const chosen = (what) => (world.chosen === null ? note("Choose a primitive first, in tree or graph.") : card.does(what));
+
 const KEYS = [
   ["/", "search a primitive", () => { search.focus(); search.select(); }],
   ["P", "pause or resume learning", does.pause],
   ["U", "undo", does.undo],
   ["R", "do again what was undone", does.redo],
-  ["N", "name the chosen primitive", () => card.does("name")],
+  ["N", "name the chosen primitive", () => chosen("name")],
   ["S", "show it once more", () => world.chosen !== null && show(world.chosen)],
-  ["M", "this and another are one", () => card.does("merge")],
-  ["D", "this is two", () => card.does("split")],
-  ["Delete", "forget this", () => card.does("forget")],
+  ["M", "this and another are one", () => chosen("merge")],
+  ["D", "this is two", () => chosen("split")],
+  ["Delete", "forget this", () => chosen("forget")],
   ["W", "let the robot walk", does.walk],
-  ["O", "let the robot go to the chosen one", () => card.does("path")],
+  ["O", "let the robot go to the chosen one", () => chosen("path")],
   ["X", "stop the robot", does.stop],
   ["G", "the whole graph, or around one", () => around(graph.around ? "whole" : "around")],
   ["L", "go to the tree", () => find("#tree [tabindex='0']")?.focus()],
