@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from mplearn.library import PrimitiveLibrary
-from mplearn_envs.execution.performer import PerformerState
+from mplearn_envs.execution.performer import Performer, PerformerState
 from mplearn_envs.execution.sensors import Measured
-from mplearn_envs.mechanics.reference import Reference
 from mplearn_envs.skills.action_choices import Choices
 from mplearn_envs.skills.repertoire import Repertoire
 from mplearn_envs.tasks import Task
@@ -42,7 +41,7 @@ class Episode(NamedTuple):
         measured: Measured,
         duration_s: float,
         repertoire: Repertoire,
-        reference: Reference,
+        performer: Performer,
     ) -> Episode:
         """Return the episode after a macro step.
 
@@ -51,7 +50,7 @@ class Episode(NamedTuple):
             measured: How the robot stands now.
             duration_s: How long the macro step took [s].
             repertoire: What the robot can perform by now.
-            reference: Where the reference robot is now.
+            performer: Who is now where that led.
         """
         current, history = self.current, self.history
         if chosen is not None:
@@ -59,7 +58,10 @@ class Episode(NamedTuple):
         gone = current is not None and current not in repertoire.slots
         if gone or (chosen is None and self.choices.dead_end):
             current = None
-        choices = repertoire.entries(reference) if current is None else repertoire.after(current)
+        here = performer.reference
+        choices = repertoire.entries(here) if current is None else repertoire.after(current)
+        if not performer.leads_home:
+            choices = repertoire.from_place(choices, here)
         return Episode(measured, choices, current, history, self.time_s + duration_s)
 
 

@@ -232,7 +232,7 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         add(terms, earned_meanwhile(self.task, report, self.discount))
         self._meanwhile(duration_s)
         episode = before.after(
-            chosen, outcome.measured, duration_s, self.repertoire, self.performer.reference
+            chosen, outcome.measured, duration_s, self.repertoire, self.performer
         )
         add(terms, self.task.arrive(self._scene(episode, {})), remaining)
         terminated = report.fallen or self.task.done

@@ -71,6 +71,11 @@ class PrimitiveHumanoidEnv(MacroStepEnv):
 
         action = env.action_space.sample(probability=info["transition_prior"])
 
+    Nothing is performed whose plan from where the robot stands cannot be: where the feet stand so
+    that a primitive cannot begin at once, the robot first goes to where it stands at rest
+    (`Skills.plan`), and the step takes as long. Where it cannot come to rest, as it may be after
+    steps that caught a push, only what can begin at once is legal.
+
     With a ``novel_penalty`` every primitive that the robot can perform is legal everywhere; one
     that was never observed there has prior 0, costs the penalty, and is flagged in
     ``info["novel"]``.

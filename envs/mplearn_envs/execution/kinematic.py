@@ -21,11 +21,19 @@ from .tracking_report import TrackingReport
 
 
 class _Place(NamedTuple):
-    """Where a kinematic robot is: its reference, the key of that, and what is measured there."""
+    """Where a kinematic robot is.
+
+    Attributes:
+        key: Of its reference.
+        reference: See there.
+        measured: What is measured there.
+        leads_home: Whether it can come to rest from there.
+    """
 
     key: Hashable
     reference: Reference
     measured: Measured
+    leads_home: bool
 
 
 class _Known(NamedTuple):
@@ -55,7 +63,7 @@ class KinematicPerformer(Performer):
         self._risk = risk_of(body)
         self._draw, self._count = 0, 0
         self._sensors = Sensors(self.simulation)
-        self._rest = self._arrive(rest_reference(self.simulation.robot))
+        self._rest = self._arrive(rest_reference(self.simulation.robot), True)
         self._here = self._rest
 
     def reset(self, draw: int = 0) -> Measured:
@@ -87,6 +95,11 @@ class KinematicPerformer(Performer):
         self._count += 1
         return known.outcome if self._risk is None else self._chanced(known, self._risk)
 
+    @property
+    def leads_home(self) -> bool:
+        """Whether the robot can go from where it is to where it stands at rest."""
+        return self._here.leads_home
+
     def state(self) -> PerformerState:
         """Return all that the future depends on."""
         return PerformerState(self.reference, None, self._draw, self._count)
@@ -112,12 +125,19 @@ class KinematicPerformer(Performer):
 
     def _performed(self, plan: Plan) -> _Known:
         report = TrackingReport.as_planned(plan)
-        place = self._arrive(plan.end, velocities(plan.q[-2:], plan.knot_s)[-1])
+        place = self._arrive(plan.end, None, velocities(plan.q[-2:], plan.knot_s)[-1])
         return _Known(Outcome.of(report, place.measured, plan.speed), place, strain_of(plan))
 
-    def _arrive(self, reference: Reference, velocity: FloatArray | None = None) -> _Place:
+    def _arrive(
+        self,
+        reference: Reference,
+        leads_home: bool | None = None,
+        velocity: FloatArray | None = None,
+    ) -> _Place:
         key = tuple(np.asarray(part).tobytes() for part in reference)
-        return _Place(key, reference, self._sensors.at(reference.q, velocity))
+        if leads_home is None:
+            leads_home = self.repertoire.skills.leads_home(reference)
+        return _Place(key, reference, self._sensors.at(reference.q, velocity), leads_home)
 
     def _play(self, plan: Plan, on_frame: Callable[[], None], frame_steps: int) -> None:
         """Show a plan's reference postures."""

@@ -122,6 +122,11 @@ class Performer(ABC):
     def show(self) -> None:
         """Bring ``simulation`` up to date, to be drawn."""
 
+    @property
+    def leads_home(self) -> bool:
+        """Whether the robot can go from where it is to where it stands at rest."""
+        return self.repertoire.skills.leads_home(self.reference)
+
     def plan(self, id: int | None, speed: float = 1.0) -> Plan:
         """Return how a primitive is performed from where the reference robot is; None holds.
 

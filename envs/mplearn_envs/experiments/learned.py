@@ -24,8 +24,8 @@ def learned_table(
 ) -> Table:
     """Return what is feasible of each library, why the rest is not, and walks in any order.
 
-    Any primitive follows any other if the plan of it passes its verdict, which asks more of the
-    robot than what was demonstrated: out of a squat it must raise a leg.
+    Any primitive follows any other, which asks more of the robot than what was demonstrated: out of
+    a squat it must raise a leg.
 
     Args:
         libraries: What was learned, by name.
@@ -62,19 +62,18 @@ def learned_table(
                 str(sum(bool(walk.fell) for walk in walks)),
                 f"{100 * max((step[1] for step in steps), default=np.nan):.2f}",
                 "; ".join(refused) or "-",
-                f"{sum(walk.refused for walk in walks)} of "
-                f"{sum(len(walk.steps) + walk.refused for walk in walks)}",
+                f"{sum(walk.detours for walk in walks)} of {len(steps)}",
             )
         )
     return Table(
         f"What robot {robot.name!r} performs of what it learned from people",
         (
             *("learned from", "feasible", "lift a foot", "walks", "falls", "COG off [cm]"),
-            *("refused", "transitions refused"),
+            *("refused", "stood up before"),
         ),
         tuple(rows),
         f"At {speed:g} of the human's speed; masses, gains and friction wrong by up to "
-        f"{100 * error:.0f} %; any primitive follows any other "
-        "if the plan of it from there passes its verdict; those drawn that do not are counted. "
+        f"{100 * error:.0f} %; any primitive follows any other; "
+        "where it cannot begin at once the robot stands up before. "
         "Feet stand as far apart as they were shown, or as a step reaches.",
     )

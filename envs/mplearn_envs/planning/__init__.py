@@ -3,4 +3,5 @@
 from .plan import Motion as Motion
 from .plan import Plan as Plan
 from .plan import PlannerConfig as PlannerConfig
+from .plan import joined as joined
 from .planner import Planner as Planner

@@ -158,6 +158,15 @@ def joined(plans: Sequence[Plan]) -> Plan:
 
     Args:
         plans: One or more, each of which begins where the one before ends.
+
+    Example:
+        >>> from mplearn_envs.mechanics import rest_reference
+        >>> from mplearn_envs.planning import Planner
+        >>> from mplearn_envs.robot import humanoid
+        >>> planner = Planner(humanoid())
+        >>> first = planner.hold(rest_reference(humanoid()), 1.0)
+        >>> joined([first, planner.hold(first.end, 0.5)]).duration_s
+        1.5
     """
     if len(plans) == 1:
         return plans[0]

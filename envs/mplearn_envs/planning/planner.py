@@ -19,6 +19,7 @@ from mplearn_envs.mechanics.reference import (
     N_BASE,
     Reference,
     reference_robot,
+    rest_reference,
     sole_middles,
     tracked_columns,
 )
@@ -41,6 +42,7 @@ OUT_OF_REACH = 1e-3  # [m, rad]: an error that slowing down does not mend
 _TRIES, _MORE_TRIES = 6, 3
 _SLOWEST = 0.6  # of the pace is tried next, at least
 _ENOUGH_M = 1e-3  # a margin that falls short by less is enough
+_AT_HOME = 1e-3  # so near to where it stands at rest the robot stands there [m, rad]
 
 
 class Planner:
@@ -71,6 +73,7 @@ class Planner:
         self._tracked = tracked_columns(robot)
         self._cache = LRUCache(self.config.cache_size)
         self._restance = Restance(robot, self._plan_step)
+        self._rest = rest_reference(robot)
 
     def motion(self, frames: FloatArray, rate_hz: float) -> Motion:
         """Return the motion of frames in the robot's channels, what its feet do included.
@@ -158,6 +161,37 @@ class Planner:
         motion = Motion(np.stack((here, here)), 1.0 / duration_s, footwork, stance=stance)
         return self.plan(start, motion, 1.0, ("hold", duration_s))
 
+    def home(self, start: Reference) -> Plan:
+        """Return the commands after which the robot stands at rest, as it did at first.
+
+        Its end is `rest_reference`, to the last bit, wherever it began and by whatever way; where
+        the robot does not come there, the plan's errors and margins say so.
+
+        Args:
+            start: Where the reference robot is.
+        """
+        full_key = ("home", *(part.tobytes() for part in start))
+        plan: Plan | None = self._cache.get(full_key)
+        if plan is None:
+            plan = self._home(start)
+            self._cache.put(full_key, plan)
+        return plan
+
+    def _home(self, start: Reference) -> Plan:
+        plans = []
+        if start.lifted >= 0:
+            plans.append(self._plan_one(start, self._restance.lowered(start), 1.0)[0])
+            start = plans[0].end
+        way, sound = self._plan_row(start, self._restance.home(start, 0))
+        if not sound:
+            again, better = self._plan_row(start, self._restance.home(start, 1))
+            way = again if better else way
+        plan = joined([*plans, way])
+        off = np.abs(plan.end.q - self._rest.q).max()
+        if not off < _AT_HOME:  # then a plan from there is not what was planned
+            return plan._replace(error=np.maximum(plan.error, off))
+        return plan._replace(end=self._rest)
+
     def _plan(self, start: Reference, motion: Motion, speed: float) -> Plan:
         """Return the plan of a motion, and of the steps into its stance before it."""
         steps = self._restance.into(start, motion)
@@ -165,18 +199,25 @@ class Planner:
             plan, sound = self._plan_one(start, motion, speed)
             if sound:
                 return plan
-        plan, sound = self._plan_after(steps, start, motion, speed)
+        plan, sound = self._plan_row(start, [*steps, motion], speed)
         if not sound and (steps := self._restance.together(start, motion)):
-            again, better = self._plan_after(steps, start, motion, speed)
+            again, better = self._plan_row(start, [*steps, motion], speed)
             plan = again if better else plan
         return plan
 
-    def _plan_after(
-        self, steps: list[Motion], start: Reference, motion: Motion, speed: float
+    def _plan_row(
+        self, start: Reference, motions: list[Motion], speed: float = 1.0
     ) -> tuple[Plan, bool]:
-        """Return the plan of steps and a motion after them, and whether all of it is sound."""
+        """Return the plan of steps and a motion after them, and whether all of it is sound.
+
+        Args:
+            start: Where the reference robot is.
+            motions: One after another.
+            speed: Of the last; the others are steps, planned at the speed at which they are made.
+        """
         plans, sounds = [], []
-        for each, pace in [*((step, 1.0) for step in steps), (motion, speed)]:
+        for i, each in enumerate(motions):
+            pace = speed if i == len(motions) - 1 else 1.0
             plan, sound = self._plan_one(start, each, pace)
             plans.append(plan)
             sounds.append(sound)

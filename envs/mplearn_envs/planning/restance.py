@@ -26,11 +26,13 @@ from .stride import SAME_PLACE_M, left_from_right
 _RATE_HZ, _FRAMES = 100.0, 211  # of a step
 _LEAVES, _LANDS = 45, 100  # frames at which its foot leaves the ground, and lands
 _RISES = 80  # frames in which the trunk is upright again
+_RESTS_S = 1.25  # in which the weight comes to rest between the feet
 _FAR_M = 0.3  # feet so far from side by side are brought there before they go elsewhere
 _ALIKE_M = 0.2  # stances so near to each other are tried for each other before one steps
 _LIFT_M = 0.05
 _SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)  # of the way to where a foot shall land
 _DECIMALS, _KNOWN = 3, 256
+_EXACT = 1e-5  # feet so near to their places are there [m, rad]
 
 
 class Restance:
@@ -138,6 +140,24 @@ class Restance:
             return []
         return self._gathered(start, self._upper(motion))[0]
 
+    def lowered(self, start: Reference) -> Motion:
+        """Return the motion that lowers a foot, where it left the ground or beside the other."""
+        return _still(self._beside, start.heel, self._rest.target)
+
+    def home(self, start: Reference, side: int) -> list[Motion]:
+        """Return the motions after which the robot stands at rest, as it did at first.
+
+        Args:
+            start: Where the reference robot is, both feet down.
+            side: Which foot is put beside the other at last, 0 left, 1 right.
+        """
+        upper = self._rest.target
+        out, here = self._gathered(start, upper)
+        if max(_apart(here, self._beside)) > _EXACT:
+            out.append(self._step(here, self._beside, Approach(side, 0.0, 0.0), upper))
+        out.append(_still(self._beside, np.zeros(2), upper, _RESTS_S))
+        return out
+
     def _upper(self, motion: Motion) -> FloatArray:
         """Return tracked coordinates of who stands upright, arms as where a motion begins, (U,)."""
         out = np.array(np.clip(motion.frames[0], *self._reference.limits.T))
@@ -205,9 +225,11 @@ class Restance:
         return Motion(frames, _RATE_HZ, footwork, stance=stance)
 
 
-def _still(place: FloatArray, heel: FloatArray, target: FloatArray) -> Motion:
+def _still(
+    place: FloatArray, heel: FloatArray, target: FloatArray, lasts_s: float = 1.0 / _RATE_HZ
+) -> Motion:
     stance = Stance(place, np.stack((heel, heel)))
-    return Motion(np.stack((target, target)), _RATE_HZ, stance=stance)
+    return Motion(np.stack((target, target)), 1.0 / lasts_s, stance=stance)
 
 
 def _apart(here: FloatArray, there: FloatArray) -> tuple[float, float]:

@@ -51,7 +51,8 @@ def plan_ground(
         elif part.lands >= 0 and footwork is not None:
             relative = footwork.left_from_right[min(part.lands, len(footwork.rise) - 1)]
         if relative is not None:
-            place = landing(robot, here, part.up, relative)
+            exact = part.lands != BESIDE and footwork is not None and not footwork.free
+            place = landing(robot, here, part.up, relative, exact=exact)
             n = last - first
             clear = _clearing(
                 n, knot_s, timeline.patience
@@ -72,11 +73,17 @@ def left_from_right(ground: FloatArray) -> FloatArray:
 
 
 def landing(
-    robot: ReferenceRobot, ground: FloatArray, side: int, relative: FloatArray
+    robot: ReferenceRobot,
+    ground: FloatArray,
+    side: int,
+    relative: FloatArray,
+    *,
+    exact: bool = False,
 ) -> FloatArray:
     """Return where a foot lands: x, y [m] and yaw [rad], shape (3,).
 
-    It does not land on the other foot, however narrow the demonstrator stands.
+    It does not land on the other foot, however narrow the demonstrator stands, and where it stood
+    if that is near, unless the place is meant exactly.
     """
     stands = ground[1 - side]
     dx, dy, turn = relative
@@ -88,7 +95,8 @@ def landing(
         dy = max(dy, clear) if side == 0 else min(dy, -clear)
     moved = stands + np.array((*turn_in_plane(dx, dy, stands[2]), turn)) - ground[side]
     moved[2] = wrap_angle(moved[2])
-    if np.hypot(moved[0], moved[1]) < SAME_PLACE_M and abs(moved[2]) < SAME_YAW_RAD:
+    near = np.hypot(moved[0], moved[1]) < SAME_PLACE_M and abs(moved[2]) < SAME_YAW_RAD
+    if near and not exact:
         return np.array(ground[side])
     return np.asarray(ground[side] + moved)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass, fields
 from numbers import Real
 from typing import Literal, TypeAlias
@@ -9,6 +10,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from mplearn.errors import InvalidValueError
+from mplearn_envs.lru_cache import LRUCache
 from mplearn_envs.mechanics.inverse_dynamics import InverseDynamics
 from mplearn_envs.mechanics.reference import (
     Reference,
@@ -22,6 +24,7 @@ from mplearn_envs.planning.planner import Planner
 
 SLOWER = 0.8  # share of the speed that is tried next
 _LEAST_MARGIN = 0.5  # of the margin at the edge is enough while one motion gives way to another
+_PLACES = 4096  # of about 1 kB each: from where it is known whether the robot comes to rest
 _AT_LIMIT = 1e-3  # so near its limit a joint is what does not reach [rad]
 ProblemKind: TypeAlias = Literal["flight", "limit", "velocity", "reach", "torque", "balance"]
 
@@ -38,8 +41,8 @@ class FeasibilityConfig:
         reach_error: How far feet, COG and base may stay off what is wanted [m, rad].
         torque_share: Share of the torque limits that may be used.
         zmp_margin_m: How near the zero-moment point may come to the edge of the soles [m].
-        transitions: Whether it is also judged, of each two primitives, if one can follow the other
-            (`Skills.follows`), and what cannot is masked. Each is planned when it is first asked.
+        transitions: Whether what can follow a primitive only by way of standing upright
+            (`Skills.plan`) is masked. Each two are planned when that is first asked.
 
     Raises:
         InvalidValueError: A limit is no number from 0 on, ``slowest`` is 0, or ``transitions`` is
@@ -161,13 +164,15 @@ class FeasibilityCheck:
         self.config = config or FeasibilityConfig()
         self._dynamics = InverseDynamics(planner.robot)
         self._columns = tracked_columns(planner.robot)
+        self._leads_home = LRUCache(_PLACES)
 
-    def judge(self, motion: Motion, speed: float) -> Feasibility:
+    def judge(self, motion: Motion, speed: float, key: Hashable = None) -> Feasibility:
         """Return whether a motion can be performed.
 
         Args:
             motion: See `Planner.motion`.
             speed: Wanted speed, as a share of the human's.
+            key: Names the motion, see `Planner.plan`.
         """
         footwork = motion.footwork
         feet = (-1, -1) if footwork is None else (footwork.up_at(False), footwork.up_at(True))
@@ -177,7 +182,7 @@ class FeasibilityCheck:
         start = self.posture(motion)
         wanted = speed
         while True:
-            plan = self.planner.plan(start, motion, speed)
+            plan = self.planner.plan(start, motion, speed, key)
             margin = float(np.nan_to_num(plan.zmp_margin_m, nan=-np.inf).min())
             share, joint = self._load(plan)
             shaky = margin < self.config.zmp_margin_m or share > self.config.torque_share
@@ -207,8 +212,26 @@ class FeasibilityCheck:
             found.append(Problem("balance", "the soles", margin, least))
         return tuple(found)
 
+    def leads_home(self, place: Reference) -> bool:
+        """Return whether the robot can go from somewhere to where it stands at rest.
+
+        Args:
+            place: Where the reference robot is.
+        """
+        key = tuple(part.tobytes() for part in place)
+        known: bool | None = self._leads_home.get(key)
+        if known is None:
+            finite = all(np.isfinite(part).all() for part in place)
+            known = finite and not self.judge_plan(self.planner.home(place))
+            self._leads_home.put(key, known)
+        return known
+
     def posture(self, motion: Motion) -> Reference:
         """Return the reference robot at rest where a motion begins, on one foot or on two."""
+        return self.way_in(motion).end
+
+    def way_in(self, motion: Motion) -> Plan:
+        """Return how the robot goes from rest to where a motion begins."""
         here = rest_reference(self.planner.robot)
         first = np.repeat(motion.frames[:1], 2, axis=0)
         stance = motion.stance
@@ -223,8 +246,8 @@ class FeasibilityCheck:
             )
             return self.planner.plan(
                 here, Motion(first, 1.0, Footwork(legs, rise, apart, (Lift(up, -1, 2),))), 1.0
-            ).end
-        return self.planner.plan(here, Motion(first, 1.0, stance=stance), 1.0).end
+            )
+        return self.planner.plan(here, Motion(first, 1.0, stance=stance), 1.0)
 
     def _flight(self, motion: Motion) -> tuple[Problem, ...]:
         """Look for soles in the air while the base is higher than it can stand."""

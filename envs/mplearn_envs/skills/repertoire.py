@@ -210,6 +210,29 @@ class Repertoire:
                 ]
             return self._choices({id: float(self.library[id].n_exemplars) for id in within})
 
+    def from_place(self, choices: Choices, place: Reference) -> Choices:
+        """Return what of some choices can be done where the robot cannot come to rest first.
+
+        It may stand so after steps that caught a push; elsewhere it can do all of them.
+
+        Args:
+            choices: What follows what was performed, or may be done first.
+            place: Where the reference robot is.
+        """
+        possible, refused, novel = {}, dict(choices.refused), []
+        for slot in np.flatnonzero(choices.mask).tolist():
+            id = self.primitive(slot)
+            if id is None:
+                continue
+            problems = self.skills.judge_plan(self.skills.plan(place, id))
+            if problems:
+                refused[slot] = tuple(str(problem) for problem in problems)
+            elif choices.novel[slot]:
+                novel.append(slot)
+            else:
+                possible[slot] = float(choices.prior[slot])
+        return choose_among(possible, refused, tuple(novel), self.capacity)
+
     def _starts_on(self, id: int, lifted: int) -> bool:
         """Return whether the robot can perform a primitive, and it starts with that foot up."""
         verdict = self.skills.feasibility(id)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from threading import RLock
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ from mplearn.generation import StyleName, Trajectory
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import FloatArray
 from mplearn_envs.mechanics.reference import N_BASE, Reference, rest_reference
-from mplearn_envs.planning import Motion, Plan, Planner
+from mplearn_envs.planning import Motion, Plan, Planner, joined
 from mplearn_envs.robot import Retargeting, Robot
 
 from .feasibility import Feasibility, FeasibilityCheck, FeasibilityConfig, Problem
@@ -212,7 +212,16 @@ class Skills:
         with self.lock:
             skill = self[id]
             if skill.verdict is None:
-                skill.verdict = self._check.judge(skill.motion, self.speed)
+                key = self.key(id)
+                verdict = self._check.judge(skill.motion, self.speed, key)
+                if verdict.feasible:  # now that its speed is known, so is how it comes from rest
+                    found = [
+                        problem
+                        for plan in self._from_rest(id, verdict.speed)
+                        for problem in self._check.judge_plan(plan)
+                    ]
+                    verdict = replace(verdict, problems=tuple(found))
+                skill.verdict = verdict
             return skill.verdict
 
     def key(self, id: int) -> tuple[int, int]:
@@ -228,14 +237,46 @@ class Skills:
     def plan(self, start: Reference, id: int, speed: float = 1.0) -> Plan:
         """Return the commands that perform a primitive from the present reference.
 
+        Where the robot stands so that it cannot begin at once, or could not come to rest after it,
+        it goes to where it stands at rest, and from there to where the primitive begins. So what
+        is feasible can follow whatever is feasible.
+
         Args:
             start: Where the reference robot is.
             id: The primitive.
             speed: As a share of the speed at which it is usually performed.
         """
+        plan, verdict = self.at_once(start, id, speed), self.feasibility(id)
+        if not verdict.feasible or not self.judge_plan(plan):
+            return plan
+        if speed != 1.0 and not self.judge_plan(usual := self.at_once(start, id)):
+            return usual
+        if not self.leads_home(start):
+            return plan
+        return joined([self.planner.home(start), *self._from_rest(id, verdict.speed)[:2]])
+
+    def at_once(self, start: Reference, id: int, speed: float = 1.0) -> Plan:
+        """Return the plan of a primitive from the present reference, sound or not; see `plan`."""
         with self.lock:
             motion, usual, key = self[id].motion, self.feasibility(id).speed, self.key(id)
         return self._settled(self.planner.plan(start, motion, usual * speed, key))
+
+    def _from_rest(self, id: int, speed: float) -> list[Plan]:
+        """Return the plans from rest to where a primitive begins, of it, and from there to rest."""
+        way_in = self._check.way_in(self[id].motion)
+        motion, key = self[id].motion, self.key(id)
+        plan = self._settled(self.planner.plan(way_in.end, motion, speed, key))
+        return [way_in, plan, self.planner.home(plan.end)]
+
+    def leads_home(self, place: Reference) -> bool:
+        """Return whether the robot can go from somewhere to where it stands at rest.
+
+        From there it can perform whatever is feasible.
+
+        Args:
+            place: Where the reference robot is.
+        """
+        return self._check.leads_home(place)
 
     def transition_s(self, before: int | None, after: int) -> float:
         """Return how long a primitive takes the robot where another has just ended [s].
@@ -256,7 +297,7 @@ class Skills:
             return self._transitions_s[key]
 
     def follows(self, before: int, after: int) -> tuple[Problem, ...]:
-        """Return why a primitive cannot follow another where that has ended; empty where it can.
+        """Return why a primitive cannot follow another at once where that has ended; empty if so.
 
         Args:
             before: The one that has ended, which the robot can perform.
@@ -265,17 +306,19 @@ class Skills:
         with self.lock:
             key = (self.key(before), self.key(after))
             if key not in self._following:
-                plan = self.plan(self.end(before), after)
+                plan = self.at_once(self.end(before), after)
                 self._following[key] = self._check.judge_plan(plan)
             return self._following[key]
 
     def judge_plan(self, plan: Plan) -> tuple[Problem, ...]:
-        """Return why a plan from anywhere cannot be performed; empty where it can.
+        """Return why a plan from anywhere is not performed; empty where it is.
 
-        What came before may have moved the feet: where one primitive may follow another, the plan
-        of it from there may be none.
+        It cannot be, or after it the robot could not come to rest.
         """
-        return self._check.judge_plan(plan)
+        problems = self._check.judge_plan(plan)
+        if not problems and not self._check.leads_home(plan.end):
+            problems = self._check.judge_plan(self.planner.home(plan.end))
+        return problems
 
     def foreknown_s(self, before: int, after: int) -> float | None:
         """Return what `transition_s` does where that was found out before; None elsewhere."""
@@ -287,7 +330,8 @@ class Skills:
             return self._rest
         key = self.key(id)
         if key not in self._ends:
-            self._ends[key] = self.plan(self._check.posture(self[id].motion), id).end
+            start = self._check.posture(self[id].motion)
+            self._ends[key] = self.at_once(start, id).end
         return self._ends[key]
 
     def hold(self, start: Reference, duration_s: float) -> Plan:

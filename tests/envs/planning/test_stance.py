@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from planners import at_rest, humanoid_reference, planner
-from standing_library import BOW, RATE_HZ, STANDING_M, sweep
+from stance_library import between, shown
+from standing_library import BOW, RATE_HZ, sweep
 
 from mplearn.maths.plane import turn_in_plane
 from mplearn_envs.execution.simulation import Simulation
@@ -15,28 +16,12 @@ from mplearn_envs.mechanics.heels import bearing_corners, foot_places, raised_fo
 from mplearn_envs.mechanics.kinematics import places
 from mplearn_envs.mechanics.reference import sole_middles, soles
 from mplearn_envs.planning.clearance import outline_gap
-from mplearn_envs.planning.stance import stand
 from mplearn_envs.planning.stride import left_from_right
 from mplearn_envs.robot import humanoid
 from mplearn_envs.skills.feasibility import FeasibilityCheck
 
 HUMANOID = humanoid()
 SPLIT = np.array([-0.5, 0.2, 0.0])  # the left foot behind
-
-
-def shown(place, heel, base):
-    """Return the features of a posture, shape (3 + n,), and check that it is one."""
-    target = at_rest().target.copy()
-    target[:3] = STANDING_M + base[0], base[1], base[2]
-    q, worst = stand(humanoid_reference(), place, np.array(heel), target, 0.5)
-    assert worst < 1e-3
-    return np.concatenate((target[:3], q[7:]))
-
-
-def between(first, last, seconds=1.2):
-    x = np.linspace(0.0, 1.0, round(seconds * RATE_HZ) + 1)[:, None]
-    share = x**3 * (10 - 15 * x + 6 * x**2)
-    return first * (1 - share) + last * share
 
 
 def lunge():
