@@ -13,6 +13,7 @@ from itertools import permutations
 import numpy as np
 
 from ..recording import BoolArray, FloatArray, IntArray
+from .config import TreeConfig
 from .distance import Exemplar
 from .exemplars.normalisation import normalised
 from .exemplars.spread import moments
@@ -33,6 +34,7 @@ _FAR = 1e12  # farther than any two segments
 _AMONG = 10  # what waits and what is known: among few anything is somebody's nearest
 _BY_FAR = 1.2  # how many times as far the next is
 _PLAYED_BACK = 0.05  # over the scale: nobody hesitates again so exactly
+_IN_SEQUENCE = 0.8  # of what tells two motions apart, for those that come after two others
 _SURELY = 1 - 1e-9  # whatever a mean is rounded to
 _NEARER = 0.8  # of how far a part is from a whole: what it is a part of, at the most
 _WELL_INSIDE = 0.8  # of its radius
@@ -312,24 +314,85 @@ def split_mixed(structure: Structure, leaf: Node, when: int) -> Change:
     """Split a leaf if its two branches lie too far apart.
 
     On average, by what is inside them and by how wide other leaves are; and with a break between
-    them. Few exemplars look like two groups by chance, so the leaf must keep all that it may.
+    them. Few exemplars look like two groups by chance, so the leaf must keep all that it may; but
+    not where its exemplars have come after two primitives, and each of the two groups after one.
+
+    Args:
+        structure: The tree.
+        leaf: The leaf that grew.
+        when: Segments seen.
     """
-    config = structure.config
-    if leaf.whole or leaf.frozen or len(leaf.members) < config.max_exemplars:
+    if leaf.whole or leaf.frozen:
         return Change()
-    width = config.split_scale * structure.index.scale(but=leaf.id)
-    if leaf.diameter <= _SURELY * width:  # without tempo nothing is farther apart
+    after = _after_two(structure, leaf)
+    full = len(leaf.members) >= structure.config.max_exemplars
+    width = structure.config.split_scale * structure.index.scale(but=leaf.id)
+    least = width if after is None else _IN_SEQUENCE * width
+    if not (full or after) or leaf.diameter <= _SURELY * least:  # without tempo nothing is farther
         return Change()
     matrix = structure.memory.bank.without_tempo(leaf.members, leaf.matrix)
-    branches = two_branches(matrix, config.min_branch)
-    if (
-        branches is None
-        or mean_between(matrix, *branches) <= width
-        or separation(matrix, *branches) <= config.split_ratio
-        or gap(matrix, *branches) <= config.split_gap
-    ):
+    branches = None
+    if after is not None:
+        share = 1.0 if min(map(len, after)) == 2 else _IN_SEQUENCE
+        groups = _with_the_nearer(matrix, *after)
+        branches = _if_apart(structure.config, matrix, groups, share * width, share)
+    if branches is None and full:
+        halves = two_branches(matrix, structure.config.min_branch)
+        branches = _if_apart(structure.config, matrix, halves, width, 1.0)
+    if branches is None:
         return Change()
     return structure.split(leaf, [[leaf.members[i] for i in branch] for branch in branches], when)
+
+
+def _if_apart(
+    config: TreeConfig,
+    matrix: FloatArray,
+    groups: tuple[IntArray, IntArray] | None,
+    width: float,
+    share: float,
+) -> tuple[IntArray, IntArray] | None:
+    """Return two groups if they lie too far apart to be one motion, by a share of the limits."""
+    if (
+        groups is None
+        or mean_between(matrix, *groups) <= width
+        or separation(matrix, *groups) <= share * config.split_ratio
+        or gap(matrix, *groups) <= share * config.split_gap
+    ):
+        return None
+    return groups
+
+
+def _after_two(structure: Structure, leaf: Node) -> tuple[IntArray, IntArray] | None:
+    """Return the positions of the exemplars that came after either of two primitives.
+
+    None where those that are known came after one, or only once after another, or half as many as
+    after that after others; or where either of the two does not mostly lead on to the leaf: what
+    comes after it by chance differs by what came by chance. What follows its own kind is no
+    sequence.
+    """
+    homes = structure.homes([number - 1 for number in leaf.members])
+    kinds, counts = np.unique(homes[(homes != ROOT) & (homes != leaf.id)], return_counts=True)
+    if len(kinds) < 2:
+        return None
+    *others, second, first = np.argsort(counts, kind="stable").tolist()
+    if counts[second] < 2 or 2 * counts[others].sum() >= counts[second]:
+        return None
+    before = kinds[[first, second]].tolist()
+    for kind in before:
+        then = structure.homes([number + 1 for number in structure.nodes[kind].members])
+        if 2 * (then == leaf.id).sum() <= (then != ROOT).sum():
+            return None
+    return np.flatnonzero(homes == before[0]), np.flatnonzero(homes == before[1])
+
+
+def _with_the_nearer(
+    matrix: FloatArray, first: IntArray, second: IntArray
+) -> tuple[IntArray, IntArray]:
+    """Return two groups, each with those of the rest that are nearer to it on average."""
+    rest = np.setdiff1d(np.arange(len(matrix)), np.concatenate([first, second]))
+    to_first, to_second = (matrix[np.ix_(rest, group)].mean(axis=1) for group in (first, second))
+    nearer = to_first <= to_second
+    return np.union1d(first, rest[nearer]), np.union1d(second, rest[~nearer])
 
 
 def shed_outliers(structure: Structure, leaf: Node, when: int) -> Change:
