@@ -60,15 +60,17 @@ class KinematicPerformer(Performer):
 
     def __init__(self, repertoire: Repertoire, hold_s: float, body: Body = NOMINAL) -> None:
         super().__init__(repertoire, hold_s)
-        self._risk = risk_of(body)
-        self._draw, self._count = 0, 0
+        self._level_risk = risk_of(body)
+        self._embody(0)
+        self._count = 0
         self._sensors = Sensors(self.simulation)
         self._rest = self._arrive(rest_reference(self.simulation.robot), True)
         self._here = self._rest
 
     def reset(self, draw: int = 0) -> Measured:
         """Stand upright at rest, arms hanging; return how the robot stands."""
-        self._draw, self._count = draw, 0
+        self._embody(draw)
+        self._count = 0
         self._here = self._rest
         self.reference = self._rest.reference
         return self._rest.measured
@@ -106,10 +108,17 @@ class KinematicPerformer(Performer):
 
     def load_state(self, state: PerformerState) -> Measured:
         """Go on from there, from the reference where the state is a simulation's."""
-        self._draw, self._count = state.draw, state.n_performed
+        if state.draw != self._draw:
+            self._embody(state.draw)
+        self._count = state.n_performed
         self._here = self._arrive(state.reference)
         self.reference = state.reference
         return self._here.measured
+
+    def _embody(self, draw: int) -> None:
+        """Draw a body; the same number gives the same one."""
+        self._draw = draw
+        self._risk = None if self._level_risk is None else self._level_risk.of_body(draw)
 
     def _chanced(self, known: _Known, risk: FallRisk) -> Outcome:
         """Return the outcome, or a fall on the way, as luck will have it."""

@@ -2,8 +2,10 @@
 
 Kinematic dynamics have no contact, so a fall is a matter of chance there. Its hazard [1/s] is
 exp(w . strain), a proportional hazard as of [Cox1972], of what strains the balance: feet in the
-air, the zero-moment point near the edge of the soles, a fast COG, fast joints. The weights of each
-level are fitted to simulated random walks by `mplearn_envs.experiments.falls`.
+air, the zero-moment point near the edge of the soles, a fast COG, fast joints. Bodies of one level
+differ: each falls more or less often than the level's do at the mean, by a factor that is drawn
+with it (a frailty, [Vaupel1979]). Weights and spread of each level are fitted to simulated random
+walks by `mplearn_envs.experiments.falls`.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from .bodies import BODIES, NOMINAL, Body
 PATH = Path(__file__).parent / "falls.json"
 STRAINS = ("always", "one foot", "near the edge", "COG speed [m/s]", "joint speed [rad/s]")
 SAFE_M = 0.05  # from the edge of the soles
+_LEAST = 1e-9  # of these factors
 
 
 @dataclass(frozen=True)
@@ -33,9 +36,23 @@ class FallRisk:
 
     Attributes:
         weights: Of each of `STRAINS`.
+        spread: Variance of the factor by which bodies differ from that, whose mean is 1.
     """
 
     weights: tuple[float, ...]
+    spread: float = 0.0
+
+    def of_body(self, draw: int) -> FallRisk:
+        """Return the hazard of one body.
+
+        Args:
+            draw: Which; the same number gives the same body.
+        """
+        if self.spread == 0.0:
+            return self
+        rng = np.random.default_rng([draw, 3])
+        factor = max(float(rng.gamma(1.0 / self.spread, self.spread)), _LEAST)
+        return FallRisk((self.weights[0] + math.log(factor), *self.weights[1:]))
 
     def probability(self, strain: FloatArray, duration_s: float) -> float:
         """Return how likely the robot falls meanwhile.
@@ -71,11 +88,14 @@ def risk_of(body: Body) -> FallRisk | None:
     if body == NOMINAL:
         return None
     level = next(name for name, known in BODIES.items() if known == body)
-    return FallRisk(tuple(fitted()[level]))
+    return fitted()[level]
 
 
 @cache
-def fitted() -> Mapping[str, list[float]]:
-    """Return the weights of each level."""
-    weights: dict[str, list[float]] = json.loads(PATH.read_text("utf-8"))["weights"]
-    return weights
+def fitted() -> Mapping[str, FallRisk]:
+    """Return the risk of the bodies of each level."""
+    known = json.loads(PATH.read_text("utf-8"))
+    return {
+        level: FallRisk(tuple(weights), known["spread"][level])
+        for level, weights in known["weights"].items()
+    }

@@ -15,7 +15,7 @@ from pathlib import Path
 from mplearn_envs.execution.bodies import BODIES
 from mplearn_envs.execution.risk import PATH, STRAINS
 
-from .falls import falls_table, fit, of_levels
+from .falls import falls_table, fit, fit_spread, of_levels
 from .soak import read_soak, soak, table_of
 
 
@@ -49,9 +49,13 @@ def _falls(args: argparse.Namespace) -> None:
     of_level = of_levels(each for file in args.files for each in read_soak(file))
     print(falls_table(of_level).to_markdown())
     if args.write:
+        spread = {level: round(fit_spread(of), 4) for level, of in of_level.items()}
         kept = {
             "strains": STRAINS,
-            "weights": {level: fit(of).round(4).tolist() for level, of in of_level.items()},
+            "weights": {
+                level: fit(of, spread[level]).round(4).tolist() for level, of in of_level.items()
+            },
+            "spread": spread,
             "steps": {level: len(of.fallen) for level, of in of_level.items()},
             "falls": {level: int(of.fallen.sum()) for level, of in of_level.items()},
         }

@@ -7,7 +7,7 @@ from standing_library import standing_library
 from mplearn.errors import InvalidValueError
 from mplearn_envs.execution.risk import FallRisk, fitted
 from mplearn_envs.experiments.__main__ import main
-from mplearn_envs.experiments.falls import Trials, chances, fit, foretold
+from mplearn_envs.experiments.falls import Trials, _fitted, chances, fit, fit_spread, foretold
 from mplearn_envs.experiments.soak import SoakedEpisode, made, read_soak, soak, soaked, table_of
 
 WEIGHTS = np.array([-3.0, 1.5, 0.0, 4.0, 0.7])
@@ -33,6 +33,27 @@ def test_a_known_hazard_is_found_again():
     assert gentle == pytest.approx(chances(weights, seen)[0])
 
 
+def test_how_much_bodies_differ_is_found_again():
+    """Walks of up to 30 steps that end with a fall, each body with a factor of its own."""
+    rng, rows = np.random.default_rng(5), []
+    risk = FallRisk(tuple(WEIGHTS), spread=0.8)
+    for walk in range(1500):
+        seen, _ = trials(30, seed=walk + 100)
+        own = chances(np.array(risk.of_body(walk).weights), seen)
+        fallen = rng.random(30) < own
+        n = int(fallen.argmax()) + 1 if fallen.any() else 30
+        alive = Trials(seen.strain, seen.time_s, fallen, seen.kind, np.full(30, walk))
+        rows.append(alive.part(np.arange(30) < n))
+    walks = Trials(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
+    spread = fit_spread(walks)
+    assert spread == pytest.approx(0.8, abs=0.2)
+    assert fit(walks, spread)[0] == pytest.approx(WEIGHTS[0], abs=0.25)
+    assert fit(walks)[0] < fit(walks, spread)[0] - 0.3  # who still walks is robust
+    assert _fitted(walks, spread)[1] < _fitted(walks, 0.0)[1] - 20.0
+    alike, _ = trials(4000)
+    assert fit_spread(alike._replace(episode=np.arange(4000) // 3)) < 0.3
+
+
 def test_falls_of_primitives_never_seen_are_foretold_as_well_as_can_be():
     seen, chance = trials(8000, seed=3)
     well = foretold(seen)
@@ -55,10 +76,10 @@ def test_more_strain_is_never_said_to_help():
 
 def test_the_weights_that_are_shipped_are_of_the_levels():
     assert {"randomised", "harsh"} <= set(fitted())
-    assert all(len(weights) == 5 and min(weights[1:]) >= 0.0 for weights in fitted().values())
+    risk = fitted()
+    assert all(len(each.weights) == 5 and min(each.weights[1:]) >= 0.0 for each in risk.values())
     at_rest = np.array([1.0, 0, 0, 0, 0])
     on_one_foot = np.array([1.0, 1, 0, 0.03, 0.2])
-    risk = {name: FallRisk(tuple(weights)) for name, weights in fitted().items()}
     for strain in (at_rest, on_one_foot):
         assert risk["randomised"].probability(strain, 3.0) < risk["harsh"].probability(strain, 3.0)
     assert risk["harsh"].probability(at_rest, 3.0) < risk["harsh"].probability(on_one_foot, 3.0)
