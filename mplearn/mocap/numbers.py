@@ -23,7 +23,8 @@ MISSING = frozenset(
 """How tables write, in lower case, that there is no number."""
 _MISSING = re.compile(r"[-+]?(?:nan\(.*\)|\d\.?#(?:ind|qnan|snan)\d*)", re.IGNORECASE)  # C runtimes
 _FORTRAN = re.compile(r"[-+]?\d*\.?\d*[dD][-+]?\d{1,3}")  # 1.5D+03
-_THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:,\d{3})+\.\d+")  # 1,660.79
+# 1,660.79, 1.660,79, 1'660.79 and, as in French, with a blank
+_THOUSANDS = re.compile(r"[-+]?\d{1,3}([,.'\u2019\u00a0\u202f ])\d{3}(?:\1\d{3})*(?!\1)[.,]\d+")
 _LONGEST = 400  # characters of a cell; no number has more digits
 _NINES = re.compile(r"-?9{4,}(?:\.[09]*)?")
 
@@ -35,10 +36,17 @@ def says_missing(cell: str) -> bool:
 
 
 def plain_number(cell: str) -> str:
-    """Return a number as Python reads it: exponents of Fortran, commas between thousands."""
-    text = cell.strip()
-    if len(text) <= _LONGEST and _THOUSANDS.fullmatch(text):
-        return text.replace(",", "")
+    """Return a number as Python reads it.
+
+    Exponents may be Fortran's, thousands apart, and the minus that of typographers.
+
+    Example:
+        >>> plain_number("1.660,79"), plain_number("1.5D+03"), plain_number("\u22122")
+        ('1660.79', '1.5e+03', '-2')
+    """
+    text = cell.strip().replace("\u2212", "-")
+    if len(text) <= _LONGEST and (grouped := _THOUSANDS.fullmatch(text)):
+        return text.replace(grouped[1], "").replace(",", ".")
     if len(text) <= _LONGEST and _FORTRAN.fullmatch(text):
         return text.lower().replace("d", "e")
     return text

@@ -19,7 +19,11 @@ _HDF5 = (
     "its CSV instead: of DeepLabCut by analyze_videos_converth5_to_csv, of SLEAP by File > Export "
     "Analysis CSV or sleap-convert --format analysis.csv"
 )
-_EXPORTED = {".h5": _HDF5, ".hdf5": _HDF5, ".slp": _HDF5}  # what programs also write as a table
+_SENT = "it as a stream: mplearn learn --live ndjson:- < FILE"
+_EXPORTED = {  # what programs also write as a table, and what was sent
+    **dict.fromkeys((".h5", ".hdf5", ".slp"), _HDF5),
+    **dict.fromkeys((".ndjson", ".jsonl"), _SENT),
+}
 _TELLING = 256  # bytes, in which formats that name themselves do
 
 _registered: list[Reader] = []  # the latest is asked first
@@ -79,7 +83,7 @@ def suffixes() -> tuple[str, ...]:
 
 
 def instead_of(path: Path) -> str:
-    """Return what is read instead of a file that programs also write as a table; else nothing."""
+    """Return what is read instead of a file of another kind, by its suffix; else nothing."""
     return "" if suffix(path) in suffixes() else _EXPORTED.get(suffix(path), "")
 
 

@@ -194,9 +194,19 @@ def fortran(text: str) -> str:
     return re.sub(r"(\d)e([-+]\d)", r"\1D\2", text)
 
 
+def grouped(text: str, between: str) -> str:
+    """Decimal commas, and something else between thousands."""
+    text = text.replace(",", ";").replace(".", ",")
+    return re.sub(r"(\d)(\d{3},\d+)", rf"\1{between}\2", text)
+
+
 TABLES: dict[str, Change] = {
     "exponents of Fortran": fortran,
     "comma between thousands": lambda s: re.sub(r"(\d)(\d{3}\.\d+)", r'"\1,\2"', s),
+    "point between thousands": lambda s: grouped(s, "."),
+    "blank between thousands": lambda s: grouped(s, "\u202f"),
+    "minus of typographers": lambda s: s.replace(",-", ",\u2212"),
+    "times twice": lambda s: re.sub(r"(?m)^([^,\n]+),", r"\1,\1,", s),
     "separator named for Excel": lambda s: "sep=;\n" + s.replace(",", ";"),
     "names again at the end": lambda s: s + s.split("\n")[0] + "\n",
     "names again in between": lambda s: s.replace("\n0.4", f"\n{s.splitlines()[0]}\n0.4", 1),

@@ -161,7 +161,7 @@ class _Table:
 
 
 def _check_names(path: Path, columns: Columns) -> None:
-    special = {i for c in columns.markers.values() for i in c} | {*columns.frames}
+    special = {i for c in columns.markers.values() for i in c} | {*columns.frames, *columns.times}
     single = [name for i, name in enumerate(columns.names) if name and i not in special]
     unnamed = columns.nameless and not columns.markers
     if unnamed or (len(set(single)) != len(single) and not columns.doubled):

@@ -12,8 +12,8 @@ from pathlib import Path
 from ..files import bad_file
 from ..numbers import plain_number, says_missing
 
-_DECIMAL_COMMA = re.compile(r"\s*[-+]?\d+,\d+(e[-+]?\d+)?\s*", re.I)
-_DECIMAL_POINT = re.compile(r"\s*[-+]?\d*\.\d+(e[-+]?\d+)?\s*", re.I)
+_DECIMAL_COMMA = re.compile(r"\s*[-+\u2212]?\d+,\d+(e[-+]?\d+)?\s*", re.I)
+_DECIMAL_POINT = re.compile(r"\s*[-+\u2212]?\d*\.\d+(e[-+]?\d+)?\s*", re.I)
 _AXIS = re.compile(r"[xyz]\d*", re.I)
 _UNIT = re.compile(
     r"[\[(]?(mm|cm|m|meters?|millimeters?|s|sec|seconds|ms|deg|degrees|°|rad)[\])]?", re.I
