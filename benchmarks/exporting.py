@@ -49,7 +49,8 @@ def main() -> None:
             continue
         with tempfile.TemporaryDirectory() as folder:
             began = time.perf_counter()
-            paths = export(walks, model, format, Path(folder) / f"walks{format.suffix}")
+            place = Path(folder) / f"walks{format.suffix if format.many else ''}"
+            paths = export(walks, model, format, place)
             written = time.perf_counter() - began
             verdicts = [verdict for path in paths for verdict in check(path, model)]
             checked = time.perf_counter() - began - written

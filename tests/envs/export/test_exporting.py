@@ -11,6 +11,7 @@ import pytest
 from export_world import written
 from standing_library import standing_library
 
+from benchmarks import exporting
 from mplearn import open_recording
 from mplearn.errors import (
     InvalidValueError,
@@ -273,6 +274,14 @@ def test_many_motions_need_a_folder_and_get_names_of_their_own(tmp_path: Path) -
         assert not (tmp_path / name).exists()
     assert len(export(done.motions, model, format_of("mjlab"), tmp_path / "all.2")) == 3
     assert taken.read_text() == "mine"
+
+
+def test_the_benchmark_sends_walks_out_and_back(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["exporting", "--walks", "2", "--only", "unitree"])
+    exporting.main()
+    assert "9 of 9" in capsys.readouterr().out
 
 
 def test_a_format_of_ones_own_joins_by_a_line(
