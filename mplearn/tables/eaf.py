@@ -46,8 +46,13 @@ def as_document(table: SegmentTable) -> str:
     tiers: dict[str, list[int]] = {}
     for k, row in enumerate(table):
         tiers.setdefault(row.take, []).append(k)
+    names = {_legal(take) for take in tiers}
     for take, rows in tiers.items():
         take, person = _legal(take), _legal(table[rows[0]].person)
+        name_below = take + _DETAILS
+        while name_below in names:  # a take may be called so
+            name_below += _DETAILS
+        names.add(name_below)
         tier = Xml.SubElement(
             root, "TIER", LINGUISTIC_TYPE_REF="primitive", PARTICIPANT=person, TIER_ID=take
         )
@@ -57,7 +62,7 @@ def as_document(table: SegmentTable) -> str:
             LINGUISTIC_TYPE_REF="details",
             PARENT_REF=take,
             PARTICIPANT=person,
-            TIER_ID=take + _DETAILS,
+            TIER_ID=name_below,
         )
         for k in rows:
             aligned = Xml.SubElement(

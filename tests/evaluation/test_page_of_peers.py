@@ -1,5 +1,7 @@
 """The page that sets other libraries beside ours, on data whose answer is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -34,6 +36,13 @@ def test_what_is_planted_is_found_by_all(planted: Recording) -> None:
     for row in table.rows[:3]:
         assert float(row[3]) > 0.8, row
         assert row[-1].endswith(" MB")
+
+
+def test_a_take_of_one_activity_is_left_out_and_named(planted: Recording) -> None:
+    alone = replace(planted.sliced(0, 600), name="alone", labels=planted.labels[:1])
+    table = activity_peers_table([alone])
+    assert not table.rows
+    assert "alone (one activity" in table.note
 
 
 def test_boundaries_of_each_are_scored_alike() -> None:

@@ -70,6 +70,19 @@ ROWS = SegmentTable(
 )
 
 
+def test_tiers_of_elan_never_share_a_name(tmp_path: Path) -> None:
+    takes = ("walk details", "walk", "walk details details")
+    table = SegmentTable(
+        RecognisedSegment(take, 0.0, 1.0, 1, "step", "step", 0.1, 0.5) for take in takes
+    )
+    path = write_segments(table, tmp_path / "a.eaf")
+    assert read_segments(path) == table
+    eaf = Eaf(str(path))
+    assert len(eaf.get_tier_names()) == 6
+    parents = {eaf.get_parameters_for_tier(tier).get("PARENT_REF") for tier in eaf.get_tier_names()}
+    assert parents == {None, *takes}
+
+
 def test_elan_as_another_reader_sees_it(tmp_path: Path) -> None:
     path = write_segments(ROWS, tmp_path / "a.eaf")
     eaf = Eaf(str(path))

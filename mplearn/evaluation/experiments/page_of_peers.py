@@ -85,8 +85,12 @@ METHODS: dict[str, tuple[str, str, Partition]] = {
 
 def activity_peers_table(recordings: Iterable[Recording]) -> Table:
     """Find the activities of labelled recordings by each library that is installed."""
-    rows, left_out = [], []
-    found = [(each, observe(each)) for each in recordings if each.labels]
+    rows, left_out, found = [], [], []
+    for each in recordings:
+        if len({label.label for label in each.labels}) > 1:
+            found.append((each, observe(each)))
+        elif each.labels:
+            left_out.append(f"{each.name} (one activity: there is nothing to tell apart)")
     for name, (library, told, method) in METHODS.items():
         if library and find_spec(library) is None:
             left_out.append(f"{name} (not installed: pip install {library})")
