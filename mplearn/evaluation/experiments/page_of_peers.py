@@ -115,8 +115,8 @@ def activity_peers_table(recordings: Iterable[Recording]) -> Table:
                     f"{score.covering:.2f}",
                     f"{score.change_f1:.2f}",
                     f"{score.n_found} of {score.n_true}",
-                    f"{took_s:.1f} s",
-                    f"{peak / 2**20:.0f} MB",
+                    f"{took_s:.2g} s",
+                    f"{peak / 2**20:.1f} MB",
                 )
             )
     note = (
