@@ -128,8 +128,9 @@ class TreeConfig:
         split_gap: And when the smallest distance between them exceeds that to a second neighbour
             inside them, the median of it, by this.
         split_scale: And when the mean between them exceeds the median diameter of the other leaves
-            by this. Of two groups, each of which came after a primitive of its own that mostly
-            leads on to the leaf, two members each are enough, and from three on 0.8 of all three.
+            by this. Of two groups, each of which came right after, or before, a primitive of its
+            own that mostly comes with the leaf, two members each are enough, and from three on 0.8
+            of all three limits.
         min_branch: Members of each branch from which on it is one, where no sequence tells.
         merge_ratio: Two leaves that a segment lies in are merged when the distance between them is
             below that inside them times this; 0 for never.
@@ -139,7 +140,7 @@ class TreeConfig:
         n_candidates: Leaves, by mean trajectory, that are looked at closely; 0 to search down from
             the root, as printed.
         max_exemplars: Exemplars kept by a node; a leaf that has so many may be split, whatever
-            they came after.
+            they came beside.
         max_unplaced: Segments that wait in the root.
         n_sampled: Segments, of all ever seen, that mu and sigma are taken over.
         seed: Seed of the choice of those.

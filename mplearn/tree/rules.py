@@ -34,7 +34,7 @@ _FAR = 1e12  # farther than any two segments
 _AMONG = 10  # what waits and what is known: among few anything is somebody's nearest
 _BY_FAR = 1.2  # how many times as far the next is
 _PLAYED_BACK = 0.05  # over the scale: nobody hesitates again so exactly
-_IN_SEQUENCE = 0.8  # of what tells two motions apart, for those that come after two others
+_IN_SEQUENCE = 0.8  # of what tells two motions apart, for those that come beside two others
 _SURELY = 1 - 1e-9  # whatever a mean is rounded to
 _NEARER = 0.8  # of how far a part is from a whole: what it is a part of, at the most
 _WELL_INSIDE = 0.8  # of its radius
@@ -315,7 +315,7 @@ def split_mixed(structure: Structure, leaf: Node, when: int) -> Change:
 
     On average, by what is inside them and by how wide other leaves are; and with a break between
     them. Few exemplars look like two groups by chance, so the leaf must keep all that it may; but
-    not where its exemplars have come after two primitives, and each of the two groups after one.
+    not where they come after, or before, two primitives, and each of the two groups beside one.
 
     Args:
         structure: The tree.
@@ -324,17 +324,17 @@ def split_mixed(structure: Structure, leaf: Node, when: int) -> Change:
     """
     if leaf.whole or leaf.frozen:
         return Change()
-    after = _after_two(structure, leaf)
+    beside = _beside_two(structure, leaf)
     full = len(leaf.members) >= structure.config.max_exemplars
     width = structure.config.split_scale * structure.index.scale(but=leaf.id)
-    least = width if after is None else _IN_SEQUENCE * width
-    if not (full or after) or leaf.diameter <= _SURELY * least:  # without tempo nothing is farther
+    least = width if beside is None else _IN_SEQUENCE * width
+    if not (full or beside) or leaf.diameter <= _SURELY * least:  # without tempo nothing is farther
         return Change()
     matrix = structure.memory.bank.without_tempo(leaf.members, leaf.matrix)
     branches = None
-    if after is not None:
-        share = 1.0 if min(map(len, after)) == 2 else _IN_SEQUENCE
-        groups = _with_the_nearer(matrix, *after)
+    if beside is not None:
+        share = 1.0 if min(map(len, beside)) == 2 else _IN_SEQUENCE
+        groups = _with_the_nearer(matrix, *beside)
         branches = _if_apart(structure.config, matrix, groups, share * width, share)
     if branches is None and full:
         halves = two_branches(matrix, structure.config.min_branch)
@@ -362,27 +362,27 @@ def _if_apart(
     return groups
 
 
-def _after_two(structure: Structure, leaf: Node) -> tuple[IntArray, IntArray] | None:
-    """Return the positions of the exemplars that came after either of two primitives.
+def _beside_two(structure: Structure, leaf: Node) -> tuple[IntArray, IntArray] | None:
+    """Return the positions of the exemplars right after, or else right before, two primitives.
 
-    None where those that are known came after one, or only once after another, or half as many as
-    after that after others; or where either of the two does not mostly lead on to the leaf: what
-    comes after it by chance differs by what came by chance. What follows its own kind is no
+    None where those that are known came beside one, or only once beside another, or half as many as
+    beside that beside others; or where either of the two does not mostly come with the leaf: what
+    comes beside it by chance differs by what came by chance. What follows its own kind is no
     sequence.
     """
-    homes = structure.homes([number - 1 for number in leaf.members])
-    kinds, counts = np.unique(homes[(homes != ROOT) & (homes != leaf.id)], return_counts=True)
-    if len(kinds) < 2:
-        return None
-    *others, second, first = np.argsort(counts, kind="stable").tolist()
-    if counts[second] < 2 or 2 * counts[others].sum() >= counts[second]:
-        return None
-    before = kinds[[first, second]].tolist()
-    for kind in before:
-        then = structure.homes([number + 1 for number in structure.nodes[kind].members])
-        if 2 * (then == leaf.id).sum() <= (then != ROOT).sum():
-            return None
-    return np.flatnonzero(homes == before[0]), np.flatnonzero(homes == before[1])
+    for step in (-1, 1):
+        homes = structure.homes([number + step for number in leaf.members])
+        kinds, counts = np.unique(homes[(homes != ROOT) & (homes != leaf.id)], return_counts=True)
+        if len(kinds) < 2:
+            continue
+        *others, second, first = np.argsort(counts, kind="stable").tolist()
+        if counts[second] < 2 or 2 * counts[others].sum() >= counts[second]:
+            continue
+        beside = kinds[[first, second]].tolist()
+        back = [structure.homes([n - step for n in structure.nodes[id].members]) for id in beside]
+        if all(2 * (here == leaf.id).sum() > (here != ROOT).sum() for here in back):
+            return np.flatnonzero(homes == beside[0]), np.flatnonzero(homes == beside[1])
+    return None
 
 
 def _with_the_nearer(
