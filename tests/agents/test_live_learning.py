@@ -257,8 +257,12 @@ def test_the_first_wish_to_stop_is_noted_and_the_second_interrupts() -> None:
     assert signal.getsignal(signal.SIGINT) is before
 
 
+@pytest.mark.parametrize("as_json", [True, False])
 def test_a_learner_slower_than_the_stream_misses_nothing(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    as_json: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     n = 2 * CAPACITY  # a receiver by itself drops what comes once so many wait as half of these
     sent = threading.Event()
@@ -288,9 +292,15 @@ def test_a_learner_slower_than_the_stream_misses_nothing(
 
     sending = threading.Timer(0.5, send)
     sending.start()
-    command = ["learn", "--live", address, "--json", "--seconds", f"{0.75 * n / 100.0}"]
+    command = ["learn", "--live", address, "--seconds", f"{0.75 * n / 100.0}"]
+    command += ["--json"] if as_json else []
     assert main([*command, "--out", str(tmp_path / "x.mplearn")]) == 0
     sending.join()
+    if not as_json:
+        said = capsys.readouterr().out
+        assert "frames that had come were not learned when it ended" in said
+        assert "overrun" not in said
+        return
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert lines[-1]["overrun"] == 0
     assert lines[-1]["frames"] + lines[-1]["lost"] + lines[-1]["unread"] > CAPACITY

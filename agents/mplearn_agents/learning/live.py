@@ -260,6 +260,7 @@ def _report(
     if log.life is None or log.learner is None:
         told = ", ".join(f"{n} {name}" for name, n in faults.items()) or "nothing came"
         raise RecordingError(f"nothing could be learned from {source.name}: {told}")
+    unread = faults.pop("unread", 0)
     library = log.life.snapshot()
     kept = keep(log.life, library, out=args.out, store=args.store)
     if kept.problem:
@@ -293,6 +294,8 @@ def _report(
     if faults:
         told = ", ".join(f"{n} {name}" for name, n in faults.items())
         console.print(f"frames and packets that were not as they should be: {told}", markup=False)
+    if unread:
+        console.print(f"{unread} frames that had come were not learned when it ended")
     if log.lost_s:
         console.print(f"nothing was learned from {log.lost_s:.1f} s", markup=False)
     return NOT_KEPT if kept.problem else 0
