@@ -399,9 +399,7 @@ def shed_outliers(structure: Structure, leaf: Node, when: int) -> Change:
     """Let a leaf keep its core only where it is wider than motions lie apart.
 
     While little was known its radius reached other motions, which it took in. What is no part of
-    its largest cluster, and lies off that by a gap, waits again to become what it is; or is a
-    primitive of its own at once where it stands for others that went for want of room: it has come
-    before.
+    its largest cluster, and lies off that by a gap, waits again to become what it is.
     """
     config, limit = structure.config, structure.memory.valley()
     if leaf.whole or leaf.frozen or leaf.diameter <= limit:
@@ -416,14 +414,7 @@ def shed_outliers(structure: Structure, leaf: Node, when: int) -> Change:
     outliers = [leaf.members[i] for group in away for i in group]
     if not outliers:
         return Change()
-    stood_for = {number: leaf.stood_for.get(number, (0, 0)) for number in outliers}
-    change = structure.shed(leaf, outliers).then(form_primitives(structure, structure.root, when))
-    for number, (n, n_frames) in stood_for.items():
-        if n and 1 + n >= structure.least and number in structure.root.members:
-            child = structure.child(structure.root, [number], when)
-            structure.pass_on(leaf, child, number, n, n_frames)
-            change = change.then(Change(born=(child.id,), moved=((number, child.id),)))
-    return change
+    return structure.shed(leaf, outliers).then(form_primitives(structure, structure.root, when))
 
 
 def merge_duplicates(structure: Structure, matches: Sequence[Match], when: int) -> Change:

@@ -8,7 +8,6 @@ import pytest
 
 from mplearn.tree import ROOT, PrimitiveTree, TreeConfig
 from mplearn.tree.exemplars.neighbours import Neighbours
-from mplearn.tree.rules import shed_outliers
 
 RATE_HZ, T = 50.0, 40
 BUMP = np.sin(np.linspace(0, np.pi, T))[:, None]
@@ -104,44 +103,6 @@ def test_a_frozen_leaf_or_one_that_a_person_made_sheds_nothing() -> None:
     assert set(tree.node(frozen).members) == seen
     kept = set(tree.node(first).members)
     assert tree.node(first).whole and (both <= kept or len(kept) == tree.config.max_exemplars)
-
-
-@pytest.mark.parametrize("n", [0, 1, 2])
-def test_what_is_shed_is_a_primitive_at_once_if_it_came_before(
-    n: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The others of its kind went for want of room; it waited for another, though it was known."""
-    rng = np.random.default_rng(2)
-    tree = PrimitiveTree(replace(TreeConfig(), min_exemplars=3), 2, RATE_HZ)
-    for _ in range(4):
-        for kind in ((1.0, 0.0), (0.0, 2.0), (-3.0, 1.0)):
-            tree.insert(BUMP * (np.array(kind) + rng.normal(0, 0.05, 2)))
-    outlier = tree.insert(BUMP * (1.0, 1.0)).number
-    structure, wide = tree._structure, tree.node(tree.leaves[0])
-    within = wide.diameter
-    structure.take_in(wide, [outlier])
-    if n:
-        wide.stand_for(outlier, n, n * T)
-        wide.n_placed, wide.n_frames = wide.n_placed + n, wide.n_frames + n * T
-    counted = wide.n_placed, wide.n_frames
-    monkeypatch.setattr(tree._memory, "valley", lambda: 1.5 * within)
-    known = tree.leaves
-    change = shed_outliers(structure, wide, tree.n_seen)
-    assert (outlier, ROOT) in change.moved and len(wide.members) == 4
-    assert tree.leaves == (*known, *change.born)
-    if 1 + n < tree.config.min_exemplars:
-        assert not change.born and outlier in tree.node(ROOT).members
-        return
-    (new,) = change.born
-    assert (tree.node(new).members, tree.node(new).stood_for) == ([outlier], {outlier: (n, n * T)})
-    here, there = tree.node(new), wide
-    assert (here.n_placed + there.n_placed, here.n_frames + there.n_frames) == counted
-    monkeypatch.undo()
-    again = PrimitiveTree(tree.config, 2, RATE_HZ)
-    again.load_state(tree.state())
-    for each in (tree, again):
-        placed = each.insert(BUMP * (1.01, 1.0))
-        assert placed.recognised and placed.node_id == new
 
 
 def test_near_copies_change_no_scale() -> None:

@@ -147,12 +147,6 @@ class Structure:
         self._note(leaf)
         return Change(moved=tuple((number, ROOT) for number in numbers))
 
-    def pass_on(self, leaf: Node, heir: Node, number: int, n: int, n_frames: int) -> None:
-        """Count for another leaf what went from a leaf, and an exemplar of that one stands for."""
-        heir.stand_for(number, n, n_frames)
-        leaf.n_placed, heir.n_placed = leaf.n_placed - n, heir.n_placed + n
-        leaf.n_frames, heir.n_frames = leaf.n_frames - n_frames, heir.n_frames + n_frames
-
     def split(self, leaf: Node, groups: Sequence[Sequence[int]], when: int) -> Change:
         """Form a leaf of each group of a leaf's exemplars; it becomes the node above them."""
         leaf.history.append(("split", when))
