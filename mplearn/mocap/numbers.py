@@ -24,7 +24,9 @@ MISSING = frozenset(
 _MISSING = re.compile(r"[-+]?(?:nan\(.*\)|\d\.?#(?:ind|qnan|snan)\d*)", re.IGNORECASE)  # C runtimes
 _FORTRAN = re.compile(r"[-+]?\d*\.?\d*[dD][-+]?\d{1,3}")  # 1.5D+03
 # 1,660.79, 1.660,79, 1'660.79 and, as in French, with a blank
-_THOUSANDS = re.compile(r"[-+]?\d{1,3}([,.'\u2019\u00a0\u202f ])\d{3}(?:\1\d{3})*(?!\1)[.,]\d+")
+_THOUSANDS = re.compile(
+    r"[-+]?[1-9]\d{0,2}([,.'\u2019\u00a0\u202f ])\d{3}(?:\1\d{3})*(?!\1)[.,]\d+"
+)
 _LONGEST = 400  # characters of a cell; no number has more digits
 _NINES = re.compile(r"-?9{4,}(?:\.[09]*)?")
 

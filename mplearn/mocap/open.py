@@ -348,10 +348,8 @@ def _named(path: Path, folder: Path) -> str:
 def _nothing_readable(path: Path) -> RecordingError:
     what = "an archive" if is_archive(path) else "a folder"
     found = f"{path}: {what} with nothing readable; expected files named {', '.join(suffixes())}"
-    inside: list[str]
-    _, inside, _ = next(os.walk(path), ("", [], []))  # nothing where it may not be read
-    if inside:
-        few = ", ".join(sorted(inside)[:3]) + (", ..." if len(inside) > 3 else "")
+    if inside := folders_of_recordings(path):
+        few = ", ".join(inside[:3]) + (", ..." if len(inside) > 3 else "")
         found = f"{found} (what is in folders of it, {few}, is found by {option('jobs')})"
     return NothingReadableError(found)
 
@@ -472,6 +470,10 @@ def _read_each(
         return each_person(_read(take, rate_hz, positions, hints))
     (file,) = take.files
     found = _read_by(take.reader.read_each, file, hints, positions)
+    if not isinstance(found, tuple) or not found:
+        what = "()" if isinstance(found, tuple) else f"a value of type {type(found).__name__}"
+        name = type(take.reader).__name__
+        raise RecordingError(f"{file}: {name}.read_each returned {what}, not a tuple of recordings")
     apart = [_whole(take, [_part(take, file, one, hints)], rate_hz, hints) for one in found]
     return tuple(each for one in apart for each in each_person(one))
 

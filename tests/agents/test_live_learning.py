@@ -1,6 +1,7 @@
 """Learning live on the command line: events as they come, an orderly end, a sender."""
 
 import asyncio
+import errno
 import json
 import os
 import signal
@@ -26,6 +27,7 @@ from mplearn.sources.sending import open_sender
 from mplearn.store import LifelongLearner
 from mplearn_agents.cli import main
 from mplearn_agents.learning.live import SOURCES, learn_live
+from mplearn_agents.learning.waiting import waiting_for_learner
 from mplearn_agents.terminal.event_lines import change_text
 from mplearn_agents.terminal.interrupts import asked_to_stop, python_interrupts
 
@@ -218,6 +220,44 @@ class Breaking(Source):
 
     def close(self) -> None:
         pass
+
+
+class Torn(Breaking):
+    """Shows a recording, and then raises what sources of ours do not."""
+
+    def read(self, timeout_s: float | None = None) -> list[Block | Change]:
+        if len(self._blocks) < 2:
+            raise OSError(errno.EIO, "input or output", "camera")
+        return super().read(timeout_s)
+
+
+def test_whatever_a_source_raises_what_was_learned_is_kept(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    torn = Torn(demonstrate(["BAR", "BAL"] * 3, seed=2).recording)
+    monkeypatch.setattr("mplearn.sources.open_source", lambda *_, **__: torn)
+    path = tmp_path / "not" / "yet" / "live.mplearn"  # where frames wait meanwhile
+    assert main(["learn", "--live", "mine", "--out", str(path)]) == 2
+    told = capsys.readouterr()
+    assert "camera: input or output" in told.err
+    assert "what was learned before is written" in told.out
+    assert len(PrimitiveLibrary.load(path)) > 0
+
+
+def test_frames_wait_in_the_next_folder_that_is_there(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("mplearn.sources.buffered._IN_MEMORY_BYTES", 0)
+    recording = demonstrate(["BAR"], seed=2).recording
+    torn = Torn(recording)
+    with waiting_for_learner(torn, beside=tmp_path / "not" / "yet" / "a.mplearn") as read:
+        items = read.read(10.0)
+        with pytest.raises(OSError, match="input or output"):
+            while True:
+                items += read.read(10.0)
+    (block,) = items  # nothing is said of files that cannot be written
+    assert isinstance(block, Block)
+    assert np.array_equal(block.frames, recording.frames, equal_nan=True)
 
 
 def test_what_was_learned_before_a_source_broke_is_kept(

@@ -152,6 +152,29 @@ def test_several_animals_that_are_seen_often_are_a_take_each(tmp_path: Path) -> 
     assert [each.person for each in take.read(hints=hints)] == ["b", "a"]
 
 
+@pytest.mark.parametrize("apart", [False, True])
+def test_tracks_that_come_one_after_the_other_are_read(tmp_path: Path, apart: bool) -> None:
+    points = mouse(4.0)[:150]
+    flat = points.reshape(len(points), -1)
+    starts = {"first": 0, "second": 150, "third": 100_000 if apart else 300}
+    rows = [
+        ",".join([track, f"{start + k}", *(f"{value:.4f}" for value in flat[k])])
+        for track, start in starts.items()
+        for k in range(len(flat))
+    ]
+    rows.append(",".join(["stray", "1e9", *map(str, flat[0])]))  # costs no other
+    columns = ["track", "frame_idx", *(f"{name}.{axis}" for name in NAMES for axis in "xy")]
+    path = tmp_path / "tracks.analysis.csv"
+    path.write_text("\n".join([",".join(columns), *rows, ""]))
+    found = open_recordings(path, hints=Hints(rate_hz=RATE_HZ))
+    assert [each.person for each in found] == list(starts)
+    assert [len(each) for each in found] == ([150] * 3 if apart else [150, 300, 450])
+    assert ("pictures far apart" in " ".join(found[0].report.notes)) == apart
+    for each in found:
+        assert np.isfinite(each.frames[-150:]).all()
+        assert each.report.left_out == ("stray",)
+
+
 def test_an_animal_that_cannot_be_read_costs_no_other(tmp_path: Path) -> None:
     points = mouse(4.0)
     values = np.concatenate([points, np.full((*points.shape[:2], 1), 0.99)], axis=2)

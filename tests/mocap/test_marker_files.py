@@ -345,6 +345,16 @@ def test_csv_with_times_labels_segments_and_a_person(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize("separator", [";", "\t", ","])
+def test_points_are_between_thousands_of_whole_numbers_too(tmp_path: Path, separator: str) -> None:
+    rows = [("time", "load"), *((f"0,{k:02}", "999,5") for k in range(50)), ("0,50", "1.013")]
+    path = tmp_path / "a.csv"
+    for last, whole in (("1.013,5", 1013.0), ("999,5", 1.013)):  # nothing else tells
+        cells = [[f'"{cell}"' for cell in row] for row in (*rows, ("0,51", last))]
+        path.write_text("\n".join(separator.join(row) for row in cells) + "\n")
+        assert open_recording(path).frames[[0, 50], 0].tolist() == [999.5, whole]
+
+
 def test_csv_of_angles_with_semicolons_and_quotes(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text('knee; hip ;"label"\n0.5;1;"down; slowly"\n;2;up\n')
@@ -414,7 +424,9 @@ def test_unknown_suffix_and_unreadable_folders(tmp_path: Path) -> None:
         (tmp_path / name).unlink()
     with pytest.raises(RecordingError, match=rf"{re.escape(str(tmp_path))}.*nothing readable"):
         open_recordings(tmp_path)
-    (tmp_path / "anna").mkdir()
+    for folder in ("anna", "notes"):
+        (tmp_path / folder).mkdir()
+    write_csv(tmp_path / "anna" / "walk.csv")
     with pytest.raises(RecordingError, match=r"in folders of it, anna, is found by find_takes"):
         open_recordings(tmp_path)
     with pytest.raises(RecordingError, match="no such file or folder"):

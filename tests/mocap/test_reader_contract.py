@@ -124,6 +124,16 @@ def test_a_reader_that_returns_no_recording_is_named(tmp_path: Path) -> None:
         def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
             return np.zeros((2, 1))  # type: ignore[return-value]
 
+    class Silent(ShoutReader):
+        suffixes = (".silent",)
+
+        def read_each(self, path: Path, hints: Hints, *, positions: bool) -> tuple[Recording, ...]:
+            return ()
+
+    register_reader(Silent())
+    (tmp_path / "a.silent").write_text("1\n2\n")
+    with pytest.raises(RecordingError, match=r"Silent\.read_each returned \(\), not a tuple of"):
+        open_recordings(tmp_path / "a.silent")
     register_reader(Careless())
     (tmp_path / "a.careless").write_text("1\n2\n")
     with pytest.raises(RecordingError, match=r"Careless\.read returned a value of type ndarray"):

@@ -13,7 +13,7 @@ from pathlib import Path
 from threading import Event as Flag
 from typing import TYPE_CHECKING, Any
 
-from mplearn.errors import MPLearnError, RecordingError
+from mplearn.errors import RecordingError
 from mplearn_agents.learning.keeping import keep, say_unkept
 from mplearn_agents.learning.pauses import short_pauses
 from mplearn_agents.recordings.reading import hints_of
@@ -135,7 +135,7 @@ def learn_from_source(
                         store=args.store,
                         log=log,
                     )
-            except MPLearnError as error:
+            except Exception as error:  # of a source of somebody else, or where lines are told
                 if log.life is not None:
                     kept = keep(log.life, log.life.snapshot(), out=args.out, store=args.store)
                     if kept.paths:

@@ -26,12 +26,14 @@ def waiting_for_learner(
     Args:
         source: The stream.
         speed: Times as fast as in time that it comes.
-        beside: File in whose folder it waits; the system's place for such, where None.
+        beside: File in whose folder, or the next above that is there, it waits; the system's
+            place for such, where None.
         arrived: See `mplearn.sources.BufferedSource`.
     """
     if speed == math.inf:
         return BufferedSource(source, most_bytes=_READ_AHEAD, arrived=arrived)
     if source.name.startswith("ndjson:"):
         return BufferedSource(source, most_bytes=_HELD_UP, arrived=arrived)
-    folder = None if beside is None else beside.absolute().parent
+    above = () if beside is None else beside.absolute().parents
+    folder = next((each for each in above if each.is_dir()), None)
     return BufferedSource(source, folder=folder, arrived=arrived)

@@ -194,13 +194,28 @@ def _flat(path: Path, hints: Hints, findings: Findings) -> _Animals:
     seen: Counter[str] = Counter()
     for track, n_values in zip(who, np.isfinite(values).sum(axis=1).tolist(), strict=True):
         seen[track] += n_values
-    begins, _ = _span(path, at)  # of all: what is done at once has the same time
+    rows: dict[str, list[int]] = {}
+    for k, track in enumerate(who):
+        rows.setdefault(track, []).append(k)
+    nodes = [row[head.node] if head.node is not None else "" for row in body]
+    most = 10 * values.size + 100_000  # numbers that tables may hold
+
+    def begins_at_once() -> bool:
+        """Whether all tables can begin with the file's first frame."""
+        whole = len(at) and at.min() >= 0 and (at == np.rint(at)).all()
+        width = {each: len(coords) * len({nodes[k] for k in rows[each]}) for each in _often(seen)}
+        return bool(whole) and most >= sum(
+            (at[rows[each]].max() - at.min() + 1) * n for each, n in width.items()
+        )
+
+    begins = at.min() if begins_at_once() else None  # what is done at once has the same time
+    if begins is None and len(rows) > 1:
+        findings.note("pictures far apart: each animal's begin with the first that it is seen in")
 
     def track_of(animal: str) -> Track:
-        own = [k for k, track in enumerate(who) if track == animal]
-        nodes = [body[k][head.node] for k in own] if head.node is not None else [""] * len(own)
-        most = 10 * values.size + 100_000
-        table, place = _by_node(path, at[own], values[own], nodes, begins, most)
+        own = rows[animal]
+        of_node = [nodes[k] for k in own]
+        table, place = _by_node(path, at[own], values[own], of_node, begins, most)
         points: dict[str, dict[str, int]] = {}
         for node, begin in place.items():
             for k, (point, coord) in enumerate(coords):
@@ -224,7 +239,12 @@ def _named_rows(path: Path, findings: Findings) -> tuple[_Head, list[int], list[
 
 
 def _by_node(
-    path: Path, at: FloatArray, values: FloatArray, nodes: list[str], first: int, most: int
+    path: Path,
+    at: FloatArray,
+    values: FloatArray,
+    nodes: list[str],
+    begins: float | None,
+    most: int,
 ) -> tuple[FloatArray, dict[str, int]]:
     """Return a table with a row for each frame, and the first column of each node in it.
 
@@ -233,10 +253,11 @@ def _by_node(
         at: The frame of each row, shape (R,).
         values: The rows, shape (R, K).
         nodes: The node that each is of.
-        first: The table's first frame.
+        begins: The table's first frame; that of the first row where None.
         most: Numbers that the table may hold.
     """
-    _, last = _span(path, at)
+    first, last = _span(path, at)
+    first = first if begins is None else int(begins)
     n_values = values.shape[1]
     place = {node: n_values * j for j, node in enumerate(dict.fromkeys(nodes))}
     n_frames, n_columns = last - first + 1, n_values * len(place)
@@ -327,6 +348,12 @@ def _rate(path: Path, hints: Hints, findings: Findings) -> float:
     return rate_hz
 
 
+def _often(seen: Mapping[str, int]) -> list[str]:
+    """Return who was seen at least half as often as the one seen most."""
+    least = _OFTEN * max(seen.values(), default=0)
+    return [each for each, n_seen in seen.items() if n_seen >= least]
+
+
 @dataclass(frozen=True)
 class _Animals:
     """The animals in a file.
@@ -355,8 +382,7 @@ class _Animals:
 
     def seen_often(self) -> tuple[Recording, ...]:
         """Return all animals that were seen at least half as often as the one seen most."""
-        most = max(self.seen.values())
-        often = [each for each, n_seen in self.seen.items() if n_seen >= _OFTEN * most]
+        often = _often(self.seen)
         if len(often) == 1:
             return (self.seen_most(),)
         found, problems = {}, {}
@@ -367,16 +393,21 @@ class _Animals:
                 problems[animal] = error
         if not found:
             raise next(iter(problems.values()))
+        names = ", ".join(who or "one unnamed" for who in found)
         self.findings.note(
-            f"{len(found)} animals: {', '.join(found)}; each is a take of its own "
+            f"{len(found)} animals: {names}; each is a take of its own "
             f"({option('person')} picks one)"
+            if len(found) > 1
+            else f"of {len(self.seen)} animals the one that can be read: {names}"
         )
         self.findings.leave_out(each for each in self.seen if each not in found)
         for animal, problem in problems.items():
-            self.findings.warn(f"{animal} is left out: {problem}")
-        name = stem(self.path)
+            self.findings.warn(f"{animal or 'one unnamed'} is left out: {problem}")
+        name, several = stem(self.path), len(found) > 1
         return tuple(
-            self._recording(seen, who, f"{name} ({who})", deepcopy(self.findings))
+            self._recording(
+                seen, who, f"{name} ({who})" if who and several else name, deepcopy(self.findings)
+            )
             for who, seen in found.items()
         )
 

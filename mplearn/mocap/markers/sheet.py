@@ -14,6 +14,10 @@ from ..numbers import plain_number, says_missing
 
 _DECIMAL_COMMA = re.compile(r"\s*[-+\u2212]?\d+,\d+(e[-+]?\d+)?\s*", re.I)
 _DECIMAL_POINT = re.compile(r"\s*[-+\u2212]?\d*\.\d+(e[-+]?\d+)?\s*", re.I)
+_THOUSANDS = r"[-+\u2212]?[1-9]\d{0,2}(?:\.\d{3})+"  # 1.660, of a table with 1.660,79, too
+_WHOLE_THOUSANDS = re.compile(rf"\s*{_THOUSANDS}\s*")
+_POINTS_FIRST = re.compile(rf"(?<![^\s;|\"]){_THOUSANDS},\d+(?![^\s;|\"])")
+_POINTS_FIRST_QUOTED = re.compile(rf"\"\s*{_THOUSANDS},\d+\s*\"")
 _AXIS = re.compile(r"[xyz]\d*", re.I)
 _UNIT = re.compile(
     r"[\[(]?(mm|cm|m|meters?|millimeters?|s|sec|seconds|ms|deg|degrees|°|rad)[\])]?", re.I
@@ -55,6 +59,7 @@ class Sheet:
         lines: Its lines.
         separator: What separates cells; empty for white space.
         decimal_comma: Whether numbers have a decimal comma.
+        points_apart: Whether thousands are apart by points, of whole numbers, too.
         cut_off: Whether the last line has no end.
         triples: Columns whose cells hold three numbers, ``[0.1, 0.2, 1.7]``: they count as three.
     """
@@ -63,6 +68,7 @@ class Sheet:
     lines: list[str]
     separator: str
     decimal_comma: bool
+    points_apart: bool = False
     cut_off: bool = False
     triples: frozenset[int] = frozenset()
 
@@ -88,7 +94,10 @@ class Sheet:
         points = sum(bool(_DECIMAL_POINT.fullmatch(cell)) for cell in cells)
         triples = {i for row in some_rows for i, cell in enumerate(row) if _three(cell)}
         cut_off = bool(text) and text[-1] not in "\r\n"
-        return cls(path, lines, separator, commas > points, cut_off, frozenset(triples))
+        apart = _POINTS_FIRST_QUOTED if separator == "," else _POINTS_FIRST
+        points_apart = any("," in cell for cell in cells) and apart.search(text) is not None
+        comma = commas > points
+        return cls(path, lines, separator, comma, points_apart, cut_off, frozenset(triples))
 
     def cells(self, line: int) -> list[str]:
         """Return the cells of a line, counted from 0.
@@ -126,11 +135,16 @@ class Sheet:
     def rows(self, start: int, stop: int | None = None) -> Iterator[tuple[int, list[str]]]:
         """Yield the rows that hold anything, each with the number of its line, from 1.
 
-        Decimal commas are points in them.
+        Decimal commas are points in them, and points between thousands left out.
         """
         for line in range(start, len(self.lines) if stop is None else stop):
             cells = self.cells(line)
             if any(cells) and any(cell.strip() for cell in cells):
+                if self.points_apart:
+                    cells = [
+                        cell.replace(".", "") if _WHOLE_THOUSANDS.fullmatch(cell) else cell
+                        for cell in cells
+                    ]
                 if self.decimal_comma:
                     cells = [
                         cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell
