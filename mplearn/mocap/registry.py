@@ -20,10 +20,8 @@ _HDF5 = (
     "Analysis CSV or sleap-convert --format analysis.csv"
 )
 _SENT = "it as a stream: mplearn learn --live ndjson:- < FILE"
-_EXPORTED = {  # what programs also write as a table, and what was sent
-    **dict.fromkeys((".h5", ".hdf5", ".slp"), _HDF5),
-    **dict.fromkeys((".ndjson", ".jsonl"), _SENT),
-}
+_EXPORTED = dict.fromkeys((".h5", ".hdf5", ".slp"), _HDF5)  # what programs also write as a table
+_LINES = dict.fromkeys((".ndjson", ".jsonl"), _SENT)  # what was sent, or a journal of anything
 _TELLING = 256  # bytes, in which formats that name themselves do
 
 _registered: list[Reader] = []  # the latest is asked first
@@ -83,7 +81,7 @@ def suffixes() -> tuple[str, ...]:
 
 
 def instead_of(path: Path) -> str:
-    """Return what is read instead of a file of another kind, by its suffix; else nothing."""
+    """Return what is read instead of a file that is also written as a table; else nothing."""
     return "" if suffix(path) in suffixes() else _EXPORTED.get(suffix(path), "")
 
 
@@ -119,7 +117,9 @@ def reader_for(path: Path) -> Reader:
         fitting = [r for r in readers() if suffix(path) in r.suffixes]
         if not fitting:
             read_bytes(path)  # tells what was saved instead of a recording
-            expected = instead_of(path) or f"one of {', '.join(suffixes())}"
+            expected = (
+                instead_of(path) or _LINES.get(suffix(path)) or f"one of {', '.join(suffixes())}"
+            )
             raise bad_file(path, f"unknown suffix {suffix(path)!r}", expected)
         found = fitting[-1]
     return found

@@ -420,6 +420,9 @@ def test_unknown_suffix_and_unreadable_folders(tmp_path: Path) -> None:
         assert list(open_takes(tmp_path).unreadable) == [name]
         table.rename(tmp_path / "mouse.analysis.csv")  # as it is exported
         assert not open_takes(tmp_path).unreadable
+        (tmp_path / "journal.jsonl").write_text("{}\n")  # as shards have, and anybody
+        assert not open_takes(tmp_path).unreadable
+        (tmp_path / "journal.jsonl").unlink()
         (tmp_path / "mouse.analysis.csv").unlink()
         (tmp_path / name).unlink()
     with pytest.raises(RecordingError, match=rf"{re.escape(str(tmp_path))}.*nothing readable"):
