@@ -42,6 +42,7 @@ OUT_OF_REACH = 1e-3  # [m, rad]: an error that slowing down does not mend
 _TRIES, _MORE_TRIES = 6, 3
 _SLOWEST = 0.6  # of the pace is tried next, at least
 _ENOUGH_M = 1e-3  # a margin that falls short by less is enough
+_CALMS_S = 1.0  # in which the robot comes to rest where it is, if it does not come home at once
 _AT_HOME = 1e-3  # so near to where it stands at rest the robot stands there [m, rad]
 
 
@@ -149,17 +150,7 @@ class Planner:
 
     def hold(self, start: Reference, duration_s: float) -> Plan:
         """Return the commands that come to rest in the present posture, on one foot or on two."""
-        here = np.clip(start.target, *self._reference.limits.T)
-        footwork = None
-        if start.lifted >= 0:
-            legs, rise = start.swing[:-2], start.swing[-2:]
-            lifts = (Lift(start.lifted, -1, 2),)
-            footwork = Footwork(
-                np.stack((legs, legs)), np.stack((rise, rise)), np.zeros((2, 3)), lifts
-            )
-        stance = Stance(left_from_right(start.ground), np.stack((start.heel, start.heel)))
-        motion = Motion(np.stack((here, here)), 1.0 / duration_s, footwork, stance=stance)
-        return self.plan(start, motion, 1.0, ("hold", duration_s))
+        return self.plan(start, self._held(start, duration_s), 1.0, ("hold", duration_s))
 
     def home(self, start: Reference) -> Plan:
         """Return the commands after which the robot stands at rest, as it did at first.
@@ -177,15 +168,30 @@ class Planner:
             self._cache.put(full_key, plan)
         return plan
 
+    def _held(self, start: Reference, duration_s: float) -> Motion:
+        """Return the motion of who stays as the robot is."""
+        here = np.clip(start.target, *self._reference.limits.T)
+        footwork = None
+        if start.lifted >= 0:
+            legs, rise = start.swing[:-2], start.swing[-2:]
+            lifts = (Lift(start.lifted, -1, 2),)
+            footwork = Footwork(
+                np.stack((legs, legs)), np.stack((rise, rise)), np.zeros((2, 3)), lifts
+            )
+        stance = Stance(left_from_right(start.ground), np.stack((start.heel, start.heel)))
+        return Motion(np.stack((here, here)), 1.0 / duration_s, footwork, stance=stance)
+
     def _home(self, start: Reference) -> Plan:
         plans = []
         if start.lifted >= 0:
             plans.append(self._plan_one(start, self._restance.lowered(start), 1.0)[0])
             start = plans[0].end
-        way, sound = self._plan_row(start, self._restance.home(start, 0))
-        if not sound:
-            again, better = self._plan_row(start, self._restance.home(start, 1))
-            way = again if better else way
+        by_left, by_right = (self._restance.home(start, side) for side in (0, 1))
+        way, sound = self._plan_row(start, by_left)
+        for motions in (by_right, [self._held(start, _CALMS_S), *by_left]):
+            if not sound:
+                again, sound = self._plan_row(start, motions)
+                way = again if sound else way
         plan = joined([*plans, way])
         off = np.abs(plan.end.q - self._rest.q).max()
         if not off < _AT_HOME:  # then a plan from there is not what was planned

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from mplearn.body import features_of, human_body, posture_of, robot_body
 from mplearn.errors import MissingDependencyError, RobotError
+from mplearn_envs.data.library_source import LibrarySource
 from mplearn_envs.execution.bodies import make_body
 from mplearn_envs.execution.simulation import Simulation
 from mplearn_envs.export import perform
@@ -25,6 +26,7 @@ from mplearn_envs.robot import ROLES, Retargeting, Robot, humanoid, make_robot, 
 from mplearn_envs.robot.feet import sole_corners
 from mplearn_envs.robot.packaged import packaged_robot
 from mplearn_envs.skills.feasibility import FeasibilityCheck
+from mplearn_envs.skills.skills import Skills
 
 HUMAN = human_body(1.7)
 SEGMENTS = {role: role for role in ROLES}
@@ -323,6 +325,17 @@ def test_dm_controls_humanoids_stand_upright_and_squat_and_raise_their_arms(name
     assert [span.name for span in done.motions[0].spans[:2]] == ["squat down", "squat raise"]
     with pytest.raises(RobotError, match="reach of"):  # its hips or ankles let no weight aside
         perform(None, robot, ("left kick raise",))
+
+
+def test_who_does_not_come_to_rest_at_once_stays_as_it_is_first():
+    """Hips that hardly roll inwards do not follow a leaning trunk that still moves."""
+    robot = make_robot("dm_humanoid")
+    library = LibrarySource(None).now()
+    skills, id = Skills(library, robot), library["right arm raise"].id
+    assert skills.feasibility(id).feasible
+    home = skills.planner.home(skills.end(id))
+    assert home.error.max() < 0.005
+    np.testing.assert_allclose(home.end.q, rest_reference(robot).q, atol=5e-3)
 
 
 def test_a_knee_that_bends_ahead_or_aside_is_refused():
