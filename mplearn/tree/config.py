@@ -106,7 +106,7 @@ class TreeConfig:
             times as far, where the same holds for what came right before both, or right after
             (or that is in one node already), and where each is farther than the scale from the node
             that it fits best; among ten that wait or are known, for among few this may be chance. 0
-            for `pair_share` alone.
+            for `pair_share` alone; then no sequence tells a leaf's motions apart, either.
         sequence_extent: And below this share of how far each is from standing still.
         ignore_fragments: Whether nothing becomes a primitive that is, together with the segment
             right before or after it, an execution of a primitive that is sure by then, or nearer by

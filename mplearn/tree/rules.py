@@ -324,7 +324,7 @@ def split_mixed(structure: Structure, leaf: Node, when: int) -> Change:
     """
     if leaf.whole or leaf.frozen:
         return Change()
-    beside = _beside_two(structure, leaf)
+    beside = _beside_two(structure, leaf) if structure.config.sequence_share else None
     full = len(leaf.members) >= structure.config.max_exemplars
     width = structure.config.split_scale * structure.index.scale(but=leaf.id)
     least = width if beside is None else _IN_SEQUENCE * width

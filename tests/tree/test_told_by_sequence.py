@@ -77,6 +77,13 @@ def test_where_nothing_is_split_no_sequence_splits() -> None:
     assert demonstrations(0.2, "after", 0, split_scale=np.inf) == np.inf
 
 
+def test_where_sequences_tell_nothing_they_split_nothing() -> None:
+    """As in files of before they did, and in the built-in library."""
+    assert (
+        demonstrations(0.2, "after", 0) < 10 <= demonstrations(0.2, "after", 0, sequence_share=0.0)
+    )
+
+
 @given(
     members=st.lists(st.integers(1, 40), unique=True, min_size=1, max_size=12).map(sorted),
     homes=st.dictionaries(st.integers(0, 41), st.sampled_from([1, 1, 2, 2, 3, 4, 9])),
