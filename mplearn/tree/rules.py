@@ -419,7 +419,8 @@ def shed_outliers(structure: Structure, leaf: Node, when: int) -> Change:
 
 def merge_duplicates(structure: Structure, matches: Sequence[Match], when: int) -> Change:
     """Merge the two leaves that a segment lies in, if they are no farther apart than inside."""
-    inside = [match.node for match in matches if match.ratio <= 1]
+    nodes = structure.nodes  # a search from the root compares with those above leaves, too
+    inside = [each.node for each in matches if each.ratio <= 1 and nodes[each.node].is_leaf]
     if len(inside) < 2:
         return Change()
     older, younger = sorted((structure.nodes[id] for id in inside[:2]), key=lambda node: node.id)

@@ -77,6 +77,11 @@ def test_where_nothing_is_split_no_sequence_splits() -> None:
     assert demonstrations(0.2, "after", 0, split_scale=np.inf) == np.inf
 
 
+def test_leaves_that_were_split_are_not_merged_with_the_node_above_them() -> None:
+    assert demonstrations(0.2, "after", 0, n_candidates=0) < 10
+    assert demonstrations(0.2, "after", 1, n_candidates=0) < 10
+
+
 def test_where_sequences_tell_nothing_they_split_nothing() -> None:
     """As in files of before they did, and in the built-in library."""
     assert (
