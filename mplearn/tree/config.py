@@ -129,8 +129,8 @@ class TreeConfig:
             inside them, the median of it, by this.
         split_scale: And when the mean between them exceeds the median diameter of the other leaves
             by this. Of two groups, each of which came right after, or before, a primitive of its
-            own that mostly comes with the leaf, two members each are enough, and from three on 0.8
-            of all three limits.
+            own that mostly comes with the leaf, `min_exemplars` each are enough, and from three on
+            0.8 of all three limits.
         min_branch: Members of each branch from which on it is one, where no sequence tells.
         merge_ratio: Two leaves that a segment lies in are merged when the distance between them is
             below that inside them times this; 0 for never.

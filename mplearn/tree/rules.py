@@ -365,10 +365,10 @@ def _if_apart(
 def _beside_two(structure: Structure, leaf: Node) -> tuple[IntArray, IntArray] | None:
     """Return the positions of the exemplars right after, or else right before, two primitives.
 
-    None where those that are known came beside one, or only once beside another, or half as many as
-    beside that beside others; or where either of the two does not mostly come with the leaf: what
-    comes beside it by chance differs by what came by chance. What follows its own kind is no
-    sequence.
+    None where those that are known came beside one, or too few for a node beside another, or half
+    as many as beside that beside others; or where either of the two does not mostly come with the
+    leaf: what comes beside it by chance differs by what came by chance. What follows its own kind
+    is no sequence.
     """
     for step in (-1, 1):
         homes = structure.homes([number + step for number in leaf.members])
@@ -376,7 +376,7 @@ def _beside_two(structure: Structure, leaf: Node) -> tuple[IntArray, IntArray] |
         if len(kinds) < 2:
             continue
         *others, second, first = np.argsort(counts, kind="stable").tolist()
-        if counts[second] < 2 or 2 * counts[others].sum() >= counts[second]:
+        if counts[second] < structure.least or 2 * counts[others].sum() >= counts[second]:
             continue
         beside = kinds[[first, second]].tolist()
         back = [structure.homes([n - step for n in structure.nodes[id].members]) for id in beside]

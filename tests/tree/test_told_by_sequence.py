@@ -92,9 +92,10 @@ def test_where_sequences_tell_nothing_they_split_nothing() -> None:
 @given(
     members=st.lists(st.integers(1, 40), unique=True, min_size=1, max_size=12).map(sorted),
     homes=st.dictionaries(st.integers(0, 41), st.sampled_from([1, 1, 2, 2, 3, 4, 9])),
+    least=st.integers(2, 3),
 )
 def test_what_came_beside_two_primitives_is_as_said(
-    members: list[int], homes: dict[int, int]
+    members: list[int], homes: dict[int, int], least: int
 ) -> None:
     homes |= dict.fromkeys(members, 9)
 
@@ -108,9 +109,9 @@ def test_what_came_beside_two_primitives_is_as_said(
                 beside.setdefault(homes[number + step], []).append(i)
         sizes = sorted(map(len, beside.values()), reverse=True)
         few = sum(sizes[2:])
-        if len(sizes) < 2 or sizes[1] < 2 or few >= sizes[1] / 2:
+        if len(sizes) < 2 or sizes[1] < least or few >= sizes[1] / 2:
             return None
-        kinds = [kind for kind, those in beside.items() if len(those) > max(few, 1)]
+        kinds = [kind for kind, those in beside.items() if len(those) > max(few, least - 1)]
         assert len(kinds) == 2
         for kind in kinds:
             back = [homes[n - step] for n in of(kind) if n - step in homes]
@@ -119,6 +120,7 @@ def test_what_came_beside_two_primitives_is_as_said(
         return sorted(beside[kind] for kind in kinds)
 
     structure = SimpleNamespace(
+        least=least,
         homes=lambda asked: np.array([homes.get(number, ROOT) for number in asked], np.int64),
         nodes={kind: SimpleNamespace(members=of(kind)) for kind in (1, 2, 3, 4)},
     )
