@@ -372,6 +372,20 @@ def test_an_interrupt_that_a_library_renames_or_swallows_is_one(monkeypatch, cap
     assert capsys.readouterr().err == "mplearn: interrupted\n"
 
 
+def test_an_interrupt_that_c_cannot_hear_comes_a_little_later(monkeypatch, capsys):
+    called_by_c = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGTERM))
+    ended = []
+
+    def run(argv):
+        called_by_c()
+        time.sleep(20)
+        ended.append("by itself")
+
+    monkeypatch.setattr(cli, "_run", run)
+    assert main([]) == 143 and not ended
+    assert capsys.readouterr().err == "mplearn: interrupted\n"
+
+
 def test_interrupted_there_is_no_traceback(library_file):
     program = (
         "import sys, mplearn_agents.cli as cli\nprint('on', flush=True)\n"

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_AGAIN_S = 0.01  # after this long a signal is sent again that nobody above could hear
 
 
 @contextmanager
@@ -16,7 +18,8 @@ def interrupted() -> Iterator[list[int]]:
     """While this lasts, Ctrl-C and SIGTERM raise `KeyboardInterrupt`; yields the signals that came.
 
     Libraries make another error of it while they are imported, or none: the list says what it was.
-    Outside the main thread it stays empty.
+    Where Python cannot raise it (in what C calls, or as an object is deleted) it comes a little
+    later. Outside the main thread the list stays empty.
     """
     came: list[int] = []
     if threading.current_thread() is not threading.main_thread():
@@ -27,10 +30,27 @@ def interrupted() -> Iterator[list[int]]:
         came.append(number)
         raise KeyboardInterrupt
 
+    def unheard(unraisable: sys.UnraisableHookArgs) -> None:
+        if not isinstance(unraisable.exc_value, KeyboardInterrupt):
+            report(unraisable)
+            return
+        number = came[-1] if came else signal.SIGINT
+        again = threading.Timer(_AGAIN_S, signal.pthread_kill, (main.ident, number))
+        again.daemon = True
+        again.start()
+        waiting.append(again)
+
+    main = threading.main_thread()
+    waiting: list[threading.Timer] = []
+    report = sys.unraisablehook
     before = {each: signal.signal(each, handle) for each in _SIGNALS}
+    sys.unraisablehook = unheard
     try:
         yield came
     finally:
+        sys.unraisablehook = report
+        for again in waiting:
+            again.cancel()
         for each, handler in before.items():
             signal.signal(each, handler)
 
