@@ -128,10 +128,12 @@ class Planner:
             key: Names the motion; plans of named motions are cached.
 
         Raises:
-            InvalidValueError: The speed is not positive, or the motion is too short or not finite.
+            InvalidValueError: The speed is not positive, the motion is too short or not finite, or
+                where the reference robot is is not finite.
         """
         if not (np.isfinite(speed) and speed > 0):
             raise InvalidValueError(f"speed must be positive and finite, not {speed}")
+        _require_finite(start)
         width = len(self._reference.limits)
         if motion.frames.ndim != 2 or motion.frames.shape[1] != width or len(motion.frames) < 2:
             raise InvalidValueError(
@@ -149,7 +151,11 @@ class Planner:
         return plan
 
     def hold(self, start: Reference, duration_s: float) -> Plan:
-        """Return the commands that come to rest in the present posture, on one foot or on two."""
+        """Return the commands that come to rest in the present posture, on one foot or on two.
+
+        Raises:
+            InvalidValueError: Where the reference robot is is not finite.
+        """
         return self.plan(start, self._held(start, duration_s), 1.0, ("hold", duration_s))
 
     def home(self, start: Reference) -> Plan:
@@ -160,7 +166,11 @@ class Planner:
 
         Args:
             start: Where the reference robot is.
+
+        Raises:
+            InvalidValueError: Where that is is not finite.
         """
+        _require_finite(start)
         full_key = ("home", *(part.tobytes() for part in start))
         plan: Plan | None = self._cache.get(full_key)
         if plan is None:
@@ -336,3 +346,10 @@ class Planner:
         swing = targets[-1, width:], rate[width:], lifted
         parts = (*tracked, *swing, ground, draft.heel[-1])
         return Reference(*(np.round(part, GRID_DECIMALS) for part in parts))
+
+
+def _require_finite(start: Reference) -> None:
+    """Check that the reference robot is somewhere."""
+    for name, part in zip(Reference._fields, start, strict=True):
+        if not np.isfinite(part).all():
+            raise InvalidValueError(f"where the reference robot is must be finite; {name} is not")

@@ -25,6 +25,7 @@ from mplearn_envs.planning.planner import Planner
 SLOWER = 0.8  # share of the speed that is tried next
 _LEAST_MARGIN = 0.5  # of the margin at the edge is enough while one motion gives way to another
 _PLACES = 4096  # of about 1 kB each: from where it is known whether the robot comes to rest
+_WAYS_IN = 8  # the last ones, of some 300 kB each: a verdict asks twice
 _AT_LIMIT = 1e-3  # so near its limit a joint is what does not reach [rad]
 ProblemKind: TypeAlias = Literal["flight", "limit", "velocity", "reach", "torque", "balance"]
 
@@ -165,6 +166,7 @@ class FeasibilityCheck:
         self._dynamics = InverseDynamics(planner.robot)
         self._columns = tracked_columns(planner.robot)
         self._leads_home = LRUCache(_PLACES)
+        self._ways_in = LRUCache(_WAYS_IN)
 
     def judge(self, motion: Motion, speed: float, key: Hashable = None) -> Feasibility:
         """Return whether a motion can be performed.
@@ -179,7 +181,7 @@ class FeasibilityCheck:
         problems = (*self._flight(motion), *self._overshoot(motion))
         if problems:  # nothing to plan
             return Feasibility(problems, speed, np.nan, np.nan, np.nan, *feet)
-        start = self.posture(motion)
+        start = self.way_in(motion, key).end
         wanted = speed
         while True:
             plan = self.planner.plan(start, motion, speed, key)
@@ -226,12 +228,22 @@ class FeasibilityCheck:
             self._leads_home.put(key, known)
         return known
 
-    def posture(self, motion: Motion) -> Reference:
-        """Return the reference robot at rest where a motion begins, on one foot or on two."""
-        return self.way_in(motion).end
+    def way_in(self, motion: Motion, key: Hashable = None) -> Plan:
+        """Return how the robot goes from rest to where a motion begins, on one foot or on two.
 
-    def way_in(self, motion: Motion) -> Plan:
-        """Return how the robot goes from rest to where a motion begins."""
+        Args:
+            motion: See `Planner.motion`.
+            key: Names the motion, see `Planner.plan`.
+        """
+        plan: Plan | None = None if key is None else self._ways_in.get(key)
+        if plan is None:
+            plan = self._way_in(motion)
+            if key is not None:
+                self._ways_in.put(key, plan)
+        return plan
+
+    def _way_in(self, motion: Motion) -> Plan:
+        """Plan how the robot goes from rest to where a motion begins."""
         here = rest_reference(self.planner.robot)
         first = np.repeat(motion.frames[:1], 2, axis=0)
         stance = motion.stance

@@ -263,8 +263,8 @@ class Skills:
 
     def _from_rest(self, id: int, speed: float) -> list[Plan]:
         """Return the plans from rest to where a primitive begins, of it, and from there to rest."""
-        way_in = self._check.way_in(self[id].motion)
         motion, key = self[id].motion, self.key(id)
+        way_in = self._check.way_in(motion, key)
         plan = self._settled(self.planner.plan(way_in.end, motion, speed, key))
         return [way_in, plan, self.planner.home(plan.end)]
 
@@ -330,7 +330,7 @@ class Skills:
             return self._rest
         key = self.key(id)
         if key not in self._ends:
-            start = self._check.posture(self[id].motion)
+            start = self._check.way_in(self[id].motion, key).end
             self._ends[key] = self.at_once(start, id).end
         return self._ends[key]
 

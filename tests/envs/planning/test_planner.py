@@ -164,6 +164,19 @@ def test_bad_motions_are_refused():
         planner().motion(whole, 100.0)
 
 
+@pytest.mark.parametrize("part", ["target", "q", "ground"])
+def test_a_robot_that_is_nowhere_is_refused(part):
+    here = at_rest()
+    lost = here._replace(**{part: np.full_like(getattr(here, part), np.nan)})
+    for plan in (
+        lambda: planner().plan(lost, there_and_back(BOW, 1.0)),
+        lambda: planner().hold(lost, 1.0),
+        lambda: planner().home(lost),
+    ):
+        with pytest.raises(InvalidValueError, match=f"must be finite; {part} is not"):
+            plan()
+
+
 def test_refining_reproduces_a_parabola_exactly():
     t = np.arange(8) * 0.02
     knots = np.stack((t**2, 3 * t - t**2), axis=1)

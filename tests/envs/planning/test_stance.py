@@ -203,7 +203,7 @@ def test_who_rises_too_fast_is_slowed_until_he_stands(speed):
     """Out of a deep squat joints and base are at their velocity limits, and soon in the air."""
     frames = sweep({"base_height": -0.42, "base_pitch": 0.5}, {"base_height": 0.0}, 0.9)
     motion = planner().motion(frames, RATE_HZ)
-    low = FeasibilityCheck(planner()).posture(motion)
+    low = FeasibilityCheck(planner()).way_in(motion).end
     plan = planner().plan(low, motion, speed)
     assert plan.error.max() < 0.01 and plan.zmp_margin_m.min() > 0.013
 

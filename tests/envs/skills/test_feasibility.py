@@ -19,8 +19,8 @@ from standing_library import (
 
 from mplearn.errors import InvalidValueError
 from mplearn_envs.environment.options import MotionOptions
-from mplearn_envs.mechanics.reference import tracked_columns
-from mplearn_envs.planning import Motion
+from mplearn_envs.mechanics.reference import rest_reference, tracked_columns
+from mplearn_envs.planning import Motion, Planner
 from mplearn_envs.robot import humanoid
 from mplearn_envs.skills.feasibility import FeasibilityCheck, FeasibilityConfig, Problem
 from mplearn_envs.skills.repertoire import Repertoire
@@ -138,7 +138,7 @@ def test_a_jerky_motion_is_slowed_for_balance():
 def test_standing_postures_are_reached():
     motion = check().planner.motion(np.stack([posture({})] * 2), RATE_HZ)
     assert motion.frames[0, 0] == STANDING_M
-    reference = check().posture(motion)
+    reference = check().way_in(motion).end
     np.testing.assert_allclose(reference.target, motion.frames[0], atol=1e-6)
     assert np.abs(reference.velocity).max() < 1e-6
 
@@ -169,3 +169,29 @@ def test_transitions_are_judged_where_that_is_wanted(monkeypatch):
     judged_too = Repertoire(library, robot, limits=FeasibilityConfig(transitions=True)).after(down)
     assert asked and all(before == down for before, _ in asked)
     assert after.mask.sum() - judged_too.mask.sum() == len(asked) > 0
+
+
+def test_a_verdict_plans_the_way_in_once(monkeypatch):
+    library, robot = standing_library(("arms up", "arms down", "bow down")), humanoid()
+    planned = []
+    plan = Planner.plan
+    monkeypatch.setattr(Planner, "plan", lambda *a: planned.append(a) or plan(*a))
+    skills = Skills(library, robot)
+    assert all(skills.feasibility(id).feasible for id in library.ids)
+    ways_in = [a for a in planned if len(a[2].frames) == 2 and a[2].rate_hz == 1.0]
+    assert len(ways_in) == len(library)
+    for id in library.ids:
+        skills.end(id)
+        assert skills._check.way_in(skills[id].motion, skills.key(id)).end.lifted == -1
+    assert len([a for a in planned if len(a[2].frames) == 2]) == len(library)
+
+
+def test_what_can_be_done_nowhere_is_an_error_of_ours():
+    """Not a mask that allows what cannot be planned, nor an error of who multiplies arrays."""
+    repertoire = Repertoire(standing_library(("arms up", "arms down")), humanoid())
+    here = rest_reference(humanoid())
+    anything = repertoire.entries(here)
+    lost = here._replace(q=np.full_like(here.q, np.nan))
+    assert not repertoire.skills.leads_home(lost)
+    with pytest.raises(InvalidValueError, match="must be finite; q is not"):
+        repertoire.from_place(anything, lost)
