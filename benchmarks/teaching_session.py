@@ -32,6 +32,7 @@ from mplearn.demonstrator import Demonstrator
 from mplearn.recording import LabelledSegment
 from mplearn.sources import Block, Stream
 from mplearn.sources.sending import open_sender
+from mplearn_agents.terminal.interrupts import interrupted
 
 NAMES = {
     "BAR": "both arms raise",
@@ -68,24 +69,30 @@ def browser() -> Iterator[Any]:
 
 @contextmanager
 def live(*options: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
-    """Run ``mplearn live`` and yield the page's address, and the process."""
+    """Run ``mplearn live`` and yield the page's address, and the process.
+
+    It ends with this, also where SIGTERM ends this.
+    """
     command = [sys.executable, "-m", "mplearn_agents.cli", "live", *options, "--port", "0"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)
-    try:
-        assert process.stdout is not None
-        words = process.stdout.readline().split()
-        if not words:
-            raise RuntimeError(f"{' '.join(command)} did not start")
-        yield words[1], process
-    finally:
-        process.send_signal(signal.SIGINT)
+    with interrupted():
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, text=True, start_new_session=True
+        )
         try:
-            process.wait(20)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
-        assert process.stdout is not None
-        process.stdout.close()
+            assert process.stdout is not None
+            words = process.stdout.readline().split()
+            if not words:
+                raise RuntimeError(f"{' '.join(command)} did not start")
+            yield words[1], process
+        finally:
+            process.send_signal(signal.SIGINT)
+            try:
+                process.wait(20)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+            assert process.stdout is not None
+            process.stdout.close()
 
 
 def until(check: Callable[[], Any], timeout_s: float = PATIENCE_S, what: str = "") -> Any:

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from rich.table import Table
 
+from mplearn import open_recording
 from mplearn.library import PrimitiveLibrary
 from mplearn_agents import cli
 from mplearn_agents.cli import build_parser, command_modules, main
@@ -307,10 +308,16 @@ def test_predict_and_generate_agree_with_the_library(library, library_file, tmp_
         assert row["primitive"] == wanted.id and row["probability"] == wanted.probability
     path = [library.ids[0], *(p.id for p in library.predict_next([library.ids[0]], 1))]
     wanted = library.generate(path).frames
-    for suffix in ("csv", "npz"):
+    for suffix in ("csv", "npz", "bvh"):
         file = tmp_path / f"deep/motion.{suffix}"
         assert said(capsys, "generate", library_file, *path, "--to", file)[0] == 0
-        if suffix == "npz":
+        if suffix == "bvh":
+            found = open_recording(file, positions=True)
+            assert len(found) == len(wanted) and found.rate_hz == pytest.approx(library.rate_hz)
+            height = found.frames[:, found.channels.index("pelvis.z")]
+            base = library.channels.index("base_height")
+            np.testing.assert_allclose(height, wanted[:, base], rtol=0, atol=1e-5)
+        elif suffix == "npz":
             with np.load(file) as found:
                 np.testing.assert_array_equal(found["frames"], wanted)
                 assert tuple(found["channels"]) == library.channels

@@ -84,7 +84,6 @@ def run(args: argparse.Namespace) -> None:
     """Train and play what was not before, and print and write each table as it is done."""
     from dataclasses import replace
 
-    from rich.progress import Progress
     from rich.table import Table as Shown
 
     from mplearn_agents.contests.compare import compare
@@ -92,6 +91,7 @@ def run(args: argparse.Namespace) -> None:
     from mplearn_agents.policies import POLICIES
     from mplearn_agents.rl.config import AlgorithmName, PriorUse
     from mplearn_agents.terminal.console import open_console
+    from mplearn_agents.terminal.progress import open_progress
 
     comparison = Comparison(
         tasks=tuple(args.tasks),
@@ -121,7 +121,7 @@ def run(args: argparse.Namespace) -> None:
     args.out.mkdir(parents=True, exist_ok=True)
     written: list[str] = []
     total = sum(each.n_contests for each in comparisons)
-    with Progress(console=console) as progress:
+    with open_progress(console) as progress:
         bar = progress.add_task("", total=total)
 
         def done(contest: Contest) -> None:

@@ -10,6 +10,7 @@ from mplearn.errors import InvalidValueError
 from mplearn_agents.terminal.arguments import count, positive, primitive_key, seed
 
 if TYPE_CHECKING:
+    from mplearn.generation.trajectory import Trajectory
     from mplearn.library import PrimitiveLibrary
 
 HELP = "Generate the motion of a path or walk in the library's own channels, as it was shown."
@@ -26,7 +27,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rate", type=positive, metavar="HZ", help="(default: the library's)")
     parser.add_argument("--speed", type=positive, default=1.0, help="share of the person's")
     parser.add_argument(
-        "--to", type=Path, required=True, metavar="FILE", help="FILE.csv or FILE.npz to write"
+        "--to",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="FILE.csv, FILE.npz, or FILE.bvh of the humanoid on the spot, to write",
     )
 
 
@@ -68,10 +73,9 @@ def run(args: argparse.Namespace) -> None:
     from mplearn.library import PrimitiveLibrary
 
     suffix = args.to.suffix.lower()
-    if suffix not in (".csv", ".npz"):
+    if suffix not in _WRITERS:
         raise InvalidValueError(
-            f"--to must be FILE.csv or FILE.npz, not {str(args.to)!r}"
-            + ("; `mplearn export --to bvh` writes what a robot performs" * (suffix == ".bvh"))
+            f"--to must be FILE.csv, FILE.npz or FILE.bvh, not {str(args.to)!r}"
         )
     library = PrimitiveLibrary.load(args.library)
     path = chosen_path(args, library)
@@ -83,23 +87,7 @@ def run(args: argparse.Namespace) -> None:
         rng=np.random.default_rng(args.seed),
     )
     args.to.parent.mkdir(parents=True, exist_ok=True)
-    if suffix == ".npz":
-        np.savez(
-            args.to,
-            frames=motion.frames,
-            rate_hz=motion.rate_hz,
-            channels=np.array(motion.channels),
-            primitive_ids=motion.primitive_ids,
-            starts=motion.starts,
-        )
-    else:
-        import csv
-
-        with args.to.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(("time_s", *motion.channels))
-            for k, row in enumerate(motion.frames.tolist()):
-                writer.writerow((round(k / motion.rate_hz, 9), *row))
+    _WRITERS[suffix](args.to, motion, library)
     noun = "primitive" if len(path) == 1 else "primitives"
     print(
         f"{len(path)} {noun}, {len(motion.frames)} frames at {motion.rate_hz:g} Hz, "
@@ -109,3 +97,37 @@ def run(args: argparse.Namespace) -> None:
 
 def _key(library: PrimitiveLibrary, text: str) -> int | str:
     return text if text in library else primitive_key(text)
+
+
+def _write_npz(path: Path, motion: Trajectory, library: PrimitiveLibrary) -> None:
+    import numpy as np
+
+    np.savez(
+        path,
+        frames=motion.frames,
+        rate_hz=motion.rate_hz,
+        channels=np.array(motion.channels),
+        primitive_ids=motion.primitive_ids,
+        starts=motion.starts,
+    )
+
+
+def _write_csv(path: Path, motion: Trajectory, library: PrimitiveLibrary) -> None:
+    import csv
+
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(("time_s", *motion.channels))
+        for k, row in enumerate(motion.frames.tolist()):
+            writer.writerow((round(k / motion.rate_hz, 9), *row))
+
+
+def _write_bvh(path: Path, motion: Trajectory, library: PrimitiveLibrary) -> None:
+    from mplearn_envs.export import RobotModel, as_shown, format_of
+    from mplearn_envs.robot import humanoid
+
+    shown = as_shown(motion, dict(zip(library.ids, library.names, strict=True)))
+    format_of("bvh").write(path, [shown], RobotModel.of(humanoid()))
+
+
+_WRITERS = {".csv": _write_csv, ".npz": _write_npz, ".bvh": _write_bvh}

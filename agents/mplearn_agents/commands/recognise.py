@@ -46,13 +46,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Read, recognise, print and write."""
-    from rich.progress import Progress
     from rich.text import Text
 
     from mplearn.library import PrimitiveLibrary
     from mplearn.tables import SegmentTable, format_of, recognise_recording, write_segments
     from mplearn_agents.terminal.console import new_table, open_console
     from mplearn_agents.terminal.inert import printable
+    from mplearn_agents.terminal.progress import open_progress
 
     if args.to is not None:
         format_of(args.to)
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> None:
     recordings = _read(args, library, aside)
     found = []
     total = sum(len(recording.frames) for recording in recordings)
-    with Progress(console=aside, transient=True) as bar:
+    with open_progress(aside) as bar:
         task = bar.add_task("recognising", total=total)
         for recording in recordings:
             for segment in recognise_recording(

@@ -118,17 +118,11 @@ def make_film(
 def _shown(
     pictures: Iterable[NDArray[np.uint8]], total: int, console: Console
 ) -> Iterator[NDArray[np.uint8]]:
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from mplearn_agents.terminal.progress import open_progress
 
-    columns = (
-        TextColumn("[bold]filming "),
-        BarColumn(bar_width=32),
-        MofNCompleteColumn(),
-        TextColumn("pictures"),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=console) as progress:
-        yield from progress.track(pictures, total=total)
+    count = "{task.completed:.0f} of {task.total:.0f} pictures"
+    with open_progress(console, count) as progress:
+        yield from progress.track(pictures, total=total, description="filming ")
 
 
 def _write_strip(pictures: list[NDArray[np.uint8]], path: Path) -> None:

@@ -140,12 +140,11 @@ def _live_table(console: Console) -> Iterator[Callable[[Progress], None]]:
 
 def recognise_in_chunks(args: argparse.Namespace) -> None:
     """Recognise a folder as a corpus, write the table and print how often what was recognised."""
-    from rich.progress import Progress as Bar
-
     from mplearn.corpus import recognise_corpus
     from mplearn.mocap import command_line
     from mplearn.tables import write_segments
     from mplearn_agents.terminal.console import new_table, open_console
+    from mplearn_agents.terminal.progress import open_progress
 
     if args.to is None and not args.json:
         raise InvalidValueError("give a table to write, --to FILE, or --json")
@@ -155,7 +154,7 @@ def recognise_in_chunks(args: argparse.Namespace) -> None:
     with (
         command_line(),
         chosen_executor(args) as executor,
-        Bar(console=aside, transient=True) as bar,
+        open_progress(aside) as bar,
     ):
         task = bar.add_task("recognising", total=None)
         found = recognise_corpus(
@@ -218,6 +217,7 @@ def _say_refused(console: Console, refused: Iterable[tuple[str, str]]) -> None:
 def progress_table(progress: Progress) -> Table:
     """Return how far the learning of a corpus is."""
     from mplearn_agents.terminal.console import new_table
+    from mplearn_agents.terminal.progress import duration
 
     table = new_table("learning a corpus", "what", "how far")
     left = "" if progress.left_s is None else f", {duration(progress.left_s)} left"
@@ -232,16 +232,3 @@ def progress_table(progress: Progress) -> Table:
     if progress.deaths:
         table.add_row("workers died", f"{progress.deaths}; what they did is taken up again")
     return table
-
-
-def duration(seconds: float) -> str:
-    """Return a time as people say it.
-
-    >>> duration(42.0), duration(200.0), duration(7000.0)
-    ('42 s', '3 min 20 s', '1 h 56 min')
-    """
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    if hours:
-        return f"{hours} h {minutes} min"
-    return f"{minutes} min {rest} s" if minutes else f"{rest} s"

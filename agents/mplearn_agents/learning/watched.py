@@ -147,21 +147,17 @@ def learn(
     Raises:
         MPLearnError: No recording can be learned, or one cannot and ``strict`` is set.
     """
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from mplearn_agents.terminal.progress import open_progress
 
     log = LearningLog()
     columns = (
-        TextColumn("[bold]learning"),
-        BarColumn(bar_width=32),
-        TextColumn("{task.percentage:3.0f} %"),
-        TextColumn("[cyan]{task.fields[speed]:.0f} x real time"),
-        TextColumn("[green]{task.fields[primitives]} primitives"),
-        TextColumn("{task.fields[segments]} segments"),
-        TimeElapsedColumn(),
+        "[cyan]{task.fields[speed]:.0f} x real time",
+        "[green]{task.fields[primitives]} primitives",
+        "{task.fields[segments]} segments",
     )
     total_s = sum(recording.duration_s for recording in recordings)
-    with asked_to_stop() as stop, Progress(*columns, console=console) as progress:
-        bar = progress.add_task("learn", total=total_s, speed=0.0, primitives=0, segments=0)
+    with asked_to_stop() as stop, open_progress(console, *columns) as progress:
+        bar = progress.add_task("learning", total=total_s, speed=0.0, primitives=0, segments=0)
         for recording in recordings:
             before_s = log.watched_s
             begin = time.perf_counter()

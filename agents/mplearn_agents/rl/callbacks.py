@@ -12,11 +12,11 @@ from typing import Any
 import gymnasium
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from stable_baselines3.common.callbacks import BaseCallback
 
 from mplearn_agents.episodes import Episode, play
 from mplearn_agents.policies import Policy
+from mplearn_agents.terminal.progress import open_progress
 
 from .config import TrainingConfig
 
@@ -34,15 +34,12 @@ class ShowProgress(BaseCallback):
     def __init__(self, config: TrainingConfig, console: Console | None) -> None:
         super().__init__()
         self.config = config
-        columns = (
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=32),
-            TextColumn("{task.completed:.0f} of {task.total:.0f} steps"),
-            TextColumn("[cyan]{task.fields[speed]:.0f} steps/s"),
-            TextColumn("[green]{task.fields[success]}"),
-            TimeElapsedColumn(),
+        self._bar = open_progress(
+            console,
+            "{task.completed:.0f} of {task.total:.0f} steps",
+            "[cyan]{task.fields[speed]:.0f} steps/s",
+            "[green]{task.fields[success]}",
         )
-        self._bar = Progress(*columns, console=console, disable=console is None)
 
     @contextmanager
     def shown(self) -> Iterator[None]:

@@ -1,7 +1,8 @@
 """What a robot performs, in the files of other tools; and checks of such files.
 
-`perform` makes motions of a library, a path or a walk, `export` writes them, `check` says what is
-wrong with a file. `register_format` joins a format of one's own.
+`perform` makes motions of a library, a path or a walk, `as_shown` one without a robot's plans;
+`export` writes them, `check` says what is wrong with a file. `register_format` joins a format of
+one's own.
 """
 
 from . import formats as _formats  # noqa: F401  (registers them)
@@ -20,3 +21,4 @@ from .registry import formats as formats
 from .registry import register_format as register_format
 from .robot_model import RobotModel as RobotModel
 from .robot_model import robot_model as robot_model
+from .shown import as_shown as as_shown

@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,17 +14,21 @@ from standing_library import standing_library
 
 from benchmarks import exporting
 from mplearn import open_recording
+from mplearn.body import feature_channels, posture_of, robot_body
 from mplearn.errors import (
     InvalidValueError,
     RecordingError,
     RobotError,
     UnknownPrimitiveError,
 )
+from mplearn.maths.rotations import quaternion_to_matrix
 from mplearn.mocap import Hints
+from mplearn_envs.data.library_source import LibrarySource
 from mplearn_envs.export import (
     Format,
     RobotModel,
     RobotMotion,
+    as_shown,
     check,
     export,
     format_of,
@@ -43,8 +48,6 @@ def test_a_path_is_what_the_environment_plans(model: RobotModel) -> None:
     assert robot is not None
     done = perform(None, robot, ("bow down", "bow up"), hold_s=0.0)
     (motion,) = done.motions
-    from mplearn_envs.data.library_source import LibrarySource
-
     library = LibrarySource(None).now()
     skills = Skills(library, robot)
     here, parts = rest_reference(robot), []
@@ -224,6 +227,28 @@ def test_our_own_reader_reads_the_bvh_as_the_robot_moves(
     names = [channel.removesuffix(".x") for channel in recording.channels[::3]]
     where = [names.index(name) for name in model.body_names]
     assert np.abs(read[:, where] - bodies.pos).max() < 1e-5
+
+
+def test_a_motion_as_it_was_shown_is_that_of_the_body_that_it_was_learned_in() -> None:
+    library = LibrarySource(None).now()
+    path = ("march, right leg raise", "bow down", "bow down")
+    motion = library.generate(path)
+    shown, model = as_shown(motion, {library["bow down"].id: "bow"}), RobotModel.of(humanoid())
+    bodies = model.forward(shown.root_pos, shown.root_quat, shown.joint_pos)
+    tree = robot_body().tree
+    where = [tree.body(name) for name in model.body_names]
+    order = [motion.channels.index(name) for name in feature_channels()]
+    for t in range(0, len(motion), 20):
+        places, turns = tree.forward(posture_of(motion.frames[t, order]))
+        np.testing.assert_allclose(bodies.pos[t], places[where], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(
+            quaternion_to_matrix(bodies.quat[t]), turns[where], rtol=0, atol=1e-9
+        )
+    assert [span.name for span in shown.spans][1:] == ["bow", "bow"]
+    assert [span.start_s for span in shown.spans] == (motion.starts / motion.rate_hz).tolist()
+    others = replace(motion, channels=tuple(f"c{k}" for k in range(len(motion.channels))))
+    with pytest.raises(InvalidValueError, match="33 are not among them"):
+        as_shown(others)
 
 
 def test_our_own_reader_takes_the_csv_for_the_g1(
