@@ -64,9 +64,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     Args:
         argv: The command line without the program's name; None takes ``sys.argv``.
     """
-    with inert_output(), plain_warnings(), interrupted() as came:
+    came: list[int] = []
+    with inert_output(), plain_warnings():
         try:
-            code = _run(argv)
+            with interrupted() as came:
+                code = _run(argv)
         except KeyboardInterrupt:
             pass
         except BaseException:  # a library that is interrupted on the way in raises what it likes

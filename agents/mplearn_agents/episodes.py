@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -40,7 +41,14 @@ class Episode:
     wall_s: float = field(default=np.nan, compare=False)
 
 
-def play(env: gymnasium.Env[Any, Any], policy: Policy, episodes: int, seed: int) -> list[Episode]:
+def play(
+    env: gymnasium.Env[Any, Any],
+    policy: Policy,
+    episodes: int,
+    seed: int,
+    *,
+    show: Callable[[int], None] = lambda done: None,
+) -> list[Episode]:
     """Play episodes; the same seed gives the same ones, whoever acts.
 
     Args:
@@ -48,6 +56,7 @@ def play(env: gymnasium.Env[Any, Any], policy: Policy, episodes: int, seed: int)
         policy: Who chooses.
         episodes: How many.
         seed: From which each episode's seed is drawn.
+        show: Called after each episode with how many are done.
 
     Raises:
         InvalidValueError: ``episodes`` is less than 1.
@@ -56,7 +65,11 @@ def play(env: gymnasium.Env[Any, Any], policy: Policy, episodes: int, seed: int)
         raise InvalidValueError(f"there is at least 1 episode to play, not {episodes}")
     seeds = np.random.SeedSequence(seed).generate_state(episodes)
     policy.reset(seed)
-    return [_episode(env, policy, int(each)) for each in seeds]
+    played = []
+    for each in seeds:
+        played.append(_episode(env, policy, int(each)))
+        show(len(played))
+    return played
 
 
 def _episode(env: gymnasium.Env[Any, Any], policy: Policy, seed: int) -> Episode:

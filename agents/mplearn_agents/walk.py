@@ -22,6 +22,7 @@ As a program: ``mplearn perform --policy random --steps 20 --video walk.mp4``, o
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -127,6 +128,7 @@ def walk(
     *,
     episodes: int | None = None,
     record: bool = False,
+    show: Callable[[int], None] = lambda done: None,
 ) -> WalkResult:
     """Let a policy walk until it has performed a number of primitives, or episodes.
 
@@ -141,6 +143,7 @@ def walk(
         episodes: How many episodes to play to their end, whatever ``steps`` is.
         record: Whether to keep the robot's postures, as often as the environment's
             ``frame_rate_hz``, so that a film can be made.
+        show: Called after each step with how many primitives, or episodes, are done.
 
     Raises:
         InvalidValueError: ``steps`` or ``episodes`` is less than 1.
@@ -203,6 +206,7 @@ def walk(
             if "is_success" in info:
                 outcomes.append(bool(info["is_success"]))
             observation, info = env.reset()
+        show(performed if episodes is None else n_ended)
     if record:
         base.frame_callback = None
     return WalkResult(

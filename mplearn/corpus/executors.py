@@ -15,6 +15,7 @@ from numbers import Integral
 from typing import Any, Protocol, TypeVar
 
 from ..errors import InvalidValueError
+from ..spawning import deaf_to_interrupts
 
 T = TypeVar("T")
 
@@ -132,7 +133,7 @@ class Processes:
 
     def submit(self, work: Callable[..., T], *args: Any) -> Future[T]:
         """Have ``work(*args)`` done by one of the processes."""
-        with _one_thread():  # processes are started as they are needed
+        with _one_thread(), deaf_to_interrupts():  # processes are started as they are needed
             if self._pool is not None:
                 try:
                     return self._pool.submit(work, *args)

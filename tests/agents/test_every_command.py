@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rich.console import Console
 from rich.table import Table
 
 from mplearn import open_recording
@@ -24,6 +25,7 @@ from mplearn_agents.cli import build_parser, command_modules, main
 from mplearn_agents.terminal import console as consoles
 from mplearn_agents.terminal.console import InertConsole
 from mplearn_agents.terminal.inert import InertStream, inert_output, printable
+from mplearn_agents.terminal.progress import TimeLeft, open_progress
 from mplearn_agents.terminal.tables import primitive_table
 from mplearn_envs.data.library_source import LibrarySource
 
@@ -300,6 +302,47 @@ def test_nothing_is_cut_where_the_output_is_no_terminal(monkeypatch):
     assert any("0.123456789" in line and "11.123456789" in line for line in lines)
 
 
+def test_a_bar_moves_in_the_terminal_and_what_is_printed_meanwhile_is_inert(monkeypatch):
+    class Terminal(io.StringIO):
+        encoding = "utf-8"
+
+        def isatty(self):
+            return True
+
+    file = Terminal()
+    monkeypatch.setenv("TERM", "xterm")
+    with monkeypatch.context() as patch:
+        patch.setattr(sys, "stdout", file)
+        with inert_output():
+            console = consoles.open_console()
+            with open_progress(console, "{task.completed:.0f} of {task.total:.0f} steps") as bar:
+                task = bar.add_task("walking", total=100)
+                bar.update(task, completed=50, refresh=True)
+                print("\x1b[2Jhostile")
+                console.print("\x1b[3Jtoo")
+                bar.update(task, completed=100)
+    text = file.getvalue()
+    assert "\x1b[2K" in text and "\\x1b[2K" not in text  # lines are cleared, not spelled out
+    assert "\\x1b[3Jtoo" in text and "hostile" in text
+    assert "\x1b[2J" not in text and "\x1b[3J" not in text
+    assert "50 of 100 steps" in text and "100 of 100 steps" in text and " 50 %" in text
+
+
+@pytest.mark.parametrize(
+    ("done", "after_s", "told"), [(0, 3.0, ""), (25, 10.0, "30 s left"), (100, 7.0, "7 s")]
+)
+def test_a_bar_says_how_long_it_will_take(done, after_s, told):
+    now = [0.0]
+    with open_progress(Console(file=io.StringIO(), width=80)) as bar:
+        bar.get_time = lambda: now[0]
+        bar.add_task("walking", total=100)
+        (task,) = bar.tasks
+        for k in range(1, done + 1):
+            now[0] = after_s * k / done
+            bar.update(task.id, completed=k)
+        assert str(TimeLeft().render(task)) == told
+
+
 def test_predict_and_generate_agree_with_the_library(library, library_file, tmp_path, capsys):
     names = list(library.names)[:1]
     code, out, _ = said(capsys, "predict", library_file, *names, "--json", "--most", 3)
@@ -379,17 +422,54 @@ def test_an_interrupt_that_a_library_renames_or_swallows_is_one(monkeypatch, cap
     assert capsys.readouterr().err == "mplearn: interrupted\n"
 
 
-def test_an_interrupt_that_c_cannot_hear_comes_a_little_later(monkeypatch, capsys):
-    called_by_c = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGTERM))
+def heard_by_c():
+    ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGTERM))()
+
+
+def swallowed():
+    with contextlib.suppress(BaseException):
+        signal.raise_signal(signal.SIGTERM)
+
+
+def handled_as_another():
+    try:
+        raise ValueError
+    except ValueError:
+        with contextlib.suppress(BaseException):
+            signal.raise_signal(signal.SIGTERM)
+        time.sleep(0.3)
+
+
+@pytest.mark.parametrize("lost", [heard_by_c, swallowed, handled_as_another])
+def test_an_interrupt_that_is_lost_comes_again_a_little_later(lost, monkeypatch, capsys):
     ended = []
 
     def run(argv):
-        called_by_c()
+        lost()
         time.sleep(20)
         ended.append("by itself")
 
     monkeypatch.setattr(cli, "_run", run)
     assert main([]) == 143 and not ended
+    assert capsys.readouterr().err == "mplearn: interrupted\n"
+
+
+def test_what_is_put_away_after_an_interrupt_is_not_interrupted(monkeypatch, capsys):
+    """However long it takes, and whatever errors it deals with meanwhile."""
+    done = []
+
+    def run(argv):
+        try:
+            signal.raise_signal(signal.SIGINT)
+        finally:
+            for _ in range(4):
+                time.sleep(0.1)
+                with contextlib.suppress(ValueError):
+                    raise ValueError
+            done.append("put away")
+
+    monkeypatch.setattr(cli, "_run", run)
+    assert main([]) == 130 and done
     assert capsys.readouterr().err == "mplearn: interrupted\n"
 
 

@@ -34,6 +34,8 @@ def run(args: argparse.Namespace) -> None:
     import mplearn_envs  # noqa: F401  (registers the environment)
     from mplearn_agents.policies import POLICIES
     from mplearn_agents.rl.offline import export_episodes
+    from mplearn_agents.terminal.console import open_console
+    from mplearn_agents.terminal.progress import open_progress
 
     env = gymnasium.make(
         "mplearn/PrimitiveHumanoid-v0",
@@ -42,9 +44,17 @@ def run(args: argparse.Namespace) -> None:
         dynamics=args.dynamics,
         disable_env_checker=True,
     )
-    written, played = export_episodes(
-        env, POLICIES[args.policy](env), args.episodes, args.dataset, args.out, args.seed
-    )
+    with open_progress(open_console(stderr=True)) as bar:
+        task = bar.add_task("playing", total=args.episodes)
+        written, played = export_episodes(
+            env,
+            POLICIES[args.policy](env),
+            args.episodes,
+            args.dataset,
+            args.out,
+            args.seed,
+            show=lambda done: bar.update(task, completed=done),
+        )
     env.close()
     print(
         f"{args.dataset}: {len(played)} episodes, {written.total_steps} macro steps, "

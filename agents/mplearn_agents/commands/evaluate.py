@@ -51,6 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> None:
     """Run the experiments; print each table as it is done."""
     from mplearn_agents.terminal.console import open_console
+    from mplearn_agents.terminal.progress import open_progress
 
     from ..evaluations import BUILT_IN, Setting, evaluations_for
 
@@ -70,26 +71,30 @@ def run(args: argparse.Namespace) -> None:
     said: set[str] = set()
     written: list[str] = []
     failed: list[str] = []
-    for name in names:
-        n_before = len(written)
-        try:
-            for table in found[name](setting):
-                for take, refused in setting.refused.items():
-                    if take not in said:
-                        said.add(take)
-                        say_left_out(console, take, refused)
-                _show(console, table)
-                written.append(table.to_markdown())
-                if args.out is not None:  # after each: a run that is stopped leaves what it has
-                    args.out.mkdir(parents=True, exist_ok=True)
-                    file = args.out / f"{Path(args.data).name}.md"
-                    file.write_text("\n".join(written), encoding="utf-8")
-        except MPLearnError as error:  # the others can be measured nevertheless
-            failed.append(name)
-            console.print(f"{name}: {error}")
-        else:
-            if len(written) == n_before:
-                console.print(f"{name}: nothing to measure in {args.data}")
+    with open_progress(console, "{task.completed:.0f} of {task.total:.0f} experiments") as bar:
+        task = bar.add_task("", total=len(names))
+        for name in names:
+            bar.update(task, description=name)
+            n_before = len(written)
+            try:
+                for table in found[name](setting):
+                    for take, refused in setting.refused.items():
+                        if take not in said:
+                            said.add(take)
+                            say_left_out(console, take, refused)
+                    _show(console, table)
+                    written.append(table.to_markdown())
+                    if args.out is not None:  # after each: a run that is stopped leaves what it has
+                        args.out.mkdir(parents=True, exist_ok=True)
+                        file = args.out / f"{Path(args.data).name}.md"
+                        file.write_text("\n".join(written), encoding="utf-8")
+            except MPLearnError as error:  # the others can be measured nevertheless
+                failed.append(name)
+                console.print(f"{name}: {error}")
+            else:
+                if len(written) == n_before:
+                    console.print(f"{name}: nothing to measure in {args.data}")
+            bar.advance(task)
     if args.out is not None and written:
         console.print(f"written to {args.out / Path(args.data).name}.md")
     if failed:

@@ -89,6 +89,8 @@ def run(args: argparse.Namespace) -> int | None:
 
 
 def _export(args: argparse.Namespace) -> None:
+    from mplearn_agents.terminal.console import open_console
+    from mplearn_agents.terminal.progress import open_progress
     from mplearn_envs.export import RobotModel, export, format_of, perform
     from mplearn_envs.export.exporting import check_place
 
@@ -96,17 +98,20 @@ def _export(args: argparse.Namespace) -> None:
     if args.out is not None and args.clips > 1:  # before it takes its time
         check_place(format, args.out, args.clips)
     robot = _robot(args.robot)
-    done = perform(
-        args.library,
-        robot,
-        [primitive_key(text) for text in args.path],
-        walk=args.walk,
-        clips=args.clips,
-        seed=args.seed,
-        speed=args.speed,
-        simulated=args.simulate,
-        upper_body=args.upper_body,
-    )
+    with open_progress(open_console(stderr=True)) as bar:
+        task = bar.add_task("performing", total=None)
+        done = perform(
+            args.library,
+            robot,
+            [primitive_key(text) for text in args.path],
+            walk=args.walk,
+            clips=args.clips,
+            seed=args.seed,
+            speed=args.speed,
+            simulated=args.simulate,
+            upper_body=args.upper_body,
+            show=lambda done, of: bar.update(task, completed=done, total=of),
+        )
     for name, reason in done.left_out.items():
         print(f"left out {name}: {reason}")
     out = args.out or _place(args.library, done.motions[0].name, len(done.motions), format.suffix)

@@ -145,11 +145,17 @@ def run(args: argparse.Namespace) -> None:
         print(f"{result.successes} of {result.episodes} episodes succeeded")
     if args.video:
         from mplearn_agents.film import film, with_captions
+        from mplearn_agents.terminal.console import open_console
+        from mplearn_agents.terminal.progress import tracked
         from mplearn_agents.video import write_video
 
         names = [step.name for step in result.steps]
         pictures = with_captions(film(result, robot.xml, balance=args.balance), result, names)
-        n_pictures = write_video(args.video, pictures, result.rate_hz)
+        n_pictures = write_video(
+            args.video,
+            tracked(pictures, len(result.postures), "filming", open_console(stderr=True)),
+            result.rate_hz,
+        )
         print(f"film of {n_pictures} pictures written to {args.video}")
 
 
@@ -164,6 +170,8 @@ def _walked(args: argparse.Namespace) -> tuple[WalkResult, Robot]:
     import mplearn_envs  # noqa: F401  (registers the environment)
     from mplearn_agents.rl import TrainingConfig
     from mplearn_agents.rl.trained import CONFIG
+    from mplearn_agents.terminal.console import open_console
+    from mplearn_agents.terminal.progress import open_progress
     from mplearn_agents.walk import walk
     from mplearn_envs.robot import make_robot
 
@@ -195,7 +203,17 @@ def _walked(args: argparse.Namespace) -> tuple[WalkResult, Robot]:
         env = gymnasium.make(name, motion=standing, **options)
     policy = _policy(args, env)
     record = args.video is not None
-    result = walk(env, policy, args.steps, args.seed, episodes=args.episodes, record=record)
+    with open_progress(open_console(stderr=True)) as bar:
+        task = bar.add_task("performing", total=args.episodes or args.steps)
+        result = walk(
+            env,
+            policy,
+            args.steps,
+            args.seed,
+            episodes=args.episodes,
+            record=record,
+            show=lambda done: bar.update(task, completed=done),
+        )
     for name, problem in _left_out(env.unwrapped.repertoire, result):  # type: ignore[attr-defined]
         print(f"{name} would have come, but the robot cannot perform it: {problem}")
     robot: Robot = env.unwrapped.robot  # type: ignore[attr-defined]

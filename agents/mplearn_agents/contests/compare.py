@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from functools import partial
 from multiprocessing import active_children, get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -17,6 +18,7 @@ from scipy import stats
 from mplearn.errors import InvalidValueError
 from mplearn.evaluation import Table
 from mplearn.recording import FloatArray
+from mplearn.spawning import deaf_to_interrupts
 from mplearn_agents.contests.comparison import SLOW, Comparison
 from mplearn_agents.contests.contest import Contest
 from mplearn_agents.episodes import Episode
@@ -71,8 +73,13 @@ def _mapping(jobs: int) -> Iterator[Callable[..., Iterator[list[list[Episode]]]]
         return
     others = set(active_children())
     with ProcessPoolExecutor(jobs, get_context("spawn"), _begin_work) as pool:
+
+        def mapped(*each: Any) -> Iterator[Any]:
+            with deaf_to_interrupts():  # processes are started as they are needed
+                return pool.map(*each)
+
         try:
-            yield pool.map
+            yield mapped
         except BaseException:  # interrupted, too: what is not kept yet is given up
             for worker in set(active_children()) - others:
                 worker.terminate()

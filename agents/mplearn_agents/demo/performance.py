@@ -84,6 +84,7 @@ def make_film(
         MissingDependencyError: There is no off-screen renderer, or no imageio-ffmpeg.
     """
     from mplearn.body import human_body
+    from mplearn_agents.terminal.progress import tracked
 
     counts = np.bincount(result.step_of, minlength=len(result.steps))
     steps = [
@@ -106,23 +107,14 @@ def make_film(
     names = [step.name for step in result.steps]
     pictures = with_captions(keeping(film(result, robot.xml, person)), result, names)
     video = folder / "walk.mp4"
-    write_video(video, _shown(pictures, len(result.postures), console), _FILM_HZ)
+    shown = tracked(pictures, len(result.postures), "filming", console)
+    write_video(video, shown, _FILM_HZ)
     _write_strip(list(kept.values()), folder / "film.png")
     stills = tuple(
         Still(_jpeg_uri(picture), names[wanted[index]], index / result.rate_hz)
         for index, picture in kept.items()
     )
     return Film(video, stills)
-
-
-def _shown(
-    pictures: Iterable[NDArray[np.uint8]], total: int, console: Console
-) -> Iterator[NDArray[np.uint8]]:
-    from mplearn_agents.terminal.progress import open_progress
-
-    count = "{task.completed:.0f} of {task.total:.0f} pictures"
-    with open_progress(console, count) as progress:
-        yield from progress.track(pictures, total=total, description="filming ")
 
 
 def _write_strip(pictures: list[NDArray[np.uint8]], path: Path) -> None:

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
+from mplearn.spawning import deaf_to_interrupts
+
 from .messages import Header, unpack
 from .outbox import Outbox
 
@@ -65,7 +67,8 @@ class Worker:
             name=f"mplearn-{self.name}",
             daemon=True,
         )
-        process.start()
+        with deaf_to_interrupts():
+            process.start()
         theirs.close()
         self._process, self._connection, self._outbox = process, mine, Outbox(mine)
         loop = asyncio.get_running_loop()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, SupportsFloat
 
@@ -31,6 +32,7 @@ def export_episodes(
     folder: str | Path | None = None,
     seed: int = 0,
     author: str = "",
+    show: Callable[[int], None] = lambda done: None,
 ) -> tuple[minari.MinariDataset, list[Episode]]:
     """Play episodes and write them as a Minari data set.
 
@@ -46,6 +48,7 @@ def export_episodes(
         folder: Where data sets lie; None is Minari's own place.
         seed: Of the episodes.
         author: Who made it.
+        show: Called after each episode with how many are done.
 
     Returns:
         The data set, as it is on disk, and what came of each episode.
@@ -73,7 +76,7 @@ def export_episodes(
             f"with a library that is not live, and tasks that are dataclasses ({error})"
         ) from error
     recorder = _Recorder(env)
-    played = play(recorder, policy, episodes, seed)
+    played = play(recorder, policy, episodes, seed, show=show)
     with _datasets_in(folder), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # that there is no link to the code
         try:

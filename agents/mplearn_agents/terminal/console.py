@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterable
 from copy import copy
 from dataclasses import replace
+from typing import TextIO
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.measure import Measurement
@@ -44,11 +46,12 @@ class InertConsole(Console):
 
 def open_console(*, stderr: bool = False) -> Console:
     """Return the console of a command."""
-    console = InertConsole(stderr=stderr, markup=False, highlight=False, emoji=False)
+    file: TextIO = sys.stderr if stderr else sys.stdout
+    while (under := getattr(file, "rich_proxied_file", None)) is not None:
+        file = under  # text is spelled out here: what moves a bar's cursor has to pass
+    console = InertConsole(file=file, stderr=stderr, markup=False, highlight=False, emoji=False)
     if not console.is_terminal:
-        console = InertConsole(
-            stderr=stderr, markup=False, highlight=False, emoji=False, width=_ENDLESS
-        )
+        console.width = _ENDLESS
     return console
 
 

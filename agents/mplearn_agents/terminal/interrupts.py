@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from types import FrameType
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
-_AGAIN_S = 0.01  # after this long a signal is sent again that nobody above could hear
+_AGAIN_S = 0.1  # after this long a signal is sent again that nothing above has heard
 
 
 @contextmanager
@@ -18,8 +18,8 @@ def interrupted() -> Iterator[list[int]]:
     """While this lasts, Ctrl-C and SIGTERM raise `KeyboardInterrupt`; yields the signals that came.
 
     Libraries make another error of it while they are imported, or none: the list says what it was.
-    Where Python cannot raise it (in what C calls, or as an object is deleted) it comes a little
-    later. Outside the main thread the list stays empty.
+    Where it is lost (in what C calls, as an object is deleted, in a library that catches all) it
+    comes again a little later. Outside the main thread the list stays empty.
     """
     came: list[int] = []
     if threading.current_thread() is not threading.main_thread():
@@ -28,29 +28,28 @@ def interrupted() -> Iterator[list[int]]:
 
     def handle(number: int, frame: FrameType | None) -> None:
         came.append(number)
+        signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)
         raise KeyboardInterrupt
+
+    def again(number: int, frame: FrameType | None) -> None:
+        if sys.exc_info()[0] is None:  # nothing is on its way up, and yet this goes on
+            signal.raise_signal(came[-1])
+        else:
+            signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)
 
     def unheard(unraisable: sys.UnraisableHookArgs) -> None:
         if not isinstance(unraisable.exc_value, KeyboardInterrupt):
             report(unraisable)
-            return
-        number = came[-1] if came else signal.SIGINT
-        again = threading.Timer(_AGAIN_S, signal.pthread_kill, (main.ident, number))
-        again.daemon = True
-        again.start()
-        waiting.append(again)
 
-    main = threading.main_thread()
-    waiting: list[threading.Timer] = []
     report = sys.unraisablehook
     before = {each: signal.signal(each, handle) for each in _SIGNALS}
+    before[signal.SIGALRM] = signal.signal(signal.SIGALRM, again)
     sys.unraisablehook = unheard
     try:
         yield came
     finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
         sys.unraisablehook = report
-        for again in waiting:
-            again.cancel()
         for each, handler in before.items():
             signal.signal(each, handler)
 

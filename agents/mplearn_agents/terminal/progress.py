@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from typing import TypeVar
+
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.text import Text
 
+T = TypeVar("T")
 _BAR = 12  # columns: what stands beside it fits a terminal of 80
 
 
@@ -27,6 +31,12 @@ def open_progress(console: Console | None, *more: str) -> Progress:
         transient=console is not None and console.stderr,
         disable=console is None,
     )
+
+
+def tracked(items: Iterable[T], total: int, name: str, console: Console) -> Iterator[T]:
+    """Yield items, and show how many of how many were taken."""
+    with open_progress(console, "{task.completed:.0f} of {task.total:.0f}") as bar:
+        yield from bar.track(items, total=total, description=name)
 
 
 class TimeLeft(ProgressColumn):

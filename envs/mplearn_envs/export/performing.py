@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -61,6 +61,7 @@ def perform(
     hold_s: float = 0.5,
     simulated: bool = False,
     upper_body: bool = False,
+    show: Callable[[int, int], None] = lambda done, of: None,
 ) -> Performed:
     """Return what a robot makes of a library, a path or a walk: feet, balance and all.
 
@@ -81,6 +82,7 @@ def perform(
             instead of what it is to do. A motion in which it falls is left out.
         upper_body: Whether only arms, head and the trunk's turn are performed, by a robot that
             stands: for motions whose legs it cannot follow.
+        show: Called after each motion with how many are done, and of how many.
 
     Raises:
         LibraryError: The library cannot be read, or is for another body.
@@ -122,12 +124,13 @@ def perform(
         jobs = [(known[id].name, [id]) for id in possible]
     names = {known[id].name: reason for id, reason in left_out.items()}
     motions = []
-    for name, path_ids in jobs:
+    for k, (name, path_ids) in enumerate(jobs, start=1):
         stage = _Simulated(robot) if simulated else _Planned(robot)
         try:
             motions.append(_motion(skills, path_ids, name, hold_s, stage))
         except _FallError as fall:
             names[name] = str(fall)
+        show(k, len(jobs))
     if not motions:
         raise _nothing(robot, names)
     return Performed(tuple(motions), names)

@@ -16,6 +16,7 @@ from ...extras import require
 from ...mocap import UNITS_M
 from ...mocap.markers.xdf import described_markers, described_unit
 from ...recording import marker_channels
+from ...spawning import deaf_to_interrupts
 from ..inbox import Inbox, Sample
 from ..received import ReceivedSource, Receiver
 from ..registry import Wanted
@@ -62,9 +63,9 @@ class LSLReceiver(Receiver):
         """Look for the stream, and take what is pulled until it is lost."""
         what = ("name", self._name) if self._name else ("type", TYPE)
         command = [sys.executable, lsl_process.__file__, *what, "attended"]
-        with subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE
-        ) as self._process:
+        with deaf_to_interrupts():
+            self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        with self._process:
             try:
                 _Pulled(self._process, inbox).take()
             finally:
