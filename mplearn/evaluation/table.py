@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+from dataclasses import asdict, dataclass
 
 from ..errors import InvalidValueError
 
@@ -34,6 +35,10 @@ class Table:
                 raise InvalidValueError(
                     f"table {self.title!r} has {len(self.columns)} columns, a row has {len(row)}"
                 )
+
+    def to_json(self) -> str:
+        """Return the table as a JSON object of one line, with its attributes."""
+        return json.dumps(asdict(self))
 
     def to_markdown(self) -> str:
         """Return the table as Markdown."""

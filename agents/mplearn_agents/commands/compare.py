@@ -78,13 +78,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--steps", type=count, help="macro steps of a training (default: by task)")
     parser.add_argument("--jobs", type=count, help="processes (default: one a processor)")
+    parser.add_argument("--json", action="store_true", help="print each table as a line of JSON")
 
 
 def run(args: argparse.Namespace) -> None:
     """Train and play what was not before, and print and write each table as it is done."""
     from dataclasses import replace
-
-    from rich.table import Table as Shown
 
     from mplearn_agents.contests.compare import compare
     from mplearn_agents.contests.comparison import Comparison
@@ -92,6 +91,7 @@ def run(args: argparse.Namespace) -> None:
     from mplearn_agents.rl.config import AlgorithmName, PriorUse
     from mplearn_agents.terminal.console import open_console
     from mplearn_agents.terminal.progress import open_progress
+    from mplearn_agents.terminal.tables import show_table
 
     comparison = Comparison(
         tasks=tuple(args.tasks),
@@ -117,7 +117,7 @@ def run(args: argparse.Namespace) -> None:
             replace(alone, algorithms=("maskable-ppo",), priors=get_args(PriorUse)),
             replace(alone, algorithms=get_args(AlgorithmName), priors=None),
         ]
-    console, file = open_console(), args.out / "compare.md"
+    console, file = open_console(stderr=args.json), args.out / "compare.md"
     args.out.mkdir(parents=True, exist_ok=True)
     written: list[str] = []
     total = sum(each.n_contests for each in comparisons)
@@ -131,15 +131,7 @@ def run(args: argparse.Namespace) -> None:
         for each in comparisons:
             for tables in compare(each, args.out, args.jobs, done):
                 for table in tables:
-                    shown = Shown(
-                        *table.columns,
-                        title=table.title,
-                        caption=table.note,
-                        caption_justify="left",
-                    )
-                    for row in table.rows:
-                        shown.add_row(*row)
-                    console.print(shown)
+                    show_table(console, table, json=args.json)
                 written.append(tables[0].to_markdown())  # time on the wall is another each time
                 file.write_text("\n".join(written), encoding="utf-8")
     console.print(f"written to {file}")

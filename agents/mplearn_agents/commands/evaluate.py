@@ -4,16 +4,10 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mplearn.errors import InvalidValueError, MPLearnError
 from mplearn_agents.recordings.reading import say_left_out
 from mplearn_agents.terminal.arguments import count, seed
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from mplearn.evaluation import Table
 
 HELP = "Measure segmentation, learning and performing, on synthetic sessions or on recordings."
 EXAMPLE = "mplearn evaluate paper-session --only learning prediction"
@@ -30,6 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", type=Path, help="folder to write the tables to, as Markdown")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="run these experiments only")
+    parser.add_argument("--json", action="store_true", help="print each table as a line of JSON")
     parser.add_argument("--list", action="store_true", help="name the experiments, run none")
     parser.add_argument(
         "--orders", type=count, default=5, help="orders of presentation a person (default: 5)"
@@ -52,10 +47,11 @@ def run(args: argparse.Namespace) -> None:
     """Run the experiments; print each table as it is done."""
     from mplearn_agents.terminal.console import open_console
     from mplearn_agents.terminal.progress import open_progress
+    from mplearn_agents.terminal.tables import show_table
 
     from ..evaluations import BUILT_IN, Setting, evaluations_for
 
-    console = open_console()
+    console = open_console(stderr=args.json)
     setting = Setting(args.data, tuple(args.seeds), args.orders, _wrong(args))
     found = evaluations_for(setting)
     if args.list:
@@ -82,7 +78,7 @@ def run(args: argparse.Namespace) -> None:
                         if take not in said:
                             said.add(take)
                             say_left_out(console, take, refused)
-                    _show(console, table)
+                    show_table(console, table, json=args.json)
                     written.append(table.to_markdown())
                     if args.out is not None:  # after each: a run that is stopped leaves what it has
                         args.out.mkdir(parents=True, exist_ok=True)
@@ -99,15 +95,6 @@ def run(args: argparse.Namespace) -> None:
         console.print(f"written to {args.out / Path(args.data).name}.md")
     if failed:
         raise InvalidValueError(f"could not be measured on {args.data}: {', '.join(failed)}")
-
-
-def _show(console: Console, table: Table) -> None:
-    from rich.table import Table as Shown
-
-    shown = Shown(*table.columns, title=table.title, caption=table.note, caption_justify="left")
-    for row in table.rows:
-        shown.add_row(*row)
-    console.print(shown)
 
 
 def _wrong(args: argparse.Namespace) -> Path | None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
+import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -105,6 +108,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="draw support polygon, centre of gravity and zero-moment point in the film",
     )
+    parser.add_argument("--json", action="store_true", help="print the steps as JSON")
 
 
 def run(args: argparse.Namespace) -> None:
@@ -135,14 +139,10 @@ def run(args: argparse.Namespace) -> None:
                 f"--show performs each primitive once, whole, in simulation; it takes no {options}"
             )
     result, robot = _walked(args) if args.show is None else _shown(args)
-    for k, step in enumerate(result.steps, start=1):
-        print(f"{k:4d}  {step.name:24s} {step.duration_s:6.2f} s{'  FELL' if step.fallen else ''}")
-    print(
-        f"{_counted(len(result.primitives), 'primitive')} in {result.duration_s:.1f} s of the "
-        f"robot's time, {_counted(result.falls, 'fall')}"
-    )
-    if result.successes is not None and result.episodes:
-        print(f"{result.successes} of {result.episodes} episodes succeeded")
+    if args.json:
+        print(json.dumps(_plain(result)), flush=True)
+    else:
+        _say(result)
     if args.video:
         from mplearn_agents.film import film, with_captions
         from mplearn_agents.terminal.console import open_console
@@ -156,7 +156,37 @@ def run(args: argparse.Namespace) -> None:
             tracked(pictures, len(result.postures), "filming", open_console(stderr=True)),
             result.rate_hz,
         )
-        print(f"film of {n_pictures} pictures written to {args.video}")
+        _aside(args, f"film of {n_pictures} pictures written to {args.video}")
+
+
+def _say(result: WalkResult) -> None:
+    for k, step in enumerate(result.steps, start=1):
+        print(f"{k:4d}  {step.name:24s} {step.duration_s:6.2f} s{'  FELL' if step.fallen else ''}")
+    print(
+        f"{_counted(len(result.primitives), 'primitive')} in {result.duration_s:.1f} s of the "
+        f"robot's time, {_counted(result.falls, 'fall')}"
+    )
+    if result.successes is not None and result.episodes:
+        print(f"{result.successes} of {result.episodes} episodes succeeded")
+
+
+def _plain(result: WalkResult) -> dict[str, Any]:
+    """Return a walk as values that JSON has: what was not measured is None."""
+    return {
+        "steps": [
+            {name: None if value != value else value for name, value in asdict(step).items()}
+            for step in result.steps
+        ],
+        "duration_s": result.duration_s,
+        "falls": result.falls,
+        "episodes": result.episodes,
+        "successes": result.successes,
+    }
+
+
+def _aside(args: argparse.Namespace, text: str) -> None:
+    """Say what is no step: beside what is read as JSON, where that is asked for."""
+    print(text, file=sys.stderr if args.json else sys.stdout)
 
 
 def _counted(n: int, noun: str) -> str:
@@ -196,9 +226,10 @@ def _walked(args: argparse.Namespace) -> tuple[WalkResult, Robot]:
     repertoire = env.unwrapped.repertoire  # type: ignore[attr-defined]
     if not args.upper_body and not repertoire.any_feasible:
         problem = repertoire.skills.feasibility(repertoire.ids[0]).problems[0]
-        print(
+        _aside(
+            args,
             f"the robot can perform none of the {len(repertoire.ids)} motions whole ({problem}): "
-            "it stands, and shows arms, head and the trunk's turn"
+            "it stands, and shows arms, head and the trunk's turn",
         )
         env = gymnasium.make(name, motion=standing, **options)
     policy = _policy(args, env)
@@ -215,7 +246,7 @@ def _walked(args: argparse.Namespace) -> tuple[WalkResult, Robot]:
             show=lambda done: bar.update(task, completed=done),
         )
     for name, problem in _left_out(env.unwrapped.repertoire, result):  # type: ignore[attr-defined]
-        print(f"{name} would have come, but the robot cannot perform it: {problem}")
+        _aside(args, f"{name} would have come, but the robot cannot perform it: {problem}")
     robot: Robot = env.unwrapped.robot  # type: ignore[attr-defined]
     env.close()
     return result, robot

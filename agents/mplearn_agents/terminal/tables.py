@@ -10,11 +10,26 @@ import numpy as np
 from mplearn_agents.terminal.inert import printable  # before it is laid out: it may get longer
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
     from rich.tree import Tree
 
+    from mplearn import evaluation
     from mplearn.library import Primitive, PrimitiveLibrary
+
+
+def show_table(console: Console, table: evaluation.Table, *, json: bool = False) -> None:
+    """Print the table of an experiment; as a line of JSON to standard output where asked for."""
+    from rich.table import Table
+
+    if json:
+        print(table.to_json(), flush=True)
+        return
+    shown = Table(*table.columns, title=table.title, caption=table.note, caption_justify="left")
+    for row in table.rows:
+        shown.add_row(*row)
+    console.print(shown)
 
 
 def most_active(primitive: Primitive, channels: Sequence[str], k: int = 3) -> tuple[str, ...]:
