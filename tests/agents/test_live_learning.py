@@ -276,6 +276,28 @@ def test_what_was_learned_before_a_source_broke_is_kept(
     assert len(PrimitiveLibrary.load(kept[0])) == len(PrimitiveLibrary.load(kept[1])) > 0
 
 
+@pytest.mark.parametrize("known", [True, False])
+def test_stopped_before_anything_came_it_says_so_and_keeps_what_was_known(
+    known: bool, take: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    store, out = tmp_path / "life.db", tmp_path / "out.mplearn"
+    if known:
+        assert main(["learn", str(take), "--store", str(store)]) == 0
+
+    class Silent(PlayedSource):
+        def read(self, timeout_s: float | None = None) -> list[Block | Change]:
+            signal.raise_signal(signal.SIGTERM)
+            return []
+
+    silent = Silent(Stream(("a", "b"), 100.0), [np.zeros((10, 2))], np.inf)
+    monkeypatch.setattr("mplearn.sources.open_source", lambda *_, **__: silent)
+    command = ["learn", "--live", "mine", "--speed", "inf", "--store", str(store)]
+    assert main([*command, "--out", str(out)]) == (0 if known else 130)
+    assert out.exists() == store.exists() == known
+    if known:
+        assert len(PrimitiveLibrary.load(out)) == len(PrimitiveLibrary.load(store)) > 0
+
+
 def test_sigterm_ends_an_event_loop_as_ctrl_c_does() -> None:
     async def wait() -> None:
         os.kill(os.getpid(), signal.SIGTERM)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import sys
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -18,7 +19,7 @@ from mplearn_agents.learning.keeping import keep, say_unkept
 from mplearn_agents.learning.pauses import short_pauses
 from mplearn_agents.recordings.reading import hints_of
 from mplearn_agents.terminal.arguments import pace, positive
-from mplearn_agents.terminal.exit_codes import NOT_KEPT
+from mplearn_agents.terminal.exit_codes import INTERRUPTED, NOT_KEPT
 from mplearn_agents.terminal.inert import printable
 from mplearn_agents.terminal.interrupts import asked_to_stop
 
@@ -87,7 +88,8 @@ def learn_from_source(
 ) -> int:
     """Learn from a live source until it ends or somebody stops it; save the library.
 
-    Returns 3 where not all that was learned is kept, as `mplearn_agents.cli` says, 0 otherwise.
+    Returns 3 where not all that was learned is kept, 130 where it was stopped before anything came,
+    as `mplearn_agents.cli` says, 0 otherwise.
 
     Args:
         args: The options of ``mplearn learn``.
@@ -183,6 +185,7 @@ def learn_live(
     from mplearn_agents.terminal.event_lines import change_json, change_text, event_json, event_text
 
     log = LiveLog() if log is None else log
+    log.life = life
 
     def tell(events: list[Event], arrived_s: float, rate_hz: float) -> None:
         for event in events:
@@ -204,9 +207,9 @@ def learn_live(
 
     def take(block: Block) -> None:
         if log.life is None:
-            log.life = life or new_life(config(LearnerConfig(block.channels, block.rate_hz)))
-            if life is not None:
-                tell(life.begin_stream(block.channels), _newest(block), block.rate_hz)
+            log.life = new_life(config(LearnerConfig(block.channels, block.rate_hz)))
+        elif not log.watched_s:
+            tell(log.life.begin_stream(block.channels), _newest(block), block.rate_hz)
         elif not block.joins:
             tell(log.life.end_stream(), _newest(block), block.rate_hz)
         tell(log.life.learn_many(block.frames), _newest(block), block.rate_hz)
@@ -218,7 +221,7 @@ def learn_live(
                 say(change_json(item) if as_json else change_text(item))
             else:
                 take(item)
-    if log.life is not None:
+    if log.life is not None and log.watched_s:
         tell(log.life.end_stream(), time.monotonic(), log.life.learner.config.rate_hz)
     return log
 
@@ -257,9 +260,13 @@ def _report(
     from mplearn_agents.terminal.tables import primitive_table
 
     faults = source.tally.faults()
-    if log.life is None or log.learner is None:
+    if log.life is None or log.learner is None or not (log.watched_s or stopped):
         told = ", ".join(f"{n} {name}" for name, n in faults.items()) or "nothing came"
-        raise RecordingError(f"nothing could be learned from {source.name}: {told}")
+        told = f"nothing could be learned from {source.name}: {told}"
+        if not stopped:
+            raise RecordingError(told)
+        print(f"mplearn: interrupted; {told}", file=sys.stderr)
+        return INTERRUPTED
     unread = faults.pop("unread", 0)
     library = log.life.snapshot()
     kept = keep(log.life, library, out=args.out, store=args.store)

@@ -10,7 +10,7 @@ import numpy as np
 from mplearn.library import PrimitiveLibrary
 from mplearn.people import PeopleTree
 
-from .messages import Header
+from .messages import Header, brief
 
 
 def knowledge(library: PrimitiveLibrary, tree: PeopleTree) -> Header:
@@ -28,7 +28,7 @@ def knowledge(library: PrimitiveLibrary, tree: PeopleTree) -> Header:
             primitives.append(
                 {
                     "id": each.id,
-                    "name": each.name,
+                    "name": brief(each.name),
                     "n": node.n_placed,
                     "of": confirmed if node.n_placed < confirmed else 0,
                     "frozen": node.frozen,

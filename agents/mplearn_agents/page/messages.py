@@ -23,6 +23,7 @@ Poses = NDArray[np.float32]
 
 LONGEST_REQUEST = 8192  # characters
 TICK, CLIP = 1, 2
+_BRIEF = 200  # characters
 _BACKWARD = re.compile("[\u0590-\u08ff\u200f\u202a-\u202e\u2066-\u2069\ufb1d-\ufdff\ufe70-\ufeff]")
 _KEPT_APART = str.maketrans("", "", "\u2066\u2067\u2068\u2069")
 _TICK = struct.Struct("<BBHHHII")  # kind, 0, bodies of person and robot, channels, first row, rows
@@ -49,6 +50,15 @@ def as_text(header: Mapping[str, Any]) -> str:
 def mention(id: int | None) -> str:
     """Return what stands in a text for a primitive's name, whatever that is when it is shown."""
     return f"{{{id}}}"
+
+
+def brief(text: str) -> str:
+    """Return a name as it is shown: a page has no room for more, and would take long to find out.
+
+    >>> len(brief("a" * 10_000))
+    200
+    """
+    return text if len(text) <= _BRIEF else f"{text[: _BRIEF - 1]}…"
 
 
 def literal(text: object) -> str:

@@ -22,7 +22,7 @@ from mplearn.store import (
     Unfreeze,
 )
 
-from .messages import Header, literal, mention
+from .messages import Header, brief, literal, mention
 
 LONGEST_NAME, LONGEST_NOTE = 80, 1000
 
@@ -56,12 +56,12 @@ def in_words(command: Command, lifelong: LifelongLearner) -> str:
     library = lifelong.snapshot()
 
     def name(id: int) -> str:
-        return literal(library[id].name) if id in library else f"P{id}"
+        return literal(brief(library[id].name)) if id in library else f"P{id}"
 
     match command:
         case Rename(id, new):
             is_so = id in library and library[id].name == new
-            return f"{f'P{id}' if is_so else name(id)} is called {literal(new)} now"
+            return f"{f'P{id}' if is_so else name(id)} is called {literal(brief(new))} now"
         case Merge(first, second):
             return f"{name(first)} and {name(second)} are one"
         case Split(id):

@@ -33,7 +33,7 @@ from mplearn_agents.learning.waiting import waiting_for_learner
 from .figures import CLIP_HZ, motions_of, shapes_of
 from .happenings import happening, tell
 from .knowledge import knowledge
-from .messages import Header, clip, literal, mention, number, unpack
+from .messages import Header, brief, clip, literal, mention, number, unpack
 from .outbox import Message, Outbox
 from .shelf import Sender
 from .teaching import do, history
@@ -262,7 +262,7 @@ class Watcher:
             {
                 "kind": "stream",
                 "source": self._settings.source,
-                "channels": list(self._figure.channels),
+                "channels": [brief(name) for name in self._figure.channels],
                 "rate_hz": self._rate_hz,
                 "stride": self._figure.stride,
                 "frame": self._lifelong.learner.n_frames,

@@ -29,7 +29,7 @@ def open_progress(console: Console | None, *more: str) -> Progress:
         TimeLeft(),
         console=console,
         transient=console is not None and console.stderr,
-        disable=console is None,
+        disable=console is None or (console.stderr and not console.is_terminal),
     )
 
 

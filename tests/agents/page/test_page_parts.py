@@ -189,6 +189,8 @@ def test_knowledge_is_the_librarys(taught):
         assert p == pytest.approx(row[target], abs=1e-4)
         assert duration_s == pytest.approx(library.graph.duration_s(source, target), abs=2e-3)
     json.dumps(told, allow_nan=False)
+    long = knowledge(library.rename(library.ids[0], "a" * 10_000), life.learner.tree)
+    assert long["primitives"][0]["name"] == "a" * 199 + "\u2026"  # a page would draw at 0.1 Hz
 
 
 def test_every_segment_is_told_with_what_became_of_it(taught):
