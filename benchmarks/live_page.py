@@ -18,6 +18,7 @@ from rich.table import Table
 
 from .teaching_session import browser, live, until
 
+LOOKS = 20
 SIZES = ((1280, 720), (1920, 1080))
 
 
@@ -60,9 +61,8 @@ _CLICK = """(k) => new Promise((done) => {
 
 def memory(opened: Any, hours: float) -> None:
     """Print the memory of each process, and of the page, while an accelerated stream goes on."""
-    table = Table(
-        "stream [h]", "server [MB]", "learner", "robot", "page", "its nodes", "primitives"
-    )
+    heads = ("server [MB]", "learner", "robot", "page's process", "its heap", "nodes", "primitives")
+    table = Table("stream [h]", *heads)
     seen: list[tuple[float, ...]] = []
     with live("demonstrator", "--speed", "inf") as (url, process):
         page = opened.new_page(viewport={"width": 1280, "height": 720})
@@ -73,22 +73,37 @@ def memory(opened: Any, hours: float) -> None:
             frames = 100.0 * 3600.0 * hours * k / 8
             while float(page.get_attribute("html", "data-frames") or 0) < frames:
                 page.wait_for_timeout(500)
-            inside.send("HeapProfiler.collectGarbage")
             used = [
                 psutil.Process(pid).memory_info().rss / 1e6
                 for pid in (process.pid, *_children(process.pid))
             ]
-            heap = inside.send("Runtime.getHeapUsage")["usedSize"] / 1e6
-            nodes = inside.send("Memory.getDOMCounters")["nodes"]
+            held = [_held(page, inside) for _ in range(LOOKS)]  # between them messages come
+            heap, nodes = map(min, zip(*held, strict=True))
             n_primitives = page.locator("#tree .row").count()
-            seen.append((*used, heap, nodes, n_primitives))
-            cells = (f"{value:.1f}" for value in (*used, heap))
+            drawing = _drawing(opened)
+            seen.append((*used, drawing, heap, nodes, n_primitives))
+            cells = (f"{value:.1f}" for value in (*used, drawing, heap))
             table.add_row(f"{hours * k / 8:.1f}", *cells, str(nodes), str(n_primitives))
         took = time.monotonic() - begun
     last, first = seen[-1], seen[len(seen) // 2 - 1]
     table.add_row("end / half", *(f"{b / a:.2f}" for a, b in zip(first, last, strict=True)))
     table.title = f"{hours:g} h of stream in {took / 60:.0f} minutes"
     Console(width=100).print(table)
+
+
+def _held(page: Any, inside: Any) -> tuple[float, int]:
+    """Return what a page holds once garbage is collected: its heap [MB], and nodes."""
+    page.wait_for_timeout(100)
+    inside.send("HeapProfiler.collectGarbage")
+    heap = inside.send("Runtime.getHeapUsage")["usedSize"] / 1e6
+    return heap, inside.send("Memory.getDOMCounters")["nodes"]
+
+
+def _drawing(opened: Any) -> float:
+    """Return the memory of the browser's largest process, that of the page [MB]."""
+    processes = opened.new_browser_cdp_session().send("SystemInfo.getProcessInfo")["processInfo"]
+    pages = [psutil.Process(each["id"]) for each in processes if each["type"] == "renderer"]
+    return max(float(each.memory_info().rss) for each in pages) / 1e6
 
 
 def _children(pid: int) -> list[int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
@@ -74,9 +74,10 @@ def _mapping(jobs: int) -> Iterator[Callable[..., Iterator[list[list[Episode]]]]
     others = set(active_children())
     with ProcessPoolExecutor(jobs, get_context("spawn"), _begin_work) as pool:
 
-        def mapped(*each: Any) -> Iterator[Any]:
+        def mapped(do: Callable[..., Any], each: Iterable[Any]) -> Iterator[Any]:
             with deaf_to_interrupts():  # processes are started as they are needed
-                return pool.map(*each)
+                done = [pool.submit(do, one) for one in each]
+            return (future.result() for future in done)  # none is cancelled, as by pool.map
 
         try:
             yield mapped
