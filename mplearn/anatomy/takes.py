@@ -10,6 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ..body import find_marker_set
+from ..body.marker_sets.marker_set import WATCHED_SHARE
 from ..errors import BodyError, MPLearnError
 from ..recording import Recording, marker_channels
 from .body_map import BodyMap
@@ -18,8 +19,6 @@ from .facing import MirroredError
 from .labels import names_skin, without_shared_ends
 from .markers import recognise_markers
 from .skeletons import recognise_skeleton
-
-LEAST_SHARE = 2 / 3  # of the points of takes that are joined, that each of them must have
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +169,7 @@ def _joined(takes: Sequence[tuple[str, tuple[str, ...]]]) -> list[tuple[str, ...
         of_same = groups.setdefault(of_set, [])
         for group in of_same:
             least = min(len(each) for each in (*group, names))
-            if least >= LEAST_SHARE * len(set(names).union(*group)):
+            if least >= WATCHED_SHARE * len(set(names).union(*group)):
                 group.append(names)
                 break
         else:

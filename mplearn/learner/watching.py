@@ -8,12 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..body import MotionObserver, ObserverState
-from ..body.marker_sets.marker_set import plain_name
+from ..body.marker_sets.marker_set import WATCHED_SHARE, plain_name
 from ..errors import FrameError
 from ..recording import FloatArray, IntArray, are_markers
 from ..state import Count, State, require, within
-
-LEAST_SHARE = 2 / 3  # of an observer's markers that a stream must have to be watched by it
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,6 +172,6 @@ def _columns(channels: tuple[str, ...], known: tuple[str, ...]) -> IntArray | No
     """Return where a stream's columns are among an observer's; None if it cannot watch them."""
     place = {plain_name(channel): i for i, channel in enumerate(known)}
     columns = [place.get(plain_name(channel), -1) for channel in channels]
-    if -1 in columns or len(set(columns)) < max(len(columns), LEAST_SHARE * len(known)):
+    if -1 in columns or len(set(columns)) < max(len(columns), WATCHED_SHARE * len(known)):
         return None
     return np.array(columns)

@@ -8,7 +8,7 @@ import pytest
 from label_sets import KEY_POINTS, SETS, labelled
 
 from mplearn.anatomy import as_bodies, recognise
-from mplearn.anatomy.takes import LEAST_SHARE
+from mplearn.body.marker_sets.marker_set import WATCHED_SHARE
 from mplearn.errors import BodyError
 from mplearn.learner import FramesLost, LearnerConfig, MotionLearner, SegmentClosed
 from mplearn.mocap import command_line
@@ -175,7 +175,7 @@ def test_takes_of_quite_different_systems_are_learned_together(truth):
     learner = MotionLearner(LearnerConfig(bodies.recordings[0].channels, truth.markers.rate_hz))
     for recording in bodies.recordings:
         seen = [not np.isnan(each).all() for each in recording.markers.swapaxes(0, 1)]
-        assert np.mean(seen) >= LEAST_SHARE
+        assert np.mean(seen) >= WATCHED_SHARE
         events = [event for part in learner.learn_recording(recording, 50) for event in part]
         assert not [event for event in events if isinstance(event, FramesLost)]
         assert [event for event in events if isinstance(event, SegmentClosed)]

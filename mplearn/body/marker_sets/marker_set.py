@@ -26,6 +26,7 @@ from .tables import TABLES
 CARRIER = {"abdomen": "pelvis", "clavicle_l": "chest", "clavicle_r": "chest"}
 LEAST_SHARE = 0.6  # of a recording's markers that a set must know to be taken for it,
 LEAST_OF_SET = 0.75  # or of the set's own that must be among them
+WATCHED_SHARE = 2 / 3  # of the markers that an observer watches, that a stream must have
 
 
 @dataclass(frozen=True, eq=False)
