@@ -138,6 +138,12 @@ def size_of(path: Path) -> int:
     return path.stat().st_size if is_file(path) else -1
 
 
+def older_copies(path: Path) -> int:
+    """Return how many files of its name a file in an archive has replaced."""
+    inside = _inside(path)
+    return inside.older if inside else 0
+
+
 def _inside(path: Path) -> Member | None:
     """Return the file in an archive that a path leads to; None where it does not."""
     at = archive_of(path)

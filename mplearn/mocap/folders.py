@@ -9,7 +9,7 @@ from typing import NamedTuple
 from ..errors import RecordingError
 from .files import bad_file, is_file, is_folder, may_be_read, read_bytes, stem, suffix, within
 from .packed.archives import is_archive, named_archive
-from .registry import instead_of, suffixes
+from .registry import holds_other_arrays, instead_of, suffixes
 
 
 class FoundFolders(NamedTuple):
@@ -87,6 +87,20 @@ def _holds_recordings(folder: Path) -> bool:
     )
 
 
+def passed_over(folder: Path) -> tuple[str, ...]:
+    r"""Return the names of the files of arrays in a folder that are none of key points.
+
+    Example:
+        >>> Path("mixed").mkdir(exist_ok=True)
+        >>> _ = Path("mixed", "weather.h5").write_bytes(b"\x89HDF\r\n temperatures")
+        >>> passed_over(Path("mixed"))
+        ('weather.h5',)
+    """
+    if not is_folder(folder):
+        return ()
+    return tuple(each.name for each in within(folder) if holds_other_arrays(each))
+
+
 def no_files(folder: Path) -> dict[str, RecordingError]:
     """Return why not, by name, for what a folder holds that is called as recordings are.
 
@@ -110,7 +124,8 @@ def no_files(folder: Path) -> dict[str, RecordingError]:
             found[each.name] = _no_archive(each)
             continue
         if (instead := instead_of(each)) and is_file(each):
-            if not any(name.startswith(stem(each)) for name in tables):
+            beside = any(name.startswith(stem(each)) for name in tables)
+            if not (beside or holds_other_arrays(each)):
                 found[each.name] = bad_file(each, "not read", instead)
             continue
         if suffix(each) in suffixes() or named_archive(each):

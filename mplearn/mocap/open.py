@@ -15,8 +15,18 @@ import numpy as np
 
 from ..errors import RecordingError, RecordingWarning
 from ..recording import ReadReport, Recording
-from .files import bad_file, contents, is_file, is_folder, may_be_read, size_of, stem, within
-from .folders import folders_in, folders_of_recordings, no_files
+from .files import (
+    bad_file,
+    contents,
+    is_file,
+    is_folder,
+    may_be_read,
+    older_copies,
+    size_of,
+    stem,
+    within,
+)
+from .folders import folders_in, folders_of_recordings, no_files, passed_over
 from .keypoints.tables import DeepLabCutReader, KeyPointsReader, SLEAPReader
 from .labels import labels_beside
 from .markers.c3d import C3DReader
@@ -177,6 +187,8 @@ class Takes:
         unreadable: Why not, by name, for the others.
         folders: Names of the folders in it that may hold recordings, too, and are not looked into;
             `find_takes` does.
+        passed_over: Names of the files in it that are called as key points of animals may be, and
+            hold none.
 
     Example:
         >>> from pathlib import Path
@@ -192,6 +204,7 @@ class Takes:
     recordings: tuple[Recording, ...]
     unreadable: Mapping[str, RecordingError]
     folders: tuple[str, ...] = ()
+    passed_over: tuple[str, ...] = ()
 
 
 def open_takes(
@@ -227,7 +240,12 @@ def open_takes(
     if not found:
         first = next(iter(unreadable.values()))
         raise RecordingError(f"none of {len(takes)} takes can be read; the first: {first}")
-    return Takes(tuple(found), MappingProxyType(unreadable), folders_of_recordings(Path(path)))
+    return Takes(
+        tuple(found),
+        MappingProxyType(unreadable),
+        folders_of_recordings(Path(path)),
+        passed_over(Path(path)),
+    )
 
 
 def take_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
@@ -489,6 +507,10 @@ def _part(take: TakeFiles, file: Path, read: object, hints: Hints | None) -> Rec
         part = right_handed(file, part)
     if archive_of(file) is not None:  # of which folders may hold files of one name
         part = replace(part, name=take.name)
+    if part.report and (older := older_copies(file)):
+        held = "an older copy" if older == 1 else f"{older} older copies"
+        said = f"the archive holds {held} of {file.name}, passed over"
+        part = replace(part, report=replace(part.report, notes=(*part.report.notes, said)))
     return part
 
 

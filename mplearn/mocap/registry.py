@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..errors import InvalidValueError, RecordingError
 from ..plugins import join_installed
-from .files import bad_file, head_text, is_file, read_bytes, suffix
+from .files import bad_file, head, head_text, is_file, read_bytes, suffix
 from .reader import Reader
 
 ENTRY_POINTS = "mplearn.readers"
@@ -19,6 +19,9 @@ _HDF5 = (
     "its CSV instead: of DeepLabCut by analyze_videos_converth5_to_csv, of SLEAP by File > Export "
     "Analysis CSV or sleap-convert --format analysis.csv"
 )
+_ARRAYS = (".h5", ".hdf5")  # which many programs write, and few of key points:
+_KEY_POINTS = ((b"df_with_missing",), (b"track_names", b"node_names"))  # names in those of such,
+_NAMES_WITHIN = 65_536  # which stand in so many bytes
 _SENT = "it as a stream: mplearn learn --live ndjson:- < FILE"
 _EXPORTED = dict.fromkeys((".h5", ".hdf5", ".slp"), _HDF5)  # what programs also write as a table
 _LINES = dict.fromkeys((".ndjson", ".jsonl"), _SENT)  # what was sent, or a journal of anything
@@ -83,6 +86,14 @@ def suffixes() -> tuple[str, ...]:
 def instead_of(path: Path) -> str:
     """Return what is read instead of a file that is also written as a table; else nothing."""
     return "" if suffix(path) in suffixes() else _EXPORTED.get(suffix(path), "")
+
+
+def holds_other_arrays(path: Path) -> bool:
+    """Whether a file of arrays is neither DeepLabCut's nor SLEAP's, by the names of its arrays."""
+    if suffix(path) not in _ARRAYS or not is_file(path):
+        return False
+    start = head(path, _NAMES_WITHIN)
+    return not any(all(name in start for name in names) for names in _KEY_POINTS)
 
 
 def reader_of(path: Path, *, any_suffix: bool = False) -> Reader | None:

@@ -283,6 +283,27 @@ def test_files_whose_names_are_one_path_are_all_read(tmp_path: Path, kind: str) 
     assert read == {"a/b": 10, "a/b (2)": 11, "a/b (3)": 12, "a/b (2) (2)": 13}
 
 
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+@pytest.mark.parametrize("kind", ["zip", "tar"])
+def test_of_a_file_that_was_appended_again_the_last_counts(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / f"a.{kind}"
+    copies = [write_bvh(tmp_path / f"{k}", bvh_values(10 + k)).read_bytes() for k in range(3)]
+    for name, text in (("b", copies[0]), ("a", copies[1]), ("b", copies[2]), ("b", copies[1])):
+        if kind == "zip":
+            with ZipFile(path, "a") as made:
+                made.writestr(f"{name}.bvh", text)
+        else:
+            with tarfile.open(path, "a") as tar:
+                info = tarfile.TarInfo(f"{name}.bvh")
+                info.size = len(text)
+                tar.addfile(info, io.BytesIO(text))
+    a, b = open_recordings(path)
+    assert (a.name, len(a), b.name, len(b)) == ("a", 11, "b", 11)
+    assert a.report and b.report
+    assert b.report.notes[-1] == "the archive holds 2 older copies of b.bvh, passed over"
+    assert not any("older" in note for note in a.report.notes)
+
+
 def test_a_file_without_a_name_is_none(tmp_path: Path) -> None:
     text = write_bvh(tmp_path / "a").read_bytes()
     with ZipFile(tmp_path / "a.zip", "w") as made:

@@ -411,7 +411,7 @@ def test_unknown_suffix_and_unreadable_folders(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"unknown suffix '\.mp4'.*\.c3d"):
         open_recording(other)
     for name in ("mouse.h5", "mouse.slp"):  # which DeepLabCut and SLEAP write as tables, too
-        (tmp_path / name).write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(64))
+        (tmp_path / name).write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(64) + b"df_with_missing")
         with pytest.raises(RecordingError, match=r"unknown suffix.*its CSV instead: of DeepLabCut"):
             open_recording(tmp_path / name)
         with pytest.raises(RecordingError, match=rf"{name}.*its CSV instead: of DeepLabCut"):
@@ -427,6 +427,13 @@ def test_unknown_suffix_and_unreadable_folders(tmp_path: Path) -> None:
         (tmp_path / name).unlink()
     with pytest.raises(RecordingError, match=rf"{re.escape(str(tmp_path))}.*nothing readable"):
         open_recordings(tmp_path)
+    (tmp_path / "weather.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(64) + b"temperatures")
+    with pytest.raises(RecordingError, match="nothing readable"):  # that is nobody's motion
+        open_takes(tmp_path)
+    table = write_csv(tmp_path / "walk.csv")
+    assert open_takes(tmp_path, strict=True).passed_over == ("weather.h5",)
+    table.unlink()
+    (tmp_path / "weather.h5").unlink()
     for folder in ("anna", "notes"):
         (tmp_path / folder).mkdir()
     write_csv(tmp_path / "anna" / "walk.csv")

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from mplearn_agents.recordings.reading import (
     add_reading_arguments,
     hints_of,
-    say_folders,
     say_left_out,
+    say_not_read,
 )
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> None:
     else:
         for name, error in takes.unreadable.items():
             say_left_out(console, name, error)
-        say_folders(console, takes)
+        say_not_read(console, takes)
         for each in found:
             _say(console, each)
     _draw(args, found, console)

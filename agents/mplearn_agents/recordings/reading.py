@@ -113,7 +113,7 @@ def say_takes(console: Console, takes: Takes) -> None:
     """Say how the takes of a folder were read, and which could not be, or were not looked for."""
     for name, error in takes.unreadable.items():
         say_left_out(console, name, error)
-    say_folders(console, takes)
+    say_not_read(console, takes)
     said: dict[str, list[str]] = {}
     for recording in takes.recordings:
         for line in remarks(recording):
@@ -122,11 +122,17 @@ def say_takes(console: Console, takes: Takes) -> None:
         console.print(printable(f"{_listed(names)}: {line}"), markup=False, highlight=False)
 
 
-def say_folders(console: Console, takes: Takes) -> None:
-    """Say which folders in a folder are not looked into."""
+def say_not_read(console: Console, takes: Takes) -> None:
+    """Say which folders in a folder are not looked into, and which files are no recordings."""
+    lines = []
     if takes.folders:
-        text = f"not looked into, folders in it: {_listed(takes.folders)} (learn --jobs N does)"
-        console.print(printable(text), markup=False, highlight=False, style="yellow")
+        lines.append(
+            f"not looked into, folders in it: {_listed(takes.folders)} (learn --jobs N does)"
+        )
+    if takes.passed_over:
+        lines.append(f"passed over, no key points in it: {_listed(takes.passed_over)}")
+    for line in lines:
+        console.print(printable(line), markup=False, highlight=False, style="yellow")
 
 
 def say_bodies(console: Console, bodies: Bodies) -> None:

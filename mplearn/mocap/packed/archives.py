@@ -53,10 +53,13 @@ class Member(NamedTuple):
     Attributes:
         packed: Its size there [bytes].
         size: Its size unpacked, as the archive says [bytes].
+        older: How many files of its name stand before it: an archive that files are appended to
+            keeps what they replace.
     """
 
     packed: int
     size: int
+    older: int = 0
 
 
 def is_archive(path: Path) -> bool:
@@ -187,10 +190,12 @@ class _Zip(_Archive):
         if files and all(info.flag_bits & _ENCRYPTED for info in files):
             raise _encrypted()
         _refuse_endless(path.stat().st_size, (info.file_size for info in files))
-        names = _Names()
-        self._named = {name: info for info in files if (name := names.plain(info.filename))}
+        names, times = _Names(), Counter(info.filename for info in files)
+        latest = {info.filename: info for info in files}.values()
+        self._named = {name: info for info in latest if (name := names.plain(info.filename))}
         self.files = {
-            name: Member(info.compress_size, info.file_size) for name, info in self._named.items()
+            name: Member(info.compress_size, info.file_size, times[info.filename] - 1)
+            for name, info in self._named.items()
         }
 
     def open(self, name: str) -> io.BufferedIOBase:
@@ -214,18 +219,26 @@ class _Tar(_Archive):
     def __init__(self, path: Path) -> None:
         self._file = _unpacked(path)
         self._lock = Lock()
-        self._at: dict[str, tuple[int, int]] = {}
+        latest: dict[str, tuple[int, int]] = {}
+        times: Counter[str] = Counter()
         with tarfile.open(fileobj=self._file, mode="r:") as archive:
-            before, names = -1, _Names()
+            before = -1
             while (info := archive.next()) is not None:
                 if archive.offset <= before:  # a negative size leads back, again and again
                     raise tarfile.ReadError("a file ends before it begins")
                 before = archive.offset
                 archive.members = []  # type: ignore[attr-defined] # else it keeps all of them
-                if info.isreg() and not info.issparse() and (name := names.plain(info.name)):
-                    self._at[name] = info.offset_data, info.size
-        _refuse_endless(self._file.seek(0, os.SEEK_END), (size for _, size in self._at.values()))
-        self.files = {name: Member(size, size) for name, (_, size) in self._at.items()}
+                if info.isreg() and not info.issparse():
+                    latest[info.name] = info.offset_data, info.size
+                    times[info.name] += 1
+        _refuse_endless(self._file.seek(0, os.SEEK_END), (size for _, size in latest.values()))
+        names = _Names()
+        called = {name: raw for raw in latest if (name := names.plain(raw))}
+        self._at = {name: latest[raw] for name, raw in called.items()}
+        self.files = {
+            name: Member(self._at[name][1], self._at[name][1], times[raw] - 1)
+            for name, raw in called.items()
+        }
 
     def __del__(self) -> None:
         with suppress(AttributeError):  # where it could not be opened
