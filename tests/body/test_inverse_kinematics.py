@@ -201,6 +201,30 @@ def test_joint_angles_of_the_human_under_noise():
             assert value < (4.0 if name in loose else 2.5), (name, value)
 
 
+def test_noise_is_not_searched_farther_than_it_tells():
+    body = human_body()
+    truth = smooth_motion(body, 200, 100.0, seed=4, amplitude=0.15)
+    clean = markers_of(body, truth)
+    noisy = clean + np.random.default_rng(0).normal(0, 0.01, clean.shape)
+
+    def followed(frames, rough_tolerance):
+        ik = known(body, truth[0], rough_tolerance=rough_tolerance)
+        steps = [(ik.update(frame), ik.iterations) for frame in frames]
+        return np.array([q for q, _ in steps]), sum(n for _, n in steps) / len(frames)
+
+    (whole, longer), (found, shorter) = followed(noisy, 1e-9), followed(noisy, 0.03)
+    off = np.degrees(np.abs(found - whole)[:, 7:])
+    noise = np.degrees(np.abs(whole - truth)[:, 7:])
+    assert 0.0 < np.median(off) < 0.01 * np.median(noise)
+    assert shorter < longer - 1.0
+    ik = known(body, truth[0])
+    assert np.array_equal(ik.update_many(noisy), found)  # at once as one by one
+    bent = clean.copy()  # a leg that the body cannot follow is no noise
+    bent[:, [name in ("LTHI", "LKNE", "LTIB", "LANK", "LHEE", "LTOE") for name in NAMES]] += 0.1
+    for frames in (clean, bent):
+        assert np.array_equal(followed(frames, 1e-9)[0], followed(frames, 0.03)[0])
+
+
 def test_a_hidden_limb_is_held_and_said_to_be_uncertain():
     body = robot_body()
     truth = smooth_motion(body, 200, 100.0, seed=3)

@@ -79,6 +79,8 @@ class Search(NamedTuple):
         tolerance: Stop when no degree of freedom moved further [m, rad].
         widening: Factor on c in the first iteration, when the posture is still the last frame's.
         largest_step: Longest step of one iteration in any degree of freedom [m, rad].
+        noise_m: Where half of the markers move against others on their body by more than this [m],
+        rough_tolerance: the search stops when no degree of freedom moved further than this.
     """
 
     outlier_m: float
@@ -86,6 +88,8 @@ class Search(NamedTuple):
     tolerance: float
     widening: float = 1.0
     largest_step: float = 0.5
+    noise_m: float = np.inf
+    rough_tolerance: float = 0.0
 
 
 # the sums over the markers that a body carries, each weighted, about the base's place
@@ -189,8 +193,36 @@ def solve_frame(
         iteration += 1
         if longest < search.tolerance:
             break
+        near = iteration > 1 and longest < search.rough_tolerance
+        if near and rough(seen, markers.bodies, len(linkage.parent), search.noise_m):
+            break
     inverse_diagonal(normal, moves.free, linkage.above, variance)
     return iteration
+
+
+@njit(cache=True)
+def rough(seen: Seen, bodies: IntArray, n_bodies: int, noise_m: float) -> bool:
+    """Say whether noise moves most markers against the others on their body by more than this.
+
+    What is the same for all markers of a body is no noise: the body does not fit there.
+    """
+    frame, points, residuals = seen
+    sums = np.zeros((n_bodies, 4))  # how many markers it carries, and their errors
+    for m in range(len(frame)):
+        if residuals[m] == residuals[m]:
+            sums[bodies[m], 0] += 1.0
+            for k in range(3):
+                sums[bodies[m], 1 + k] += frame[m, k] - points[m, k]
+    apart, known = 0, 0
+    for m in range(len(frame)):
+        on = sums[bodies[m]]
+        if residuals[m] == residuals[m] and on[0] > 2.0:
+            squared = 0.0
+            for k in range(3):
+                squared += (frame[m, k] - points[m, k] - on[1 + k] / on[0]) ** 2
+            known += 1
+            apart += squared > noise_m**2 * (1.0 - 1.0 / on[0])
+    return 2 * apart > known
 
 
 @njit(cache=True)

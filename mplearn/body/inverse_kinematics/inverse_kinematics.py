@@ -30,6 +30,7 @@ from .following import FEWEST_MARKERS as FEWEST_MARKERS
 from .following import WIDENING, Followed, FollowRules, Joints, follow_frames
 from .gauss_newton import Markers, Search
 
+HALF_WITHIN = 1.2  # standard deviations of noise, of three markers on a body that fits them best
 NEAR_M = 0.03  # root mean square distance of the markers at which a posture is right
 
 
@@ -48,6 +49,8 @@ class IKConfig:
         most_uncertain: Bound on the uncertainty of a joint [rad] or the base [m].
         max_iterations: Gauss-Newton steps a frame.
         tolerance: Change below which a frame is solved [rad, m].
+        rough_tolerance: The same where markers move against others on their segment as by noise of
+            `marker_sigma_m` and more, which does a hundred times that to the angles.
 
     Example:
         >>> IKConfig(marker_sigma_m=0.02).outlier_m  # of markers on loose clothes
@@ -63,6 +66,7 @@ class IKConfig:
     most_uncertain: float = 0.7
     max_iterations: int = 6
     tolerance: float = 1e-3
+    rough_tolerance: float = 0.03
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -163,7 +167,12 @@ class InverseKinematics:
             drift=self._drift**2 / self.rate_hz,
             most_uncertain=self.config.most_uncertain**2,
             search=Search(
-                self.config.outlier_m, self.config.max_iterations, self.config.tolerance, WIDENING
+                self.config.outlier_m,
+                self.config.max_iterations,
+                self.config.tolerance,
+                WIDENING,
+                noise_m=HALF_WITHIN * self.config.marker_sigma_m,
+                rough_tolerance=self.config.rough_tolerance,
             ),
         )
         self._weights = np.full(len(self._used), self.config.marker_sigma_m**-2)
