@@ -6,12 +6,12 @@ import asyncio
 import secrets
 import socket
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from typing import Any
 
 from mplearn.errors import InvalidValueError
 from mplearn.extras import require
-from mplearn_agents.terminal.interrupts import python_interrupts
+from mplearn_agents.terminal.interrupts import asked_in_loop
 
 from .hub import Hub
 from .messages import LONGEST_REQUEST
@@ -48,7 +48,7 @@ def serve(
     listening = listen(host, port)
     url = _address(host, listening.getsockname()[1], token)
     left_s: list[float] = []
-    with listening, suppress(KeyboardInterrupt), python_interrupts():
+    with listening, suppress(KeyboardInterrupt):
         asyncio.run(_serve(settings, listening, token, robot, lambda: ready(url), left_s))
     return sum(left_s)
 
@@ -64,21 +64,23 @@ async def _serve(
     uvicorn = require("uvicorn", "ui")
     hub = Hub(settings, robot=robot)
     server = uvicorn.Server(uvicorn.Config(make_app(hub, token=token), **page_config()))
-    hub.start()
-    serving = asyncio.create_task(server.serve(sockets=[listening]))
-    ends = (serving, hub.failed)
-    try:
-        await asyncio.wait((*ends, hub.begun), return_when=asyncio.FIRST_COMPLETED)
-        if not any(end.done() for end in ends):
-            ready()
-            await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
-        if hub.failed.done():
-            raise InvalidValueError(hub.failed.result())
-    finally:
-        server.should_exit = True
-        await hub.close()
-        left_s.append(hub.behind_s)
-        await serving
+    server.capture_signals = nullcontext  # they come here
+    with asked_in_loop() as asked:
+        hub.start()
+        serving = asyncio.create_task(server.serve(sockets=[listening]))
+        ends = (serving, hub.failed, asked)
+        try:
+            await asyncio.wait((*ends, hub.begun), return_when=asyncio.FIRST_COMPLETED)
+            if not any(end.done() for end in ends):
+                ready()
+                await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+            if hub.failed.done():
+                raise InvalidValueError(hub.failed.result())
+        finally:
+            server.should_exit = True
+            await hub.close()
+            left_s.append(hub.behind_s)
+            await serving
 
 
 def page_config() -> dict[str, Any]:
