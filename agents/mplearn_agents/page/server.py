@@ -77,12 +77,9 @@ def make_app(hub: Hub, *, token: str = "") -> Starlette:
         client = hub.enter()
         sending = asyncio.create_task(_send(websocket, hub, client))
         try:
-            while True:
-                text = await websocket.receive_text()
+            while (text := await _asked(websocket)) is not None:
                 hub.ask(client, text)
                 await asyncio.sleep(_BETWEEN_REQUESTS_S)
-        except (WebSocketDisconnect, KeyError):  # KeyError: bytes, which no page of ours sends
-            pass
         finally:
             hub.leave(client)
             sending.cancel()
@@ -97,6 +94,14 @@ def make_app(hub: Hub, *, token: str = "") -> Starlette:
         ],
         middleware=[Middleware(_SafeHeaders)],
     )
+
+
+async def _asked(websocket: WebSocket) -> str | None:
+    """Return the next request; None where the page is gone, or sent what no page of ours does."""
+    try:
+        return await websocket.receive_text()
+    except (WebSocketDisconnect, RuntimeError, KeyError):  # RuntimeError: who sends has found out
+        return None  # KeyError: it sent bytes
 
 
 async def _send(websocket: WebSocket, hub: Hub, client: Client) -> None:

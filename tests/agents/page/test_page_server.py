@@ -1,5 +1,6 @@
 import http.client
 import json
+import logging
 import time
 
 import numpy as np
@@ -170,6 +171,22 @@ def test_bytes_from_a_page_end_its_socket_quietly(server):
         with pytest.raises(ConnectionClosed):
             for _ in range(1000):
                 socket.recv(timeout=5)
+
+
+def test_who_goes_with_much_still_asked_goes_quietly(server, caplog):
+    """Who sends to it finds out first; what it asked is not an error of the server."""
+    logger = logging.getLogger("uvicorn.error")
+    logger.addHandler(caplog.handler)
+    with open_socket(server) as socket:
+        texts(socket, "hello")
+        for _ in range(300):
+            socket.send("{}")
+        socket.socket.close()
+    end = time.monotonic() + 20
+    while server.hub.clients and time.monotonic() < end:
+        time.sleep(0.02)
+    logger.removeHandler(caplog.handler)
+    assert not server.hub.clients and not caplog.records
 
 
 def test_who_reads_slowly_gets_the_latest_and_costs_no_memory(server):
