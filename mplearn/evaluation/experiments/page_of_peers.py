@@ -9,7 +9,7 @@ from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
@@ -31,6 +31,7 @@ ACTIVITY_HZ = 10.0
 BOUNDARY_HZ = 30.0
 TOLERANCE_S = 0.25
 
+_Found = TypeVar("_Found")
 Partition = Callable[[FloatArray, float, int, int], IntArray]
 
 
@@ -102,7 +103,8 @@ def activity_peers_table(recordings: Iterable[Recording]) -> Table:
             labelled = truth != ""
             changes = int((truth[labelled][1:] != truth[labelled][:-1]).sum())
             asked = (postures, own.rate_hz, len(set(truth[labelled].tolist())), changes)
-            classes, took_s, peak = _measured(lambda a=asked, m=method: m(*a))  # type: ignore[misc]
+            peak = _most_allocated(partial(method, *asked))
+            classes, took_s = _timed(partial(method, *asked))
             at = np.arange(len(truth)) * own.rate_hz / recording.rate_hz
             frames = classes[np.minimum(at.astype(np.int64), len(classes) - 1)]
             score = agreement(truth[labelled], frames[labelled])
@@ -151,10 +153,12 @@ def boundary_peers_table(takes: Iterable[Recording]) -> Table:
         if library and find_spec(library) is None:
             left_out.append(f"{name} (not installed: pip install {library})")
             continue
-        scores, took_s, peak = [], 0.0, 0
+        longest = max((frames for _, _, frames in seen), key=len)
+        peak = _most_allocated(partial(cut, longest, BOUNDARY_HZ))
+        scores, took_s = [], 0.0
         for take, own, frames in seen:
-            cuts, own_s, most = _measured(lambda f=frames, c=cut: c(f, BOUNDARY_HZ))  # type: ignore[misc]
-            took_s, peak = took_s + own_s, max(peak, most)
+            cuts, own_s = _timed(partial(cut, frames, BOUNDARY_HZ))
+            took_s += own_s
             scores.append(_scored(take, own, cuts))
         score = BoundaryScore.pooled(scores)
         minutes = sum(own.duration_s for _, own, _ in seen) / 60
@@ -174,7 +178,7 @@ def boundary_peers_table(takes: Iterable[Recording]) -> Table:
         f"{BOUNDARY_HZ:g} Hz. True boundaries are the joins of repetitions and the reversal inside "
         f"each; matched one to one within {TOLERANCE_S} s. Ours is the default segmenter, on-line; "
         "PELT has the penalty of the Bayesian information criterion, with all variance, or a share "
-        "of it, for that of noise; the others have their defaults. "
+        "of it, for that of noise; the others have their defaults. Memory is that of the longest. "
         "ClaSP and FLOSS look for changes of the activity, not for turns of a motion."
     )
     return Table(
@@ -192,16 +196,20 @@ def _scored(take: Recording, own: Recording, cuts: list[int]) -> BoundaryScore:
     return score_boundaries(segments, take.labels, take.rate_hz, tolerance_s=TOLERANCE_S)
 
 
-def _measured(work: Callable[[], Any]) -> tuple[Any, float, int]:
-    """Return what some work returns, its time [s], and the most that it allocates [byte]."""
-    work()  # compiles, and imports
+def _timed(work: Callable[[], _Found]) -> tuple[_Found, float]:
+    """Return what some work returns, and its time [s]."""
     begin = time.process_time()
     result = work()
-    took_s = time.process_time() - begin
+    return result, time.process_time() - begin
+
+
+def _most_allocated(work: Callable[[], object]) -> int:
+    """Return the most that some work allocates [byte]."""
+    work()  # compiles, and imports
     tracemalloc.start()
     try:
         work()
-        return result, took_s, tracemalloc.get_traced_memory()[1]
+        return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
 
