@@ -27,6 +27,8 @@ from .files import (
     within,
 )
 from .folders import folders_in, folders_of_recordings, no_files, passed_over
+from .keypoints.animals import AnimalReader
+from .keypoints.hdf5 import hdf5_readers
 from .keypoints.tables import DeepLabCutReader, KeyPointsReader, SLEAPReader
 from .labels import labels_beside
 from .markers.c3d import C3DReader
@@ -76,6 +78,7 @@ for _reader in (
     KeyPointsReader(),
     DeepLabCutReader(),
     SLEAPReader(),
+    *hdf5_readers(),
 ):
     register_reader(_reader)
 
@@ -417,6 +420,7 @@ def _found_in_folder(path: Path) -> tuple[dict[str, TakeFiles], dict[str, Record
                 named += [(inner + n, replace(t, name=inner + n)) for n, t in takes.items()]
         elif may_be_read(file) and (fitting := reader_of(file)) is not None:
             files.setdefault(fitting, []).append(file)
+    _leave_what_is_a_table(files)
     for reader, group in files.items():
         for name, taken in reader.takes(group).items():
             named.append((taken[0].name, TakeFiles(name, reader.person(name), taken, reader)))
@@ -425,6 +429,15 @@ def _found_in_folder(path: Path) -> tuple[dict[str, TakeFiles], dict[str, Record
     times = Counter(take.name for _, take in named)
     takes = {t.name if times[t.name] == 1 else whole: t for whole, t in named}
     return {name: replace(takes[name], name=name) for name in sorted(takes)}, unreadable
+
+
+def _leave_what_is_a_table(files: Mapping[Reader, list[Path]]) -> None:
+    """Leave out HDF5 of key points that the program has also written as a table beside it."""
+    both = {r: group for r, group in files.items() if isinstance(r, AnimalReader)}
+    tables = {stem(file) for r, group in both.items() if ".csv" in r.suffixes for file in group}
+    for reader, group in both.items():
+        if ".csv" not in reader.suffixes:
+            group[:] = [file for file in group if stem(file) not in tables]
 
 
 def _found_in_archive(

@@ -17,7 +17,8 @@ ENTRY_POINTS = "mplearn.readers"
 _XML = re.compile(r"<\?XML[^>]*>\s*")
 _HDF5 = (
     "its CSV instead: of DeepLabCut by analyze_videos_converth5_to_csv, of SLEAP by File > Export "
-    "Analysis CSV or sleap-convert --format analysis.csv"
+    "Analysis CSV or sleap-convert --format analysis.csv; or their HDF5 (.h5), with h5py installed "
+    "(pip install 'mplearn[hdf5]')"
 )
 _ARRAYS = (".h5", ".hdf5")  # which many programs write, and few of key points:
 _KEY_POINTS = ((b"df_with_missing",), (b"track_names", b"node_names"))  # names in those of such,

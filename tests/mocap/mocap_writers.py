@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import pickle
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -655,6 +656,35 @@ def write_key_points(path: Path) -> Path:
     return path
 
 
+def write_deeplabcut_hdf5(path: Path) -> Path:
+    """Write rows as pandas does by PyTables; see the test of a file that it has written itself."""
+    import h5py
+
+    values = keypoint_values()
+    coords = ("x", "y", "likelihood")
+    heads = [("net", name, coord) for name in KEYPOINTS for coord in coords]
+    rows = np.zeros(len(values), [("index", "<i8"), ("values_block_0", "<f8", (values.shape[1],))])
+    rows["index"], rows["values_block_0"] = np.arange(len(values)), values
+    with h5py.File(path, "w") as file:
+        frame = file.create_group("df_with_missing")
+        frame.attrs["pandas_type"] = np.bytes_(b"frame_table")
+        frame["table"] = rows
+        frame["table"].attrs["values_block_0_kind"] = np.bytes_(pickle.dumps(heads, 0))
+    return path
+
+
+def write_sleap_hdf5(path: Path) -> Path:
+    import h5py
+
+    values = keypoint_values().reshape(12, len(KEYPOINTS), 3)
+    with h5py.File(path, "w") as file:
+        file["tracks"] = values[..., :2].transpose(2, 1, 0)[None]
+        file["point_scores"] = values[..., 2].T[None]
+        file["node_names"] = np.array(KEYPOINTS, "S")
+        file["track_names"] = np.array(["mouse"], "S")
+    return path
+
+
 KEYPOINTS = ("snout", "left_ear", "right_ear", "tail_base")
 
 
@@ -688,8 +718,18 @@ WRITERS: dict[str, tuple[str, Writer]] = {
     "DeepLabCut": ("take.csv", write_deeplabcut),
     "SLEAP": ("take.csv", write_sleap),
     "key points": ("take.csv", write_key_points),
+    "DeepLabCut HDF5": ("take.h5", write_deeplabcut_hdf5),
+    "SLEAP HDF5": ("take.h5", write_sleap_hdf5),
 }
 """For each reader, by its format: a file name, and what writes a small valid file there."""
+
+BINARY = frozenset(
+    (
+        *("C3D", "Theia", "SMPL", "XDF", "joint array", "G1 array"),
+        *("DeepLabCut HDF5", "SLEAP HDF5"),
+    )
+)
+"""Those that are no text."""
 
 
 def write(folder: Path, format: str) -> Path:

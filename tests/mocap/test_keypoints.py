@@ -1,15 +1,17 @@
 """Key points of animals: the same wherever they are, however large, however they are turned."""
 
+import pickle
 import re
 import tracemalloc
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pandas
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mocap_writers import KEYPOINTS, keypoint_values
+from mocap_writers import KEYPOINTS, keypoint_values, write
 
 from mplearn import LearnerConfig, MotionLearner, open_recording
 from mplearn.errors import RecordingError, RecordingWarning
@@ -281,3 +283,50 @@ def test_many_names_far_apart_take_no_memory(tmp_path: Path, each: str) -> None:
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert most < 50e6
+
+
+@pytest.mark.parametrize("format", ["DeepLabCut", "SLEAP"])
+def test_hdf5_holds_what_the_table_does(tmp_path: Path, format: str) -> None:
+    hdf5 = write(tmp_path, f"{format} HDF5")
+    found = open_recording(hdf5)
+    table = open_recording(write(tmp_path, format))
+    np.testing.assert_allclose(found.frames, table.frames, atol=1e-6)
+    assert (found.channels, found.person) == (table.channels, table.person)
+    (take,) = find_takes(tmp_path).takes  # both hold it: the table is read
+    assert take.reader.format == format
+    other = hdf5.rename(tmp_path / "other.h5")
+    assert [each.name for each in find_takes(tmp_path).takes] == ["other", "take"]
+    with h5py.File(tmp_path / "weights.hdf5", "w") as file:  # of something else
+        file["layer"] = np.zeros(3)
+    assert [each.name for each in find_takes(tmp_path).takes] == ["other", "take"]
+    with pytest.raises(RecordingError, match=r"holds \['layer'\]; expected a table of DeepLabCut"):
+        open_recording(tmp_path / "weights.hdf5")
+    other.write_bytes(other.read_bytes()[:-500])
+    with pytest.raises(RecordingError, match=r"other\.h5: damaged"):
+        open_recordings(tmp_path, strict=True)
+
+
+@pytest.mark.parametrize("order", ["tckf", "fkct", "ftkc"])
+@pytest.mark.parametrize("z", [False, True])
+def test_sleap_exports_arrays_in_several_orders(tmp_path: Path, order: str, z: bool) -> None:
+    points = np.stack([mouse(4.0, z), mouse(4.0, z)[::-1]], axis=1)  # (f, t, k, c)
+    pixels = points if z else points * [1, -1]
+    pixels[90:, 0] = np.nan  # seen less often than the other
+    with h5py.File(tmp_path / "pair_50fps.h5", "w") as file:
+        file["tracks"] = np.einsum(f"ftkc->{order}", pixels)
+        file["node_names"] = np.array(NAMES, "S")
+        file["track_names"] = np.array(["left", "right"], "S")
+    left, right = open_recordings(tmp_path / "pair_50fps.h5")
+    assert (left.person, right.person, right.rate_hz) == ("left", "right", 50.0)
+    expected, channels, _ = seen_from_the_body(mouse(4.0, z)[::-1], NAMES, RATE_HZ)
+    assert right.channels == channels
+    np.testing.assert_allclose(right.frames, expected, atol=1e-6)
+
+
+def test_what_pandas_pickled_is_only_names(tmp_path: Path) -> None:
+    path = write(tmp_path, "DeepLabCut HDF5")
+    with h5py.File(path, "r+") as file:
+        told = np.bytes_(pickle.dumps([Path("found"), "x"], 0))
+        file["df_with_missing/table"].attrs["values_block_0_kind"] = told
+    with pytest.raises(RecordingError, match=r"damaged \(pathlib"):
+        open_recording(path)

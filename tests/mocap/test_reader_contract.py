@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from mocap_writers import WRITERS, write, zipped
+from mocap_writers import BINARY, WRITERS, write, zipped
 
 from mplearn import plugins
 from mplearn.errors import (
@@ -34,16 +34,14 @@ from mplearn.mocap import (
 from mplearn.recording import Recording
 
 FORMATS = sorted(WRITERS)
-WITHOUT_ROWS = {"C3D", "Theia", "MVNX", "SMPL", "XDF", "joint array", "G1 array"}
+WITHOUT_ROWS = BINARY | {"MVNX"}
 SKELETAL = {"AMC", "BVH", "G1 CSV", "G1 array", "MVNX", "SMPL"}
 # in body lengths, of anything: no person in metres
-FROM_THE_BODY = {"DeepLabCut", "SLEAP", "key points"}
+FROM_THE_BODY = {"DeepLabCut", "SLEAP", "key points", "DeepLabCut HDF5", "SLEAP HDF5"}
 RATES_HZ = {
     "AMC": 120.0,
     "G1 CSV": 30.0,
-    "DeepLabCut": 30.0,
-    "SLEAP": 30.0,
-    "key points": 30.0,
+    **dict.fromkeys(FROM_THE_BODY, 30.0),
 }  # which do not say theirs
 TEXT_FORMATS = [format for format in FORMATS if format not in WITHOUT_ROWS]
 SEPARATORS = {

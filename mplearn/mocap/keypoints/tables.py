@@ -1,62 +1,45 @@
 """Tables of key points: of DeepLabCut [Mathis2018], of SLEAP [Pereira2022], and their like, as CSV.
 
 Names stand in rows of heads above the columns, in one row (``nose.x, nose.y, nose.score``), or a
-row is one point (``frame_idx, track, node, x, y, score``). Of several animals `read` returns the
-one that was seen most, `read_each` all that were seen at least half as often.
+row is one point (``frame_idx, track, node, x, y, score``).
 """
 
 from __future__ import annotations
 
 import re
-from abc import abstractmethod
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from copy import deepcopy
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from ...errors import RecordingError
-from ...recording import FloatArray, Recording
-from ..files import bad_file, head_text, read_text, stem
+from ...recording import FloatArray
+from ..files import bad_file, head_text, read_text
 from ..findings import Findings
 from ..markers.sheet import Sheet
 from ..numbers import numbers, without_cut_row
-from ..options import option
-from ..rates import rate_beside
-from ..reader import Hints, Reader
-from .egocentric import seen_from_the_body
-
-USUAL_HZ = 30.0
-"""Pictures a second where nobody says how many [1/s]."""
+from ..reader import Hints
+from .animals import (
+    COORDS,
+    SURE,
+    AnimalReader,
+    Animals,
+    Track,
+    by_frame,
+    often_seen,
+    points_of,
+    rate_of,
+    span_of,
+)
 
 _HEADS = ("scorer", "individuals", "bodyparts", "coords")  # as they stand, the last two always
-_SURE = ("likelihood", "score", "confidence", "conf", "probability", "visibility")
-_COORDS = frozenset(("x", "y", "z", *_SURE))
 _FRAMES = ("frame_idx", "frame")
 _TRACKS = ("track", "instance", "individual", "animal")
 _NODES = ("node", "bodypart", "keypoint")
 _LOOK = 6  # rows in which heads are looked for
-_OFTEN = 0.5  # of what is seen of one animal most, that is seen of another that is read, too
 _FEWEST = 3  # points that a table must name to be taken for one of key points
-
-
-class AnimalReader(Reader):
-    """Reads tables of key points, of one animal or of several."""
-
-    def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
-        """Read the animal that was seen most; see `Reader.read`."""
-        return self._animals(path, hints).seen_most()
-
-    def read_each(self, path: Path, hints: Hints, *, positions: bool) -> tuple[Recording, ...]:
-        """Read all animals that were seen often; see `Reader.read_each`."""
-        return self._animals(path, hints).seen_often()
-
-    @abstractmethod
-    def _animals(self, path: Path, hints: Hints) -> _Animals:
-        """Return the animals in a file."""
 
 
 class DeepLabCutReader(AnimalReader):
@@ -74,7 +57,7 @@ class DeepLabCutReader(AnimalReader):
         named = {row[0].lower() for row in rows[: at + 1] if row}
         return not named.isdisjoint(_HEADS) or "likelihood" in map(str.lower, rows[at])
 
-    def _animals(self, path: Path, hints: Hints) -> _Animals:
+    def _animals(self, path: Path, hints: Hints) -> Animals:
         findings = Findings(self.format)
         rows = _rows(path, findings)
         at = _coords_row([row for _, row in rows[:_LOOK]])
@@ -88,15 +71,12 @@ class DeepLabCutReader(AnimalReader):
         animals = (*heads.get("individuals", ()), *[""] * width)[:width]
         body = [(n, row) for n, row in rows[at + 1 :] if any(row[1:])]  # below the index' name
         table = numbers(path, [row for _, row in body], width, [n for n, _ in body])
-        table = _by_frame(path, table[:, 0], table)
+        table = by_frame(path, table[:, 0], table)
         columns: dict[str, dict[str, dict[str, int]]] = {}
         for k in range(1, width):
             points = columns.setdefault(animals[k], {})
             points.setdefault(parts[k] if k < len(parts) else "", {})[coords[k].lower()] = k
-        rate_hz = _rate(path, hints, findings)
-        tracks = {animal: _points(path, table, points) for animal, points in columns.items()}
-        seen = {each: int(np.isfinite(track[0]).sum()) for each, track in tracks.items()}
-        return _Animals(path, seen, tracks.__getitem__, rate_hz, findings)
+        return Animals.in_columns(path, table, columns, hints, findings)
 
 
 class SLEAPReader(AnimalReader):
@@ -113,7 +93,7 @@ class SLEAPReader(AnimalReader):
         head = _Head.of(rows[0])
         return head.is_sleap and bool(head.points)
 
-    def _animals(self, path: Path, hints: Hints) -> _Animals:
+    def _animals(self, path: Path, hints: Hints) -> Animals:
         return _flat(path, hints, Findings(self.format))
 
 
@@ -131,10 +111,10 @@ class KeyPointsReader(AnimalReader):
         return (
             len(flat) >= _FEWEST
             and not any("z" in own for own in points.values())
-            and all(not own.keys().isdisjoint(_SURE) for own in flat)
+            and all(not own.keys().isdisjoint(SURE) for own in flat)
         )
 
-    def _animals(self, path: Path, hints: Hints) -> _Animals:
+    def _animals(self, path: Path, hints: Hints) -> Animals:
         return _flat(path, hints, Findings(self.format))
 
 
@@ -169,10 +149,10 @@ class _Head:
         points: dict[str, dict[str, int]] = {}
         for k, name in enumerate(row):
             match = re.fullmatch(r"(.+)[._ ](\w+)", name)
-            if match and match[2].lower() in _COORDS and match[1].lower() not in _TRACKS:
+            if match and match[2].lower() in COORDS and match[1].lower() not in _TRACKS:
                 points.setdefault(match[1], {})[match[2].lower()] = k
         if node is not None:
-            points = {"": {name: names.index(name) for name in names if name in _COORDS}}
+            points = {"": {name: names.index(name) for name in names if name in COORDS}}
         return cls(points, column(_FRAMES), column(_TRACKS), node, "frame_idx" in names)
 
     @property
@@ -181,7 +161,7 @@ class _Head:
         return {(p, c): k for p, each in self.points.items() for c, k in each.items()}
 
 
-def _flat(path: Path, hints: Hints, findings: Findings) -> _Animals:
+def _flat(path: Path, hints: Hints, findings: Findings) -> Animals:
     """Read a table with one row of names."""
     head, lines, body = _named_rows(path, findings)
     coords = head.coords
@@ -203,7 +183,9 @@ def _flat(path: Path, hints: Hints, findings: Findings) -> _Animals:
     def begins_at_once() -> bool:
         """Whether all tables can begin with the file's first frame."""
         whole = len(at) and at.min() >= 0 and (at == np.rint(at)).all()
-        width = {each: len(coords) * len({nodes[k] for k in rows[each]}) for each in _often(seen)}
+        width = {
+            each: len(coords) * len({nodes[k] for k in rows[each]}) for each in often_seen(seen)
+        }
         return bool(whole) and most >= sum(
             (at[rows[each]].max() - at.min() + 1) * n for each, n in width.items()
         )
@@ -220,9 +202,9 @@ def _flat(path: Path, hints: Hints, findings: Findings) -> _Animals:
         for node, begin in place.items():
             for k, (point, coord) in enumerate(coords):
                 points.setdefault(point or node, {})[coord] = begin + k
-        return _points(path, table, points)
+        return points_of(path, table, points)
 
-    return _Animals(path, seen, track_of, _rate(path, hints, findings), findings)
+    return Animals(path, seen, track_of, rate_of(path, hints, findings), findings)
 
 
 def _named_rows(path: Path, findings: Findings) -> tuple[_Head, list[int], list[list[str]]]:
@@ -256,7 +238,7 @@ def _by_node(
         begins: The table's first frame; that of the first row where None.
         most: Numbers that the table may hold.
     """
-    first, last = _span(path, at)
+    first, last = span_of(path, at)
     first = first if begins is None else int(begins)
     n_values = values.shape[1]
     place = {node: n_values * j for j, node in enumerate(dict.fromkeys(nodes))}
@@ -295,150 +277,6 @@ def _coords_row(rows: list[list[str]]) -> int | None:
     """Return which row names coordinates alone; its first cell is the head's own name."""
     for k, row in enumerate(rows):
         cells = [cell.lower() for cell in row[1:]]
-        if {"x", "y"} <= set(cells) <= _COORDS:
+        if {"x", "y"} <= set(cells) <= COORDS:
             return k
     return None
-
-
-def _span(path: Path, at: FloatArray) -> tuple[int, int]:
-    """Return the first and the last of some frames' numbers."""
-    whole = len(at) and np.isfinite(at).all() and (at == np.rint(at)).all()
-    if not whole or at.min() < 0 or at.max() > 1e15 or np.ptp(at) > 10 * len(at) + 1000:
-        raise bad_file(path, "no frames, or numbers far apart", "frames one after the other")
-    return int(at.min()), int(at.max())
-
-
-def _by_frame(path: Path, at: FloatArray, table: FloatArray) -> FloatArray:
-    """Return a table with a row for each frame by its number, where they are numbered."""
-    if len(at) < 2 or not (np.diff(at) >= 1.0).all() or (at != np.rint(at)).any():
-        return table
-    first, last = _span(path, at)
-    whole = np.full((last - first + 1, table.shape[1]), np.nan)
-    whole[at.astype(np.int64) - first] = table
-    return whole
-
-
-Track = tuple[FloatArray, tuple[str, ...], FloatArray | None]
-
-
-def _points(path: Path, values: FloatArray, columns: dict[str, dict[str, int]]) -> Track:
-    """Return points, shape (T, K, 2 or 3), their names, and how likely each is, shape (T, K)."""
-    axes = "xyz" if all("z" in own for own in columns.values()) else "xy"
-    whole = {name: own for name, own in columns.items() if set(axes) <= own.keys()}
-    if not whole:
-        raise bad_file(path, "no key point with x and y", "columns x, y (and z) for each point")
-    points = np.stack([values[:, [own[axis] for axis in axes]] for own in whole.values()], axis=1)
-    if len(axes) == 2:
-        points[..., 1] *= -1.0  # a picture's rows are counted downwards
-    likely = None
-    sure = next((s for s in _SURE if all(s in own for own in whole.values())), None)
-    if sure is not None:
-        likely = np.nan_to_num(values[:, [own[sure] for own in whole.values()]])
-    return points, tuple(whole), likely
-
-
-def _rate(path: Path, hints: Hints, findings: Findings) -> float:
-    rate_hz = hints.rate_hz or rate_beside(path, findings)
-    if rate_hz is None:
-        rate_hz = USUAL_HZ
-        findings.note(
-            f"the file does not say how many pictures there are a second: taken as {USUAL_HZ:g}; "
-            f"{option('rate_hz')} settles it"
-        )
-    return rate_hz
-
-
-def _often(seen: Mapping[str, int]) -> list[str]:
-    """Return who was seen at least half as often as the one seen most."""
-    least = _OFTEN * max(seen.values(), default=0)
-    return [each for each, n_seen in seen.items() if n_seen >= least]
-
-
-@dataclass(frozen=True)
-class _Animals:
-    """The animals in a file.
-
-    Attributes:
-        path: The file.
-        seen: Of each, by name, how many numbers there are.
-        track: Returns the key points of one.
-        rate_hz: Pictures a second [1/s].
-        findings: What was found out on the way.
-    """
-
-    path: Path
-    seen: Mapping[str, int]
-    track: Callable[[str], Track]
-    rate_hz: float
-    findings: Findings
-
-    def seen_most(self) -> Recording:
-        """Return the animal that was seen most, and tell which others there are."""
-        most = max(self.seen, key=lambda each: self.seen[each])
-        if len(self.seen) > 1:
-            self.findings.note(f"of {len(self.seen)} animals the one that was seen most: {most}")
-            self.findings.leave_out(each for each in self.seen if each != most)
-        return self._recording(self._seen(most), most, stem(self.path), self.findings)
-
-    def seen_often(self) -> tuple[Recording, ...]:
-        """Return all animals that were seen at least half as often as the one seen most."""
-        often = _often(self.seen)
-        if len(often) == 1:
-            return (self.seen_most(),)
-        found, problems = {}, {}
-        for animal in often:
-            try:
-                found[animal] = self._seen(animal)
-            except RecordingError as error:
-                problems[animal] = error
-        if not found:
-            raise next(iter(problems.values()))
-        names = ", ".join(who or "one unnamed" for who in found)
-        self.findings.note(
-            f"{len(found)} animals: {names}; each is a take of its own "
-            f"({option('person')} picks one)"
-            if len(found) > 1
-            else f"of {len(self.seen)} animals the one that can be read: {names}"
-        )
-        self.findings.leave_out(each for each in self.seen if each not in found)
-        for animal, problem in problems.items():
-            self.findings.warn(f"{animal or 'one unnamed'} is left out: {problem}")
-        name, several = stem(self.path), len(found) > 1
-        return tuple(
-            self._recording(
-                seen, who, f"{name} ({who})" if who and several else name, deepcopy(self.findings)
-            )
-            for who, seen in found.items()
-        )
-
-    def _seen(self, animal: str) -> _Seen:
-        """Return an animal as it is seen from its body."""
-        points, names, likelihood = self.track(animal)
-        try:
-            frames, channels, length = seen_from_the_body(points, names, self.rate_hz, likelihood)
-        except RecordingError as error:
-            raise bad_file(self.path, str(error), "key points of a body") from error
-        hidden = tuple(each for each in names if f"{each}.ahead" not in channels)
-        return _Seen(frames, channels, length, hidden)
-
-    def _recording(self, seen: _Seen, who: str, name: str, findings: Findings) -> Recording:
-        findings.note(f"key points along the body's heading, in body lengths of {seen.length:.4g}")
-        findings.leave_out(seen.hidden)
-        report = findings.report(self.rate_hz)
-        return Recording(seen.frames, self.rate_hz, seen.channels, name, who, report=report)
-
-
-class _Seen(NamedTuple):
-    """An animal as it is seen from its body.
-
-    Attributes:
-        frames: Shape (T, D) [body lengths].
-        channels: Their names, length D.
-        length: Of the body, in the file's unit.
-        hidden: Names of points that were never seen.
-    """
-
-    frames: FloatArray
-    channels: tuple[str, ...]
-    length: float
-    hidden: tuple[str, ...]
