@@ -5,6 +5,7 @@ frame of markers -> gap tracking -> inverse kinematics -> segmentation -> tree -
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -22,7 +23,7 @@ from ..people import PeopleTree
 from ..recording import BoolArray, FloatArray, Recording, Segment, are_markers
 from ..segmentation import make_segmenter
 from ..state import from_plain, require, to_plain, validated, within
-from ..tree import Change, Exchange, MirrorMap, Placement, Recogniser, make_distance
+from ..tree import ROOT, Change, Exchange, MirrorMap, Placement, Recogniser, make_distance
 from .absurd import AbsurdFrames
 from .buffer import FrameBuffer
 from .chain import Chain
@@ -805,8 +806,12 @@ class MotionLearner:
         """Return which provisional primitives a segment confirmed, and which are forgotten."""
         came = Counter([placement.node_id, *(to for _, to in placement.moved)])
         events: list[Event] = []
-        leaves = self.tree.leaves
-        for id in sorted(id for id in came.keys() - set(placement.born) if id in leaves):
+        older = sorted(came.keys() - {ROOT, *placement.born})
+        leaves = self.tree.leaves if older else ()  # which rise
+        for id in older:
+            k = bisect_left(leaves, id)
+            if leaves[k : k + 1] != (id,):
+                continue
             shown = self.tree.n_placed(id)
             if shown - came[id] < self.config.tree.confirmed <= shown:
                 events.append(PrimitiveConfirmed(segment, id, shown))

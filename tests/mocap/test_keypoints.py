@@ -306,12 +306,22 @@ def test_hdf5_holds_what_the_table_does(tmp_path: Path, format: str) -> None:
         open_recordings(tmp_path, strict=True)
 
 
+@pytest.mark.parametrize("name", ["pandas_table", "pandas_fixed", "sleap_io"])
+def test_files_of_the_programs_themselves(name: str) -> None:
+    """Written by pandas with PyTables, as DeepLabCut does, and by sleap-io, one frame by hand."""
+    take = open_recording(Path(__file__).parent / "data" / f"{name}.h5.gz")
+    seen = keypoint_values().reshape(len(ROWS), 4, 3)
+    expected, channels, _ = seen_from_the_body(seen[..., :2] * [1, -1], KEYPOINTS, 30.0)
+    assert take.channels == channels
+    np.testing.assert_allclose(take.frames, expected, atol=1e-9)
+
+
 @pytest.mark.parametrize("order", ["tckf", "fkct", "ftkc"])
 @pytest.mark.parametrize("z", [False, True])
 def test_sleap_exports_arrays_in_several_orders(tmp_path: Path, order: str, z: bool) -> None:
     points = np.stack([mouse(4.0, z), mouse(4.0, z)[::-1]], axis=1)  # (f, t, k, c)
     pixels = points if z else points * [1, -1]
-    pixels[90:, 0] = np.nan  # seen less often than the other
+    pixels[150:, 0] = np.nan  # seen less often than the other
     with h5py.File(tmp_path / "pair_50fps.h5", "w") as file:
         file["tracks"] = np.einsum(f"ftkc->{order}", pixels)
         file["node_names"] = np.array(NAMES, "S")

@@ -70,7 +70,7 @@ def points_of(path: Path, values: FloatArray, columns: Columns) -> Track:
     likely = None
     sure = next((s for s in SURE if all(s in own for own in whole.values())), None)
     if sure is not None:
-        likely = np.nan_to_num(values[:, [own[sure] for own in whole.values()]])
+        likely = values[:, [own[sure] for own in whole.values()]]  # NaN where a person says it
     return points, tuple(whole), likely
 
 

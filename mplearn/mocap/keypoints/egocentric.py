@@ -37,7 +37,8 @@ def seen_from_the_body(
             a point was not seen.
         names: Of the points, length K.
         rate_hz: Frames per second [1/s].
-        likelihood: Of each point, shape (T, K), in [0, 1]; below 0.6 it counts as not seen.
+        likelihood: Of each point, shape (T, K), in [0, 1]; below 0.6 it counts as not seen, NaN
+            where nobody doubts it.
 
     Returns:
         Frames, shape (T, 2 K) or (T, 3 K) [body lengths], NaN where gaps are longer than 0.3 s;

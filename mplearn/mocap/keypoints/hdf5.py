@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib.util
 import io
 import pickle
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,7 +29,8 @@ from .animals import COORDS, AnimalReader, Animals, by_frame
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _DAMAGE = (OSError, KeyError, ValueError, RuntimeError, TypeError, AttributeError, IndexError,
-           OverflowError, EOFError, NotImplementedError, pickle.UnpicklingError)  # fmt: skip
+           OverflowError, EOFError, NotImplementedError, MemoryError, struct.error,
+           pickle.UnpicklingError)  # fmt: skip
 _FRAMES = (b"frame", b"frame_table")  # what pandas calls a frame kept as arrays, as rows
 _EXPECTED = "a table of DeepLabCut, or what SLEAP exports for analysis"
 # the axes of SLEAP's arrays: as it writes them, as it does untransposed, as sleap-io does
@@ -238,8 +240,11 @@ def _levels(path: Path, frame: Any, name: str) -> list[Any]:
     return list(zip(*levels, strict=True))
 
 
-class _Unpickler(pickle.Unpickler):
-    """Makes lists and texts, and nothing that has to be found by name."""
+class _Unpickler(pickle._Unpickler):
+    """Makes lists and texts, and nothing that has to be found by name.
+
+    In Python: in C what is remembered is an array, which damage can make as large as memory.
+    """
 
     def find_class(self, module_name: str, global_name: str) -> Any:
         raise pickle.UnpicklingError(f"{module_name}.{global_name} among names of columns")

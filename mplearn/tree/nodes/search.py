@@ -477,7 +477,7 @@ def _mean_extents(bank: ExemplarBank, groups: Sequence[Sequence[int]]) -> FloatA
     return np.asarray(np.add.reduceat(extents, np.cumsum(sizes) - sizes) / sizes)
 
 
-_N_WAVES = 3  # that motions mostly consist of
+_N_WAVES = 6  # that motions, and two of them in one, mostly consist of
 _ROUNDING = 1e-9
 
 
