@@ -10,6 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -252,8 +253,13 @@ def _by_node(
 
 
 def _first_rows(path: Path) -> list[list[str]]:
+    return _rows_in(path, head_text(path))
+
+
+@lru_cache(maxsize=1)  # each reader asks
+def _rows_in(path: Path, head: str) -> list[list[str]]:
     try:
-        sheet = _sheet(path, head_text(path))
+        sheet = _sheet(path, head)
         return [row for _, row in _cells(sheet, min(_LOOK, len(sheet.lines)))]
     except RecordingError:  # quotes that do not match: no table
         return []

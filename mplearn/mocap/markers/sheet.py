@@ -90,9 +90,10 @@ class Sheet:
         sheet = cls(path, lines, separator, False)
         some_rows = [sheet.cells(i) for i in range(min(len(lines), _LOOK))]
         cells = [cell for row in some_rows for cell in row]
-        commas = sum(bool(_DECIMAL_COMMA.fullmatch(cell)) for cell in cells)
-        points = sum(bool(_DECIMAL_POINT.fullmatch(cell)) for cell in cells)
-        triples = {i for row in some_rows for i, cell in enumerate(row) if _three(cell)}
+        commas = sum("," in cell and bool(_DECIMAL_COMMA.fullmatch(cell)) for cell in cells)
+        points = commas and sum(bool(_DECIMAL_POINT.fullmatch(cell)) for cell in cells)
+        opens = any(each in text for each in _OPENS)  # most tables hold none
+        triples = {i for row in some_rows for i, c in enumerate(row) if _three(c)} if opens else ()
         cut_off = bool(text) and text[-1] not in "\r\n"
         apart = _POINTS_FIRST_QUOTED if separator == "," else _POINTS_FIRST
         points_apart = any("," in cell for cell in cells) and apart.search(text) is not None
