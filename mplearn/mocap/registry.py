@@ -93,6 +93,8 @@ def holds_other_arrays(path: Path) -> bool:
     """Whether a file of arrays is neither DeepLabCut's nor SLEAP's, by the names of its arrays."""
     if suffix(path) not in _ARRAYS or not is_file(path):
         return False
+    if suffix(path) in suffixes():  # it can be looked into
+        return reader_of(path) is None
     start = head(path, _NAMES_WITHIN)
     return not any(all(name in start for name in names) for names in _KEY_POINTS)
 

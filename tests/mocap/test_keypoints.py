@@ -15,7 +15,7 @@ from mocap_writers import KEYPOINTS, keypoint_values, write
 
 from mplearn import LearnerConfig, MotionLearner, open_recording
 from mplearn.errors import RecordingError, RecordingWarning
-from mplearn.mocap import Hints, find_takes, open_recordings
+from mplearn.mocap import Hints, find_takes, open_recordings, open_takes
 from mplearn.mocap.keypoints.egocentric import seen_from_the_body
 from mplearn.recording import FloatArray
 
@@ -299,6 +299,7 @@ def test_hdf5_holds_what_the_table_does(tmp_path: Path, format: str) -> None:
     with h5py.File(tmp_path / "weights.hdf5", "w") as file:  # of something else
         file["layer"] = np.zeros(3)
     assert [each.name for each in find_takes(tmp_path).takes] == ["other", "take"]
+    assert open_takes(tmp_path).passed_over == ("weights.hdf5",)
     with pytest.raises(RecordingError, match=r"holds \['layer'\]; expected a table of DeepLabCut"):
         open_recording(tmp_path / "weights.hdf5")
     other.write_bytes(other.read_bytes()[:-500])
