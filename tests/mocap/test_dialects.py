@@ -624,14 +624,20 @@ def test_motive_whose_only_free_markers_are_not_identified(tmp_path: Path) -> No
     assert np.allclose(found.frames, plain.frames, equal_nan=True)
 
 
+@pytest.mark.parametrize("apart", [False, True])
 @pytest.mark.parametrize("reference", ["GLOBAL", "LOCAL"])
-def test_a_skeleton_of_qualisys(tmp_path: Path, standing: Recording, reference: str) -> None:
+def test_a_skeleton_of_qualisys(
+    tmp_path: Path, standing: Recording, reference: str, apart: bool
+) -> None:
     names, points = standing.marker_names, 1000.0 * standing.markers
-    columns = "\t".join(f"{m} {c}" for m in names for c in ("X", "Y", "Z", "QX", "QY", "QZ", "QW"))
+    axes = ("X", "Y", "Z", "QX", "QY", "QZ", "QW")
+    named = [[m, *axes] if apart else [f"{m} {axis}" for axis in axes] for m in names]
+    columns = "\t".join(cell for each in named for cell in each)
     lines = [f"NO_OF_FRAMES\t{len(points)}", "FREQUENCY\t50", f"REFERENCE\t{reference}"]
     lines.append(f"Frame\tTime\t{columns}")
     for i, frame in enumerate(points):
-        cells = "\t".join("\t".join([*cells_of(p), "0", "0", "0", "1"]) for p in frame)
+        own = [""] if apart else []  # below the name
+        cells = "\t".join("\t".join([*own, *cells_of(p), "0", "0", "0", "1"]) for p in frame)
         lines.append(f"{i + 1}\t{i / 50:.5f}\t{cells}")
     path = tmp_path / "a.tsv"
     path.write_text("\n".join(lines) + "\n")

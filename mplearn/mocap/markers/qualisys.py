@@ -10,7 +10,7 @@ from ..findings import Findings
 from ..numbers import number
 from ..placing.space import Space
 from ..reader import Hints, Reader
-from .blocks import Block, read_block
+from .blocks import Block, marker_columns, read_block
 from .columns import meaning_of
 from .sheet import Sheet, is_number
 
@@ -88,16 +88,24 @@ def _block(sheet: Sheet, said: dict[str, list[str]], start: int) -> Block:
 
 
 def _named_columns(sheet: Sheet, said: dict[str, list[str]], start: int) -> Block:
-    """Return the points that a row of names tells of, as in exports of skeletons."""
-    named = start < len(sheet.lines) and not sheet.is_data(start)
-    meaning = meaning_of(sheet.cells(start)) if named else None
-    if meaning is None or not meaning.markers:
+    """Return the points that a row of names tells of, as in exports of skeletons.
+
+    The axes follow a name in a column of its own, which is empty below, or bear it: ``Hips X``.
+    """
+    cells = sheet.cells(start) if start < len(sheet.lines) and not sheet.is_data(start) else []
+    meaning = meaning_of(cells) if cells else None
+    before = ["", *cells[:-1]]
+    names = [name if axis == "X" else "" for name, axis in zip(before, cells, strict=True)]
+    markers = dict(zip(*marker_columns(names, cells), strict=True))
+    if meaning is not None:
+        markers = meaning.markers or markers
+    if meaning is None or not markers:
         raise bad_file(sheet.path, f"no {_NAMES}", "an export of QTM with its header")
     if said.get("REFERENCE", [""])[:1] == ["LOCAL"]:
         raise bad_file(sheet.path, "REFERENCE is LOCAL", "'GLOBAL': places in the world")
     return Block(
-        tuple(meaning.markers),
-        tuple(meaning.markers.values()),
+        tuple(markers),
+        tuple(markers.values()),
         start + 1,
         len(sheet.lines),
         len(meaning.names),
