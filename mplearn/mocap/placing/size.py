@@ -33,7 +33,8 @@ _LOOK = 200  # frames
 _PEOPLE = (0.4, 1.4)
 _VARY = 0.3  # of the logarithm of their size
 _RARE = 3.0  # nat, against a unit that few use
-_IN_DOUBT = 3.0  # nat: another unit is meant in one of twenty such files
+_POSSIBLE = 3.0  # nat: another unit is meant in one of twenty such files
+_IN_DOUBT, _BETWEEN_RARE = 0.8, 1.5  # nat; between two that few use, habit does not help
 # how far the points may spread against the markers of a whole person: a hand to two people afar
 _SPREADS = (0.06, 8.0)
 _USUAL_SPREAD_M = 0.45
@@ -49,7 +50,8 @@ class Unit:
         fits: Whether a person, or a part of one, can be meant by it.
         contradicts: Whether it is another than the one declared.
         doubtful: Whether the points would be few, or far apart, of a person.
-        rival_m: Another unit that may well be meant [m]: of a child, or of an adult in inches.
+        rival_m: Another unit that may be meant [m]: of a child, or of an adult in inches.
+        close: Whether that fits nearly as well.
     """
 
     unit_m: float
@@ -57,6 +59,7 @@ class Unit:
     contradicts: bool
     doubtful: bool = False
     rival_m: float | None = None
+    close: bool = False
 
 
 def find_unit(
@@ -108,8 +111,10 @@ def likeliest_unit(
         return Unit(declared_m if says_so else best, False, False)
     unlikely = {unit: _unlikely(unit, adult_m, declared_m) for unit in fits}
     best, *others = sorted(fits, key=lambda unit: unlikely[unit])
-    rival = others[0] if others and unlikely[others[0]] - unlikely[best] < _IN_DOUBT else None
-    return Unit(best, True, best != declared_m, False, rival)
+    behind = unlikely[others[0]] - unlikely[best] if others else np.inf
+    rival = others[0] if behind < _POSSIBLE else None
+    close = behind < (_BETWEEN_RARE if unlikely[best] >= _RARE else _IN_DOUBT)
+    return Unit(best, True, best != declared_m, False, rival, close)
 
 
 def _unlikely(unit_m: float, adult_m: float, declared_m: float) -> float:

@@ -12,7 +12,7 @@ from ...recording import FloatArray
 from ..files import bad_file
 from ..findings import Findings
 from ..options import option
-from ..reader import Hints
+from ..reader import DIRECTIONS, Hints
 from .size import UNITS_M, Unit, find_unit, spread_of
 from .vertical import find_vertical
 
@@ -135,7 +135,8 @@ def placed(
     unit = hints.unit_m or _settled_unit(points, names, space, findings, sized)
     metres = checked_markers(path, points if unit == 1.0 else points * unit, names)
     _warn_of_flat(metres, findings)
-    up = hints.up_axis or _settled_up(metres, names, rate_hz, space, findings)
+    usual = ("x", "y", "z") if sized else DIRECTIONS  # cameras have theirs as they hang
+    up = hints.up_axis or _settled_up(metres, names, rate_hz, space, findings, usual)
     turn = to_z_up(up, space.forward) if up == space.up else upright(up)
     turned = metres if np.array_equal(turn, np.eye(3)) else metres @ turn.T
     return Placed(turned, unit, up, turn)
@@ -167,7 +168,7 @@ def _settled_unit(
     rival = "" if found.rival_m is None else f"; {unit_text(found.rival_m)} would fit as well"
     if found.contradicts:
         said = f"{'the file says' if space.says_unit else 'usual is'} {unit_text(space.unit_m)}"
-        tell = findings.warn if space.says_unit or rival else findings.note
+        tell = findings.warn if space.says_unit or found.close else findings.note
         sets = f"({option('unit_m')} sets it)"
         tell(f"{taken}, by the size of the person; {said}{rival} {sets}")
     elif found.doubtful and len(names) >= _MANY:
@@ -177,7 +178,8 @@ def _settled_unit(
             f"person's; {option('unit_m')} settles it"
         )
     elif rival:
-        findings.warn(f"{taken}, as is usual{rival}: {option('unit_m')} settles it")
+        tell = findings.warn if found.close else findings.note
+        tell(f"{taken}, as is usual{rival}: {option('unit_m')} settles it")
     elif sized is not None and not found.fits:
         findings.warn(f"{taken}, though nobody is as large: {option('unit_m')} settles it")
     elif not space.says_unit and found.fits:
@@ -186,11 +188,16 @@ def _settled_unit(
 
 
 def _settled_up(
-    metres: FloatArray, names: tuple[str, ...], rate_hz: float, space: Space, findings: Findings
+    metres: FloatArray,
+    names: tuple[str, ...],
+    rate_hz: float,
+    space: Space,
+    findings: Findings,
+    usual: tuple[str, ...],
 ) -> str:
     found = find_vertical(metres, names, rate_hz, space.up, says_so=space.says_up)
-    if found.contradicts:
-        tell = findings.warn if space.says_up else findings.note
+    if found.contradicts:  # where a skeleton's is turned round, somebody may stand on the hands
+        tell = findings.warn if space.says_up or found.up not in usual else findings.note
         said = "the file says" if space.says_up else "usual in the format is"
         tell(
             f"{found.up} is taken as the vertical axis, by feet, head and floor; {said} {space.up} "
