@@ -7,6 +7,7 @@ nothing had happened. What no checkpoint needs any more goes.
 
 from __future__ import annotations
 
+import os
 import sqlite3
 import warnings
 from collections.abc import Callable
@@ -121,7 +122,7 @@ class Store:
         require_number("checkpoint_s", checkpoint_s)
         if not checkpoint_s > 0:
             raise InvalidValueError(f"checkpoint_s must be positive, not {checkpoint_s}")
-        self.path = path_of("path", path).resolve()
+        self.path = Path(os.path.realpath(path_of("path", path)))  # also of links in a circle
         self._checkpoint_s = checkpoint_s
         look_at(self.path)
         self._lock = WriterLock(self.path)

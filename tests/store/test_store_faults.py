@@ -361,3 +361,15 @@ def test_a_migration_is_whole_or_not_at_all(
 
 def test_every_fault_is_an_error_of_ours() -> None:
     assert issubclass(StoreError, MPLearnError)
+
+
+def test_what_a_link_leads_to_is_written_and_links_in_a_circle_are_named(tmp_path: Path) -> None:
+    real, link, circle = (tmp_path / name for name in ("real.db", "link.db", "circle.db"))
+    link.symlink_to(real)
+    circle.symlink_to(circle)
+    with LifelongLearner.open(link, learner) as life:
+        feed(life, 100)
+    assert link.is_symlink() and real.exists()
+    assert state_of(real) == state_of(link)
+    with pytest.raises(StoreError, match=r"circle\.db cannot be written"):
+        LifelongLearner.open(circle, learner)

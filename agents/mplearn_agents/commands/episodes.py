@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> None:
 
     env = gymnasium.make(
         "mplearn/PrimitiveHumanoid-v0",
-        library=None if args.library is None else str(args.library.resolve()),
+        library=None if args.library is None else str(args.library.absolute()),
         task=args.task,
         dynamics=args.dynamics,
         disable_env_checker=True,
