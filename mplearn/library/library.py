@@ -139,7 +139,7 @@ class PrimitiveLibrary:
         if found is None:
             names = ", ".join(primitive.name for primitive in self.primitives[:30])
             raise UnknownPrimitiveError(
-                f"no primitive {key!r} in the library; it holds {len(self)}: {names}"
+                f"no primitive {key!r:.80} in the library; it holds {len(self)}: {names}"
             )
         return found
 
