@@ -50,6 +50,8 @@ class Reach(NamedTuple):
         down_s: Shortest time in which a foot that is in the air comes down, for the other one to
             step.
         close: How far aside of that it is then [m]; at 0 none comes down so.
+        gently: Largest acceleration with which it ends its way down [m/s^2]: one that hits the
+            floor throws the robot up, and no foot stands.
     """
 
     ahead: float
@@ -64,6 +66,7 @@ class Reach(NamedTuple):
     inwards: float = 0.0
     down_s: float = 0.1
     close: float = 0.0
+    gently: float = np.inf
 
 
 class Step(NamedTuple):
@@ -250,6 +253,13 @@ def _hits(ax: float, ay: float, bx: float, by: float, half_x: float, half_y: flo
 
 
 @inner_kernel
+def _falls_s(reach: Reach, high_m: float, sinks: float) -> float:
+    """Return in what time a foot comes down by a cubic that ends no harder than it may [s]."""
+    a = reach.gently
+    return 0.0 if a == np.inf else (np.sqrt(sinks * sinks + 6.0 * a * high_m) - sinks) / a
+
+
+@inner_kernel
 def _price(missing: float, far: float, time_s: float, lag: float, reach: Reach) -> float:
     """Return what a step costs that misses so much and has so far to go."""
     hurry = max(0.0, far / max(time_s - lag, _TRY_S) / reach.fastest - 1.0)
@@ -291,6 +301,8 @@ def choose_step(
     only: int,
     since_s: float = 0.0,
     crosses: bool = True,
+    high_m: float = 0.0,
+    sinks: float = 0.0,
 ) -> Step:
     """Return the step that catches the DCM best: inside the soles, without hurry, near and soon.
 
@@ -307,6 +319,8 @@ def choose_step(
         since_s: For how long that foot has been on its way [s].
         crosses: Whether the one foot that can step was in the air: it may cross the other one, or
             come down at once.
+        high_m: How high that foot is [m].
+        sinks: How fast it comes down [m/s].
     """
     best = np.inf
     found = Step(max(only, 0), LONGEST_S, feet[max(only, 0)].copy(), np.inf, BESIDE)
@@ -321,7 +335,7 @@ def choose_step(
                 continue
             soonest = max(reach.soonest - since_s, _SOONEST_S)
             if way == DOWN:
-                soonest = max(reach.down_s - since_s, _LANDS_S)
+                soonest = max(reach.down_s - since_s, _LANDS_S, _falls_s(reach, high_m, sinks))
             for k in range(int((LONGEST_S - since_s - soonest) / _TRY_S) + 1):
                 time_s = soonest + k * _TRY_S
                 place, missing = landing_place(

@@ -134,7 +134,11 @@ def begin_stepping(
         part[:] = 0.0
     stepping.goal[:] = now.dcm
     if up >= 0:
-        step = choose_step(robot.corners, now.feet, now.dcm, now.rate, law.hurried, up, 0.0)
+        high_m = max(now.soles[up, :, 2].min() - now.floor, 0.0)
+        sinks = -now.foot_rate[up, 2]
+        step = choose_step(
+            robot.corners, now.feet, now.dcm, now.rate, law.hurried, up, 0.0, True, high_m, sinks
+        )
         _lift(robot, stepping, now, up, step.time_s, step.place)
         stepping.phase[4], stepping.phase[5], stepping.phase[6] = step.way, 1.0, 1.0
 
@@ -256,6 +260,8 @@ def _on_one_foot(
                 side,
                 stepping.time[0],
                 stepping.phase[5] == 1.0,
+                max(stepping.foot[2] - now.floor - robot.stance.foot_position[side, 2], 0.0),
+                -stepping.foot_rate[2],
             )
             stepping.time[1] = stepping.time[0] + step.time_s
             stepping.phase[4], stepping.place[:] = step.way, step.place

@@ -193,6 +193,26 @@ def test_who_falls_beyond_the_foot_that_stands_comes_down_for_it_to_step(corners
     assert single.missing_m > 0.05 and single.way == BESIDE
 
 
+@pytest.mark.parametrize("sinks", [-0.5, 0.0, 1.0])
+def test_a_foot_comes_down_as_gently_as_told(corners, sinks):
+    """By the cubic from its height and velocity to rest, whose end is the hardest."""
+    dcm = FEET[0, :2] + np.array([0.05, 0.09])
+    hard = choose_step(corners, FEET, dcm, RATE, COMING_DOWN, 1, high_m=0.18, sinks=sinks)
+    gentle = COMING_DOWN._replace(gently=80.0)
+    soft = choose_step(corners, FEET, dcm, RATE, gentle, 1, high_m=0.18, sinks=sinks)
+    assert hard.way == soft.way == DOWN and hard.time_s == COMING_DOWN.down_s
+
+    def ends(time_s):
+        times = np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0]])
+        times = np.vstack((times, time_s ** np.arange(3.0, -1.0, -1.0)))
+        times = np.vstack((times, [3.0 * time_s**2, 2.0 * time_s, 1.0, 0.0]))
+        cubic = np.linalg.solve(times, [0.18, -sinks, 0.0, 0.0])
+        return 6.0 * cubic[0] * time_s + 2.0 * cubic[1]
+
+    assert ends(soft.time_s) == pytest.approx(80.0, rel=1e-9)
+    assert ends(hard.time_s) > 80.0
+
+
 def test_a_foot_on_its_way_is_sooner_there(corners):
     dcm = np.array([0.2, 0.0])
     on_its_way = choose_step(corners, FEET, dcm, RATE, REACH, 0, 0.1)
