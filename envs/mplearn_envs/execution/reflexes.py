@@ -57,7 +57,7 @@ _DROP_M = 0.35  # who steps may be so much lower
 _TUNED: dict[str, Any] = {  # on pushes at the chest of the humanoid
     "reach": Reach(0.5, 0.4, 0.16, 0.62, 2.2, 0.24, across=0.1, inwards=0.05),
     "hurried_s": 0.2,
-    "gently": 120.0,
+    "gently": 60.0,
     "decides_s": 0.1,
     "gain": 4.0,
     "lift_m": 0.035,
