@@ -94,7 +94,7 @@ def _named_columns(sheet: Sheet, said: dict[str, list[str]], start: int) -> Bloc
     """
     cells = sheet.cells(start) if start < len(sheet.lines) and not sheet.is_data(start) else []
     meaning = meaning_of(cells) if cells else None
-    before = ["", *cells[:-1]]
+    before = ["", *cells][: len(cells)]
     names = [name if axis == "X" else "" for name, axis in zip(before, cells, strict=True)]
     markers = dict(zip(*marker_columns(names, cells), strict=True))
     if meaning is not None:
