@@ -187,13 +187,14 @@ class Chain:
         moved = dict(placement.moved)
         if placement.number not in moved and placement.node_id in placement.born:
             moved[placement.number] = placement.node_id
-        events += self._revise(placement, moved)
+        newest = len(self._segments) - 1
+        events += self._revise(placement, moved, {newest} if known is not None else set())
         del self._segments[:-REMEMBERED]
         return events
 
     def revise(self, change: Change) -> list[Event]:
         """Follow a change of the tree that a person asked for, and count what is known by it."""
-        return self._revise(change, dict(change.moved))
+        return self._revise(change, dict(change.moved), set())
 
     def exchange(
         self,
@@ -226,8 +227,16 @@ class Chain:
             if seen.primitive not in self.graph:
                 seen.primitive = None
 
-    def _revise(self, change: Placement | Change, moved: Mapping[int, int]) -> list[Event]:
-        """Follow the tree where earlier segments turned out to be something else."""
+    def _revise(
+        self, change: Placement | Change, moved: Mapping[int, int], known: set[int]
+    ) -> list[Event]:
+        """Follow the tree where earlier segments turned out to be something else.
+
+        Args:
+            change: What changed in it.
+            moved: Segments by number, and what they are in now.
+            known: Places of those that lead to transitions that count, if anything was born.
+        """
         for merge in change.merges:
             self.graph.merge_nodes(merge.kept, merge.absorbed)
             self._rename({merge.absorbed}, merge.kept)
@@ -238,7 +247,7 @@ class Chain:
             if id in self.graph:
                 self.graph.remove_node(id)
             self._rename({id}, None)
-        known_now: set[int] = set()  # places of transitions that take part in what was born
+        known_now = known if change.born else set()  # and those that take part in what was born
         for number, id in moved.items():
             at = bisect_left(self._segments, number, key=lambda seen: seen.number)
             if at < len(self._segments) and self._segments[at].number == number:

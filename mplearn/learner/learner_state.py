@@ -130,7 +130,7 @@ FILES = FileFormat(
     "mplearn-learner",
     "learner",
     StateError,
-    4,
-    migrations={1: _one_watch, 2: _whole, 3: _whole},
+    5,
+    migrations={1: _one_watch, 2: _whole, 3: _whole, 4: _whole},
     compression=1,
 )

@@ -75,4 +75,6 @@ def _whole(content: Any) -> Any:
     return to_plain(from_plain(LibraryState, content), whole=True)
 
 
-FILES = FileFormat("mplearn-library", "library", LibraryError, 3, migrations={1: _whole, 2: _whole})
+FILES = FileFormat(
+    "mplearn-library", "library", LibraryError, 4, migrations={1: _whole, 2: _whole, 3: _whole}
+)

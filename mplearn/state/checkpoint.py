@@ -20,8 +20,8 @@ from .structure import from_plain
 
 T = TypeVar("T")
 _KEY = "$key"
-_WHOLE = "$whole 2"  # what a document names that, with its parts, leaves out no field of now
-_WHOLE_THEN = "$whole"  # or none of those that there were before `TreeState.follows`
+_WHOLE = "$whole 3"  # what a document names that, with its parts, leaves out no field of now
+_WHOLE_THEN = ("$whole", "$whole 2")  # or none of those that there were then
 
 
 class Checkpoint(NamedTuple):
@@ -101,7 +101,7 @@ def resumed(kind: type[T], document: bytes, part: Callable[[str], bytes]) -> T:
     try:
         content = from_bytes(document)
         named = next(iter(content)) if isinstance(content, dict) and len(content) == 1 else ""
-        inner = content[named] if named in (_WHOLE, _WHOLE_THEN) else content
+        inner = content[named] if named in (_WHOLE, *_WHOLE_THEN) else content
         return from_plain(kind, _put_together(inner, part, {}), whole=named == _WHOLE)
     except RecursionError as error:
         raise StateError("its parts are nested too deep") from error

@@ -44,7 +44,8 @@ _UNKNOWN = 3.0  # leaves that the scale of all motion counts for beside that of 
 def form_primitives(structure: Structure, node: Node, when: int) -> Change:
     """Form a leaf of each cluster in a node that grew; what else waits in the root may join it.
 
-    A leaf in which others are formed, as the rules are printed, is split: it is a leaf no more.
+    Of `max_born` clusters at most, the tightest ones: the others wait for the next segment. A leaf
+    in which others are formed, as the rules are printed, is split: it is a leaf no more.
 
     Args:
         structure: The tree.
@@ -54,7 +55,7 @@ def form_primitives(structure: Structure, node: Node, when: int) -> Change:
     config = structure.config
     was_leaf = node.id != ROOT and node.is_leaf
     change = Change()
-    while True:
+    while len(change.born) < config.max_born:
         loose = [i for i, n in enumerate(node.members) if node.id == ROOT or n not in node.settled]
         matrix = node.matrix[np.ix_(loose, loose)]
         limit = cutoff(structure, node)

@@ -397,6 +397,8 @@ class PrimitiveTree:
                 change = split_mixed(structure, node, self.n_seen)
             if not change.moved:
                 change = merge_duplicates(structure, matches, self.n_seen)
+            if not change.moved and self._bore_lately():
+                change = change.then(form_primitives(structure, structure.root, self.n_seen))
         change = change.then(forget_chances(structure, self.n_seen))
         self._memory.release(number)
         self._renew()
@@ -450,8 +452,11 @@ class PrimitiveTree:
             if best and best[0].ratio <= 1 and best[0].node in self.leaves:
                 leaf = structure.nodes[best[0].node]
                 change = change.then(structure.take_in(leaf, [number]))
-        if not self.config.local:
-            change = change.then(form_primitives(structure, structure.root, self.n_seen))
+        while not self.config.local:
+            formed = form_primitives(structure, structure.root, self.n_seen)
+            change = change.then(formed)
+            if not formed.born:
+                break
         return self._edited(change)
 
     def remeasure(self) -> None:
@@ -635,6 +640,11 @@ class PrimitiveTree:
                     else f"must have {width} channels, not {blob.array.shape[1]}"
                 )
                 require(not reason, f"{place}.frames[{i}]", reason)
+
+    def _bore_lately(self) -> bool:
+        """Return whether a node was formed with the segment before: there may be more to form."""
+        newest = next(reversed(self._structure.nodes.values()))
+        return np.isfinite(self.config.max_born) and newest.born_at == self.n_seen - 1
 
     def _waiting_like(self, node: Node) -> int | None:
         """Return what the newest segment of the root is most like among those before it."""

@@ -5,6 +5,7 @@ drawn with seed 7, and says what became of them.
 """
 
 import hashlib
+import math
 import sys
 import warnings
 from collections import Counter
@@ -27,6 +28,7 @@ from mplearn.state import checkpoint, from_bytes, from_plain, resumed, to_bytes,
 from mplearn.state.checkpoint import _WHOLE
 from mplearn.store import Freeze, LifelongLearner, Merge, Note, Rename
 from mplearn.store.life_state import LifeState
+from mplearn.tree import TreeConfig
 
 
 def one_person() -> MotionLearner:
@@ -165,6 +167,28 @@ def test_what_was_whole_before_there_was_a_field_opens_without_it(life, learner,
     assert loaded.snapshot().version == learner.snapshot().version
 
 
+def test_what_was_whole_before_births_were_bounded_goes_on_without_a_bound(life, learner, tmp_path):
+    state = life.state()
+    part = checkpoint(state).new.__getitem__
+    mark, content = document_of(state)
+    assert content["learner"]["config"]["tree"].pop("max_born") == 1
+    with pytest.raises(StateError, match=r"tree\.max_born: is missing"):
+        resumed(LifeState, to_bytes({mark: content}), part)
+    opened = resumed(LifeState, to_bytes({"$whole 2": content}), part)
+    assert opened.learner.config.tree.max_born == math.inf
+    plain = to_plain(learner.state(), whole=True)
+    assert plain["config"]["tree"].pop("max_born") == 1
+    replace(LEARNER_FILES, schema=4, migrations={}).write(tmp_path / "old.mplearner", plain)
+    assert MotionLearner.load(tmp_path / "old.mplearner").config.tree.max_born == math.inf
+    config = LearnerConfig(("elbow",), tree=replace(TreeConfig(), max_born=math.inf))
+    then = MotionLearner(config)
+    then.learn_many(np.sin(np.arange(1200) / 30.0)[:, None])
+    plain = to_plain(then.snapshot().state(), whole=True)
+    assert plain["recogniser"]["config"].pop("max_born") == math.inf
+    replace(FILES, schema=3, migrations={}).write(tmp_path / "old.mplearn", plain)
+    assert PrimitiveLibrary.load(tmp_path / "old.mplearn").version == then.snapshot().version
+
+
 def fields_below(kind, found):
     """Note the fields of a type, and of all that it can hold."""
     names = [each.name for each in fields(kind)] if is_dataclass(kind) else []
@@ -181,9 +205,9 @@ def fields_below(kind, found):
 @pytest.mark.parametrize(
     ("kind", "version", "known"),
     [
-        (LearnerState, LEARNER_FILES.schema, (4, "cfafff162dce")),
-        (LibraryState, FILES.schema, (3, "64161995acd0")),
-        (LifeState, _WHOLE, ("$whole 2", "c7005ab4df1b")),
+        (LearnerState, LEARNER_FILES.schema, (5, "3e19161c2923")),
+        (LibraryState, FILES.schema, (4, "86db5f8d9e77")),
+        (LifeState, _WHOLE, ("$whole 3", "25e7eb767869")),
     ],
 )
 def test_who_adds_a_field_says_how_what_was_kept_without_it_opens(kind, version, known):

@@ -7,6 +7,7 @@ the names that the demonstrator gives them, as a person would name them on seein
 
 from __future__ import annotations
 
+import math
 from collections import Counter, defaultdict
 from dataclasses import replace
 from pathlib import Path
@@ -30,7 +31,7 @@ def build_default() -> PrimitiveLibrary:
     demonstration = demonstrate(script, SEED)
     recording = demonstration.recording
     # The rules of version 0, here and in the next lines.
-    rules = replace(TreeConfig(), sequence_share=0.0, ignore_fragments=False)
+    rules = replace(TreeConfig(), sequence_share=0.0, ignore_fragments=False, max_born=math.inf)
     config = LearnerConfig(recording.channels, recording.rate_hz, scaffolding=False, tree=rules)
     learner = MotionLearner(config)
     votes: defaultdict[int, Counter[str]] = defaultdict(Counter)
