@@ -112,7 +112,7 @@ class TreeConfig:
             right before or after it, an execution of a primitive that is sure by then, or nearer by
             far to the only other one that it is like: a motion that is cut in two where someone
             hesitated is not two motions.
-        max_born: Clusters that become nodes with one segment, at most, so that no frame takes long:
+        max_born: Clusters that become nodes with a segment, at most, so that no frame takes long:
             others become nodes with the next segments, one after another; inf for no such bound.
         confirmed: Members from which on a primitive is sure; with fewer it is provisional.
         patience: A provisional primitive that nothing has joined after so many further segments is
@@ -179,7 +179,7 @@ class TreeConfig:
     sequence_share: float = newer(1.2, absent=0.0)
     sequence_extent: float = newer(0.74, absent=0.74)
     ignore_fragments: bool = newer(True, absent=False)
-    max_born: float = newer(1.0, absent=math.inf)
+    max_born: float = newer(2.0, absent=math.inf)
     confirmed: int = newer(3, absent=1)
     patience: int = newer(64, absent=64)
     reach: float = 1.6

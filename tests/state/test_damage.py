@@ -171,13 +171,13 @@ def test_what_was_whole_before_births_were_bounded_goes_on_without_a_bound(life,
     state = life.state()
     part = checkpoint(state).new.__getitem__
     mark, content = document_of(state)
-    assert content["learner"]["config"]["tree"].pop("max_born") == 1
+    assert content["learner"]["config"]["tree"].pop("max_born") == 2
     with pytest.raises(StateError, match=r"tree\.max_born: is missing"):
         resumed(LifeState, to_bytes({mark: content}), part)
     opened = resumed(LifeState, to_bytes({"$whole 2": content}), part)
     assert opened.learner.config.tree.max_born == math.inf
     plain = to_plain(learner.state(), whole=True)
-    assert plain["config"]["tree"].pop("max_born") == 1
+    assert plain["config"]["tree"].pop("max_born") == 2
     replace(LEARNER_FILES, schema=4, migrations={}).write(tmp_path / "old.mplearner", plain)
     assert MotionLearner.load(tmp_path / "old.mplearner").config.tree.max_born == math.inf
     config = LearnerConfig(("elbow",), tree=replace(TreeConfig(), max_born=math.inf))

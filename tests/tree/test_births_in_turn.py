@@ -1,4 +1,4 @@
-"""One segment forms one primitive: where there are more to form, the next ones form them."""
+"""A segment forms few primitives: where there are more to form, the next ones form them."""
 
 import math
 from collections import Counter
@@ -17,6 +17,7 @@ from mplearn.recording import Segment
 from mplearn.tree import PrimitiveTree, TreeConfig
 
 AT_ONCE = replace(TreeConfig(), max_born=math.inf)
+IN_TURN = replace(TreeConfig(), max_born=1)
 N = 6  # motions that are known first
 
 
@@ -46,7 +47,7 @@ def test_no_segment_forms_more_than_one_and_soon_the_same_is_formed(seed, order)
     kinds = [*(m for _ in range(5) for m in range(N)), *(N + k for k in order), 9, 10, 11]
     segments = [motions.perform(kind) for kind in kinds]
     (in_turn, born), (at_once, born_at_once) = (
-        placed(config, segments) for config in (TreeConfig(), AT_ONCE)
+        placed(config, segments) for config in (IN_TURN, AT_ONCE)
     )
     assert max(map(len, born)) <= 1
     assert sum(map(len, born)) == sum(map(len, born_at_once))
@@ -64,16 +65,16 @@ def twice(seed=0, after=(0, 1, 0)):
 def test_a_sequence_that_came_twice_is_formed_by_what_comes_then_also_a_known_motion():
     segments = twice()
     _, at_once = placed(AT_ONCE, segments)
-    tree, in_turn = placed(TreeConfig(), segments)
+    tree, in_turn = placed(IN_TURN, segments)
     assert [len(each) for each in at_once[-4:]] == [2, 0, 0, 0]
     assert [len(each) for each in in_turn[-4:]] == [1, 1, 0, 0]
-    assert placed(TreeConfig(), segments, resumed=True)[1] == in_turn
+    assert placed(IN_TURN, segments, resumed=True)[1] == in_turn
     assert sorted(tree.leaves[-2:]) == sorted(at_once[-4])
 
 
 def test_what_follows_what_is_counted_where_a_known_motion_forms_another_one():
     counts = []
-    for config in (AT_ONCE, TreeConfig()):
+    for config in (AT_ONCE, IN_TURN):
         tree, chain = PrimitiveTree(config, D, RATE_HZ), Chain(TransitionGraph(), RATE_HZ, 2.0)
         seen = [
             event

@@ -98,9 +98,13 @@ def forward(tree: MassTree, q: FloatArray) -> Pose:
     n_bodies = len(parent)
     moment, carried = np.empty((n_bodies, 3)), tree.mass.copy()
     for b in range(n_bodies):
-        moment[b] = tree.mass[b] * (position[b] + turned(rotation[b], tree.centre[b]))
+        x, y, z = tree.centre[b]
+        for i in range(3):
+            off = rotation[b, i, 0] * x + rotation[b, i, 1] * y + rotation[b, i, 2] * z
+            moment[b, i] = tree.mass[b] * (position[b, i] + off)
     for b in range(n_bodies - 1, 0, -1):
-        moment[parent[b]] += moment[b]
+        for i in range(3):
+            moment[parent[b], i] += moment[b, i]
         carried[parent[b]] += carried[b]
     return Pose(position, rotation, at.anchor, at.axis, moment, carried)
 
