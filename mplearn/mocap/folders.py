@@ -88,11 +88,13 @@ def _holds_recordings(folder: Path) -> bool:
 
 
 def passed_over(folder: Path) -> tuple[str, ...]:
-    r"""Return the names of the files of arrays in a folder that are none of key points.
+    """Return the names of the files of arrays in a folder that are none of key points.
 
     Example:
+        >>> import h5py
         >>> Path("mixed").mkdir(exist_ok=True)
-        >>> _ = Path("mixed", "weather.h5").write_bytes(b"\x89HDF\r\n temperatures")
+        >>> with h5py.File("mixed/weather.h5", "w") as file:
+        ...     file["temperatures"] = [12.5, 13.0]
         >>> passed_over(Path("mixed"))
         ('weather.h5',)
     """
