@@ -2,6 +2,7 @@
 
 import pickle
 import re
+import struct
 import tracemalloc
 from pathlib import Path
 
@@ -298,9 +299,12 @@ def test_hdf5_holds_what_the_table_does(tmp_path: Path, format: str) -> None:
     assert [each.name for each in find_takes(tmp_path).takes] == ["other", "take"]
     with h5py.File(tmp_path / "weights.hdf5", "w") as file:  # of something else
         file["layer"] = np.zeros(3)
+        file["raw"], file["sums"] = h5py.SoftLink("/gone"), h5py.ExternalLink("gone.h5", "/sums")
     assert [each.name for each in find_takes(tmp_path).takes] == ["other", "take"]
     assert open_takes(tmp_path).passed_over == ("weights.hdf5",)
-    with pytest.raises(RecordingError, match=r"holds \['layer'\]; expected a table of DeepLabCut"):
+    with pytest.raises(
+        RecordingError, match=r"holds \['layer', 'raw', 'sums'\]; expected a table of DeepLabCut"
+    ):
         open_recording(tmp_path / "weights.hdf5")
     other.write_bytes(other.read_bytes()[:-500])
     with pytest.raises(RecordingError, match=r"other\.h5: damaged"):
@@ -341,3 +345,12 @@ def test_what_pandas_pickled_is_only_names(tmp_path: Path) -> None:
         file["df_with_missing/table"].attrs["values_block_0_kind"] = told
     with pytest.raises(RecordingError, match=r"damaged \(pathlib"):
         open_recording(path)
+    with h5py.File(path, "r+") as file:  # an array of 2^28 bytes, of which none is there
+        told = np.bytes_(b"\x80\x05\x96" + struct.pack("<Q", 2**28) + b".")
+        file["df_with_missing/table"].attrs["values_block_0_kind"] = told
+    tracemalloc.start()
+    with pytest.raises(RecordingError, match="damaged"):
+        open_recording(path)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 50e6

@@ -187,8 +187,8 @@ def _in_order(array: FloatArray, order: str, wanted: str) -> FloatArray:
 
 
 def _frames(file: Any) -> list[Any]:
-    """Return the frames of pandas in a file."""
-    groups = [file[name] for name in file]
+    """Return the frames of pandas in a file; a link in it may lead nowhere."""
+    groups = [each for each in map(file.get, file) if each is not None]
     return [each for each in groups if _plain(each.attrs.get("pandas_type")) in _FRAMES]
 
 
@@ -243,8 +243,15 @@ def _levels(path: Path, frame: Any, name: str) -> list[Any]:
 class _Unpickler(pickle._Unpickler):
     """Makes lists and texts, and nothing that has to be found by name.
 
-    In Python: in C what is remembered is an array, which damage can make as large as memory.
+    In Python: in C what is remembered is an array, which damage can make as large as memory. So it
+    can an array of bytes, which is made before it is read.
     """
+
+    dispatch = {  # noqa: RUF012
+        code: load
+        for code, load in pickle._Unpickler.dispatch.items()
+        if code != pickle.BYTEARRAY8[0]
+    }
 
     def find_class(self, module_name: str, global_name: str) -> Any:
         raise pickle.UnpicklingError(f"{module_name}.{global_name} among names of columns")
