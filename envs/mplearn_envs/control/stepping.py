@@ -8,7 +8,7 @@ back beside each other.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -73,16 +73,27 @@ class StepLaw(NamedTuple):
     decides_s: float
 
 
+STEP = np.dtype(
+    [
+        ("doing", "i8"),  # `STANDS`, `SHIFTS` (the weight goes to one foot) or `SWINGS`
+        ("side", "i8"),  # of the foot that steps
+        ("back", "?"),  # whether it steps back, and not to catch
+        ("n_steps", "i8"),  # that were taken
+        ("way", "i8"),  # on which it goes, see `choose_step`
+        ("crosses", "?"),  # whether it may cross the other: it was up when the robot was pushed
+        ("hurries", "?"),  # whether any foot was
+        ("time_s", "f8"),  # since this began
+        ("lasts_s", "f8"),  # the step
+        ("rested_s", "f8"),  # for how long the weight has rested
+    ]
+)
+
+
 class StepState(NamedTuple):
     """What is remembered from one moment to the next; arrays, changed in place.
 
     Attributes:
-        phase: What is going on (`STANDS`, `SHIFTS`: the weight goes to one foot, `SWINGS`); which
-            foot steps, 0 left, 1 right; whether it steps back and not to catch; how many steps were
-            taken; on which way the foot goes (`BESIDE`); whether it may cross the other one,
-            for it was in the air when that was pushed; and whether any foot was; shape (7,).
-        time: Time in this phase, how long the step lasts, and for how long the weight has rested,
-            shape (3,) [s].
+        step: What is going on, shape (1,), of `STEP`.
         place: Where the foot lands: x, y [m] and yaw [rad], shape (3,).
         goal: Where the DCM shall be, on its way, shape (2,) [m].
         foot: Where the foot that steps shall be now: x, y, z [m] and yaw [rad], shape (4,).
@@ -90,8 +101,7 @@ class StepState(NamedTuple):
         foot_change: Its acceleration, shape (4,).
     """
 
-    phase: FloatArray
-    time: FloatArray
+    step: Any
     place: FloatArray
     goal: FloatArray
     foot: FloatArray
@@ -101,13 +111,14 @@ class StepState(NamedTuple):
 
 def new_step_state() -> StepState:
     """Return what is remembered at first: nothing."""
-    return StepState(*(np.zeros(n) for n in (7, 3, 3, 2, 4, 4, 4)))
+    return StepState(np.zeros(1, STEP), *(np.zeros(n) for n in (3, 2, 4, 4, 4)))
 
 
 @kernel
 def swinging(stepping: StepState) -> int:
     """Return the side of the foot that is on its way, -1 for none."""
-    return int(stepping.phase[1]) if stepping.phase[0] == SWINGS else -1
+    s = stepping.step[0]
+    return int(s.side) if s.doing == SWINGS else -1
 
 
 @inlined
@@ -123,9 +134,10 @@ def begin_stepping(
         now: The moment.
         up: Side of the foot that is in the air, -1 for none.
     """
+    s = stepping.step[0]
+    s.doing, s.side, s.back, s.n_steps, s.way = STANDS, LEFT, False, 0, BESIDE
+    s.crosses, s.hurries, s.time_s, s.lasts_s, s.rested_s = False, False, 0.0, 0.0, 0.0
     for part in (
-        stepping.phase,
-        stepping.time,
         stepping.place,
         stepping.goal,
         stepping.foot,
@@ -140,7 +152,7 @@ def begin_stepping(
             robot.corners, now.feet, now.dcm, now.rate, law.hurried, up, 0.0, True, high_m, sinks
         )
         _lift(robot, stepping, now, up, step.time_s, step.place)
-        stepping.phase[4], stepping.phase[5], stepping.phase[6] = step.way, 1.0, 1.0
+        s.way, s.crosses, s.hurries = step.way, True, True
 
 
 @kernel
@@ -153,7 +165,8 @@ def settled(law: StepLaw, stepping: StepState, feet: FloatArray, for_s: float) -
         feet: Where the feet are: x, y [m] and yaw [rad], shape (2, 3).
         for_s: How long the weight must have rested [s].
     """
-    rests = stepping.phase[0] == STANDS and stepping.time[2] >= for_s
+    s = stepping.step[0]
+    rests = s.doing == STANDS and s.rested_s >= for_s
     return bool(rests and _astray(law, feet) < ASTRAY_M)
 
 
@@ -169,30 +182,31 @@ def plan_step(
         stepping: What is remembered.
         now: The moment.
     """
-    stepping.time[0] += law.period_s
-    if stepping.phase[0] == SWINGS:
-        side, left = int(stepping.phase[1]), stepping.time[1] - stepping.time[0]
+    s = stepping.step[0]
+    s.time_s += law.period_s
+    if s.doing == SWINGS:
+        side, left = s.side, s.lasts_s - s.time_s
         low = now.soles[side, :, 2].min() - now.floor
-        if (stepping.time[0] > 0.6 * stepping.time[1] and low < TOUCHES_M) or left < -_LATE_S:
-            stepping.phase[0], stepping.time[0], stepping.time[2] = STANDS, 0.0, 0.0
+        if (s.time_s > 0.6 * s.lasts_s and low < TOUCHES_M) or left < -_LATE_S:
+            s.doing, s.time_s, s.rested_s = STANDS, 0.0, 0.0
             stepping.goal[:] = now.dcm
-    if stepping.phase[0] != SWINGS:
+    if s.doing != SWINGS:
         hull = support_hull(robot.corners, now.feet, NEITHER, 0.0)
-        landed = stepping.phase[3] == 0.0 or stepping.phase[0] == SHIFTS
-        landed = landed or stepping.phase[6] == 1.0 or stepping.time[0] > _STOOD_S
+        landed = s.n_steps == 0 or s.doing == SHIFTS
+        landed = landed or s.hurries or s.time_s > _STOOD_S
         if landed and hull_margin(hull, now.dcm[0], now.dcm[1]) < _LEAVES_M:
             reach = _reach_of(law, stepping)
             step = choose_step(robot.corners, now.feet, now.dcm, now.rate, reach, NEITHER, 0.0)
             _lift(robot, stepping, now, step.side, step.time_s, step.place)
-            stepping.phase[4] = step.way
-    if stepping.phase[0] != SWINGS:
+            s.way = step.way
+    if s.doing != SWINGS:
         side = _goes_back(law, stepping, now)
         if side >= 0:
             over = support_hull(robot.corners, now.feet, side, _LIFTS_M)
             if hull_margin(over, now.dcm[0], now.dcm[1]) > 0.0:
                 _lift(robot, stepping, now, side, _BACK_S, _beside(law, now.feet, side))
-                stepping.phase[2], stepping.phase[4] = 1.0, BESIDE  # back
-    if stepping.phase[0] == SWINGS:
+                s.back, s.way = True, BESIDE  # back
+    if s.doing == SWINGS:
         return _on_one_foot(law, robot, stepping, now)
     return _on_both_feet(law, robot, stepping, now)
 
@@ -200,7 +214,7 @@ def plan_step(
 @inner_kernel
 def _reach_of(law: StepLaw, stepping: StepState) -> Reach:
     """Return where feet can land, and how soon."""
-    return law.hurried if stepping.phase[6] == 1.0 else law.reach
+    return law.hurried if stepping.step[0].hurries else law.reach
 
 
 @inner_kernel
@@ -209,11 +223,12 @@ def _goes_back(law: StepLaw, stepping: StepState, now: BodyState) -> int:
 
     After a step that caught, far aside, of who hurries, the other foot follows without rest.
     """
-    if stepping.phase[0] == SHIFTS:
-        return int(stepping.phase[1])
-    caught = stepping.phase[6] == 1.0 and stepping.phase[2] == 0.0
-    if caught and stepping.time[0] > _STOOD_S and _astray(law, now.feet) > _FAR_M:
-        return 1 - int(stepping.phase[1])
+    s = stepping.step[0]
+    if s.doing == SHIFTS:
+        return int(s.side)
+    caught = s.hurries and not s.back
+    if caught and s.time_s > _STOOD_S and _astray(law, now.feet) > _FAR_M:
+        return 1 - int(s.side)
     return -1
 
 
@@ -227,10 +242,11 @@ def _lift(
     place: FloatArray,
 ) -> None:
     """Begin a step, one to catch."""
-    stepping.phase[0], stepping.phase[1], stepping.phase[2] = SWINGS, side, 0.0
-    stepping.phase[3] += 1.0
-    stepping.phase[5] = 0.0
-    stepping.time[0], stepping.time[1] = 0.0, time_s
+    s = stepping.step[0]
+    s.doing, s.side, s.back = SWINGS, side, False
+    s.n_steps += 1
+    s.crosses = False
+    s.time_s, s.lasts_s = 0.0, time_s
     stepping.place[:] = place
     stepping.foot[:3], stepping.foot[3] = (
         now.pose.position[robot.stance.feet[side]],
@@ -244,13 +260,14 @@ def _on_one_foot(
     law: StepLaw, robot: ReferenceRobot, stepping: StepState, now: BodyState
 ) -> tuple[float, float]:
     """Move the foot on; return where in the standing sole the zero-moment point shall be."""
-    side = int(stepping.phase[1])
-    left = max(stepping.time[1] - stepping.time[0], 0.0)
+    s = stepping.step[0]
+    side = s.side
+    left = max(s.lasts_s - s.time_s, 0.0)
     sole = support_hull(robot.corners, now.feet, side, 0.5 * _INSET_M)
-    if stepping.phase[2] == 1.0 and hull_margin(sole, now.dcm[0], now.dcm[1]) < -_LOST_M:
-        stepping.phase[2] = 0.0
-    if stepping.phase[2] == 0.0:
-        if stepping.time[0] < law.decides_s:
+    if s.back and hull_margin(sole, now.dcm[0], now.dcm[1]) < -_LOST_M:
+        s.back = False
+    if not s.back:
+        if s.time_s < law.decides_s:
             step = choose_step(
                 robot.corners,
                 now.feet,
@@ -258,13 +275,13 @@ def _on_one_foot(
                 now.rate,
                 _reach_of(law, stepping),
                 side,
-                stepping.time[0],
-                stepping.phase[5] == 1.0,
+                s.time_s,
+                s.crosses,
                 max(stepping.foot[2] - now.floor - robot.stance.foot_position[side, 2], 0.0),
                 -stepping.foot_rate[2],
             )
-            stepping.time[1] = stepping.time[0] + step.time_s
-            stepping.phase[4], stepping.place[:] = step.way, step.place
+            s.lasts_s = s.time_s + step.time_s
+            s.way, stepping.place[:] = step.way, step.place
         elif left > _FIXED_S:
             place, _ = landing_place(
                 robot.corners,
@@ -274,7 +291,7 @@ def _on_one_foot(
                 now.rate,
                 left,
                 _reach_of(law, stepping),
-                int(stepping.phase[4]),
+                s.way,
             )
             stepping.place[:] = place
         x, y = now.dcm
@@ -298,11 +315,12 @@ def _on_both_feet(
     law: StepLaw, robot: ReferenceRobot, stepping: StepState, now: BodyState
 ) -> tuple[float, float]:
     """Bring the weight between the feet or over one; return the wanted zero-moment point."""
+    s = stepping.step[0]
     left_x, left_y = sole_middle(robot, now.feet, LEFT)
     right_x, right_y = sole_middle(robot, now.feet, RIGHT)
     share = 0.5
-    if stepping.phase[0] == SHIFTS:
-        share = 0.0 if stepping.phase[1] == 0.0 else 1.0
+    if s.doing == SHIFTS:
+        share = 0.0 if s.side == LEFT else 1.0
     x = share * left_x + (1.0 - share) * right_x
     y = share * left_y + (1.0 - share) * right_y
     dx, dy = x - stepping.goal[0], y - stepping.goal[1]
@@ -312,15 +330,11 @@ def _on_both_feet(
         stepping.goal[0] += go * dx
         stepping.goal[1] += go * dy
     near = np.hypot(now.dcm[0] - x, now.dcm[1] - y) < _RESTS_M
-    stepping.time[2] = stepping.time[2] + law.period_s if near else 0.0
-    if (
-        stepping.phase[0] == STANDS
-        and stepping.time[2] > _RESTS_S
-        and _astray(law, now.feet) > ASTRAY_M
-    ):
-        stepping.phase[0], stepping.time[0], stepping.time[2] = SHIFTS, 0.0, 0.0
-        if stepping.phase[2] == 0.0:  # after a step that caught, the other foot follows
-            stepping.phase[1] = 1.0 - stepping.phase[1]
+    s.rested_s = s.rested_s + law.period_s if near else 0.0
+    if s.doing == STANDS and s.rested_s > _RESTS_S and _astray(law, now.feet) > ASTRAY_M:
+        s.doing, s.time_s, s.rested_s = SHIFTS, 0.0, 0.0
+        if not s.back:  # after a step that caught, the other foot follows
+            s.side = 1 - s.side
     hull = support_hull(robot.corners, now.feet, NEITHER, _INSET_M)
     strong = 1.0 + law.gain / now.rate
     return nearest_inside(
@@ -355,8 +369,9 @@ def _swing(
     law: StepLaw, robot: ReferenceRobot, stepping: StepState, floor: float, stands: FloatArray
 ) -> None:
     """Move the foot that steps on its way: up, round the other foot, and down to its place."""
+    s = stepping.step[0]
     h = law.period_s
-    left = max(stepping.time[1] - stepping.time[0], _FIXED_S)
+    left = max(s.lasts_s - s.time_s, _FIXED_S)
     at, rate, change = stepping.foot, stepping.foot_rate, stepping.foot_change
     via_x, via_y, far = way_round(stands, at, stepping.place, law.reach)
     for i in range(2):
@@ -367,12 +382,12 @@ def _swing(
             near = np.hypot(via_x - at[0], via_y - at[1]) + 1e-9
             speed = min(far / max(left - 0.02, _LEAST_S), 1.5 * law.reach.fastest)
             change[i] = (speed * (via - at[i]) / near - rate[i]) / _TURNS_S
-    half = 0.45 * stepping.time[1]
-    height = floor + robot.stance.foot_position[int(stepping.phase[1]), 2]
-    rises = stepping.time[0] < half and stepping.phase[4] != DOWN
+    half = 0.45 * s.lasts_s
+    height = floor + robot.stance.foot_position[s.side, 2]
+    rises = s.time_s < half and s.way != DOWN
     rises = rises and at[2] < height + law.lift_m  # a raised foot comes down
     height += law.lift_m if rises else -_DOWN_M
-    until = max(half - stepping.time[0] if rises else left, _FIXED_S)
+    until = max(half - s.time_s if rises else left, _FIXED_S)
     change[2] = _towards(at[2], rate[2], height, until)
     change[3] = _towards(0.0, rate[3], wrap_angle(stepping.place[2] - at[3]), left)
     rate += h * change

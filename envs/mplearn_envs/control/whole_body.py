@@ -213,7 +213,7 @@ def _height(
 ) -> float:
     """Return how high the base shall be over the floor, so that both legs will reach [m]."""
     stance, swings = robot.stance, swinging(stepping)
-    out = wanted - (law.crouch_m if stepping.phase[3] > 0.0 else 0.0)
+    out = wanted - (law.crouch_m if stepping.step[0].n_steps > 0.0 else 0.0)
     for side in range(2):
         foot, thigh = stance.feet[side], stance.thighs[side]
         hip = now.pose.position[thigh]
@@ -222,9 +222,9 @@ def _height(
         for i in range(2):
             speed = (now.after.position[thigh, i] - hip[i]) / law.period_s
             if side == swings:
-                left = max(stepping.time[1] - stepping.time[0], 0.0)
+                left = max(stepping.step[0].lasts_s - stepping.step[0].time_s, 0.0)
                 d = hip[i] + left * speed - stepping.place[i]
-            elif stepping.phase[0] == SHIFTS:
+            elif stepping.step[0].doing == SHIFTS:
                 d = hip[i] + stepping.goal[i] - now.cog[i] - now.pose.position[foot, i]
             else:
                 speed -= (now.after.position[foot, i] - now.pose.position[foot, i]) / law.period_s

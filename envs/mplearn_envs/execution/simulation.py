@@ -214,7 +214,7 @@ class Simulation:
         return report._replace(
             fallen=self._diverged() or has_fallen(self.data.qpos, end.q, FALL_DROP_M),
             duration_s=done * plan.knot_s + len(back) * reflexes.law.period_s,
-            n_steps=int(progress.stepping.phase[3]),
+            n_steps=int(progress.stepping.step[0]["n_steps"]),
             end=end,
         )
 
