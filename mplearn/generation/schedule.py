@@ -7,9 +7,11 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from ..errors import InvalidValueError
 from ..hmm import LeftRightHMM
 from ..recording import FloatArray, IntArray
 from .dynamics import Dynamics
+from .trajectory import MAX_FRAMES
 
 
 class GenerativePrimitive(Protocol):
@@ -73,7 +75,17 @@ def state_durations_s(primitive: GenerativePrimitive) -> FloatArray:
 
 
 def schedule(path: Sequence[GenerativePrimitive], rate_hz: float) -> Schedule:
-    """Return which state of which primitive each frame is in, at any frame rate."""
+    """Return which state of which primitive each frame is in, at any frame rate.
+
+    Raises:
+        InvalidValueError: These are more than `MAX_FRAMES`.
+    """
+    n_in_all = rate_hz * sum(primitive.mean_duration_s for primitive in path)
+    if n_in_all > MAX_FRAMES:
+        raise InvalidValueError(
+            f"a path of {len(path)} primitives at {rate_hz:g} Hz has {n_in_all:.3g} frames, "
+            f"more than {MAX_FRAMES}"
+        )
     states = []
     for primitive in path:
         ends = np.cumsum(state_durations_s(primitive)) * rate_hz

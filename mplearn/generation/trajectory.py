@@ -9,6 +9,8 @@ import numpy as np
 from ..errors import InvalidValueError
 from ..recording import FloatArray, IntArray
 
+MAX_FRAMES = 5_000_000
+
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:

@@ -11,10 +11,9 @@ from ..errors import InvalidValueError
 from ..maths.compiling import njit
 from ..maths.splines import curvatures, fill_in, spline_values
 from ..recording import FloatArray, IntArray
-from .trajectory import Trajectory
+from .trajectory import MAX_FRAMES, Trajectory
 
 _BLEND_S = 0.1  # half the time over which one primitive's slow-down passes into the next one's
-_MAX_FRAMES = 5_000_000
 
 
 class Timing(NamedTuple):
@@ -68,9 +67,9 @@ class Warp:
         n_old = len(self.trajectory)
         slowness, passed = self._course(slow_down, 0, n_old)
         n_new = math.ceil(passed[-1] - 1e-9) + 1
-        if n_new > _MAX_FRAMES:
+        if n_new > MAX_FRAMES:
             raise InvalidValueError(
-                f"the limits would stretch {n_old} frames to {n_new}, more than {_MAX_FRAMES}"
+                f"the limits would stretch {n_old} frames to {n_new}, more than {MAX_FRAMES}"
             )
         fit = (n_new - 1) / passed[-1]
         slowness, passed = fit * slowness, fit * passed

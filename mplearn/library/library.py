@@ -568,6 +568,8 @@ def _tree_node(node: tuple[int, int | None, int]) -> TreeNode:
 
 def _is_store(path: Path) -> bool:
     """Whether a file is a store, by its first bytes."""
+    if not path.is_file():  # a pipe would be waited for
+        return False
     try:
         with path.open("rb") as file:
             return file.read(len(_STORE)) == _STORE

@@ -8,9 +8,7 @@ migrations of its format.
 from __future__ import annotations
 
 import hashlib
-import os
 import struct
-import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
@@ -19,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import MPLearnError, StateError
+from ..writing import written_whole
 from .packing import as_json, from_json, packed, unpacked
 
 _MAX_BYTES = 1 << 30  # of the content of a file that claims to hold many times its own size
@@ -74,28 +73,13 @@ class FileFormat:
         }
         parts = {"header.json": as_json(header), "arrays.bin": blob}
         try:
-            path = path.resolve()  # a link stays one: what it leads to is written
-            mode = path.stat().st_mode & 0o7777 if path.exists() else 0o644
-            handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle
-            reason = error.strerror if isinstance(error, OSError) else str(error)
-            raise self.error(f"cannot write {path}: {reason}") from error
-        temporary = Path(name)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                with zipfile.ZipFile(file, "w") as archive:
-                    for part, data in parts.items():
-                        info = zipfile.ZipInfo(part, _EPOCH)
-                        info.compress_type = zipfile.ZIP_DEFLATED
-                        archive.writestr(info, data, compresslevel=self.compression)
-                file.flush()
-                os.fsync(file.fileno())
-            temporary.chmod(mode)
-            temporary.replace(path)
+            with written_whole(path) as file, zipfile.ZipFile(file, "w") as archive:
+                for part, data in parts.items():
+                    info = zipfile.ZipInfo(part, _EPOCH)
+                    info.compress_type = zipfile.ZIP_DEFLATED
+                    archive.writestr(info, data, compresslevel=self.compression)
         except OSError as error:
             raise self.error(f"cannot write {path}: {error.strerror}") from error
-        finally:
-            temporary.unlink(missing_ok=True)
 
     def read(self, path: Path) -> Any:
         """Return what `write` wrote, as of the newest schema.
@@ -152,6 +136,8 @@ def checksum(body: Any, blob: bytes) -> str:
 
 
 def _parts(path: Path) -> tuple[bytes, bytes]:
+    if path.exists() and not (path.is_file() or path.is_dir()):  # of which there is no end
+        raise ValueError("it is a pipe or a device, no file")
     with zipfile.ZipFile(path) as archive:
         names = ("header.json", "arrays.bin")
         size = sum(archive.getinfo(name).file_size for name in names)

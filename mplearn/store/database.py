@@ -28,6 +28,8 @@ _CANNOT_WRITE = ("full", "readonly", "read-only", "disk I/O", "unable to open")
 
 def looks_like_one(path: Path) -> bool:
     """Whether a file is a store by its first bytes; it may still be another program's."""
+    if not path.is_file():  # a pipe would be waited for
+        return False
     try:
         with path.open("rb") as file:
             return file.read(len(MAGIC)) == MAGIC

@@ -13,11 +13,13 @@ from typing import NamedTuple
 from ..errors import InvalidValueError, RecordingError
 from ..extras import require
 from ..library import RecognisedSegment, SegmentTable
+from ..writing import written_whole
 from . import boris, eaf, motion_bids
 
 
 def _write_text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", errors="backslashreplace")
+    with written_whole(path) as file:
+        file.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 def as_csv(table: SegmentTable) -> str:
@@ -61,7 +63,9 @@ def _text_format(
 
 
 def _write_parquet(table: SegmentTable, path: Path) -> None:
-    require("pyarrow.parquet", "tables").write_table(table.to_arrow(), path)
+    parquet = require("pyarrow.parquet", "tables")
+    with written_whole(path) as file:
+        parquet.write_table(table.to_arrow(), file)
 
 
 def _read_parquet(path: Path) -> SegmentTable:
@@ -70,7 +74,9 @@ def _read_parquet(path: Path) -> SegmentTable:
 
 
 def _write_feather(table: SegmentTable, path: Path) -> None:
-    require("pyarrow.feather", "tables").write_feather(table.to_arrow(), str(path))
+    feather = require("pyarrow.feather", "tables")
+    with written_whole(path) as file:
+        feather.write_feather(table.to_arrow(), str(file))
 
 
 def _read_feather(path: Path) -> SegmentTable:

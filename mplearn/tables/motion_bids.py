@@ -10,6 +10,7 @@ from typing import Any
 
 from ..errors import RecordingError
 from ..library import RecognisedSegment, SegmentTable
+from ..writing import written_whole
 from .boris import UNKNOWN, behaviour
 
 _MISSING = "n/a"
@@ -49,8 +50,10 @@ def write(table: SegmentTable, path: Path) -> None:
                 *(_MISSING if c in (None, "") else c for c in cells),
             )
         )
-    path.write_text(out.getvalue(), encoding="utf-8", errors="backslashreplace")
-    path.with_suffix(".json").write_text(json.dumps(_SAID, indent=2), encoding="utf-8")
+    with written_whole(path) as file:
+        file.write_text(out.getvalue(), encoding="utf-8", errors="backslashreplace")
+    with written_whole(path.with_suffix(".json")) as file:
+        file.write_text(json.dumps(_SAID, indent=2), encoding="utf-8")
 
 
 def read(path: Path) -> SegmentTable:

@@ -508,6 +508,46 @@ def test_interrupted_while_it_is_loaded_there_is_no_traceback():
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "loading\n", "")
 
 
+@pytest.mark.parametrize("suffix", ["csv", "NPZ", "bvh"])
+def test_a_motion_is_written_whole_or_not_at_all(suffix, library_file, tmp_path, capsys):
+    """A name in capitals is taken as it is, too."""
+    from mplearn import writing
+
+    file = tmp_path / "to" / f"motion.{suffix}"
+    argv = ("generate", library_file, 3, "--to", file)
+    assert said(capsys, *argv)[0] == 0
+    assert [each.name for each in file.parent.iterdir()] == [file.name]
+    file.write_bytes(b"precious")
+
+    def interrupt(_):
+        raise KeyboardInterrupt
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(writing.os, "fsync", interrupt)
+        assert said(capsys, *argv)[0] == 130
+    assert [each.read_bytes() for each in file.parent.iterdir()] == [b"precious"]
+
+
+@pytest.mark.parametrize("name", ["stdout", "stderr"])
+def test_a_closed_stream_is_no_traceback(name, library_file, capsys, monkeypatch):
+    monkeypatch.setattr(sys, name, None)
+    assert main(["show", str(library_file)]) == 0
+    assert main(["show", "nowhere.mplearn"]) == 2
+    assert "Traceback" not in "".join(capsys.readouterr())
+
+
+def test_who_reads_no_more_is_no_fault(library_file):
+    program = "import sys\nfrom mplearn_agents.cli import main\nsys.exit(main(sys.argv[1:]))"
+    with subprocess.Popen(
+        [sys.executable, "-c", program, "show", str(library_file)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as process:
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 0
+
+
 def test_streams_are_put_back():
     before = sys.stdout, sys.stderr
     with inert_output():

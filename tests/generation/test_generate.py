@@ -181,6 +181,7 @@ def test_bad_requests_are_named():
         ({"style": "ballet"}, "style must be one of"),
         ({"rate_hz": 0.0}, "rate_hz"),
         ({"rate_hz": np.nan}, "rate_hz"),
+        ({"rate_hz": 1e12}, "more than 5000000"),
         ({"blend_s": -1.0}, "blend_s"),
         ({"n_samples": 0}, "n_samples"),
         ({"start": np.zeros(2)}, r"shape \(3,\)"),

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from library_examples import CHANNELS, RATE, demonstrations, example_library
 
+from mplearn import writing
 from mplearn.errors import LibraryError, StoreError
 from mplearn.graph import TransitionGraph
 from mplearn.hmm import fit
@@ -89,7 +90,7 @@ def test_saving_is_all_or_nothing(saved, tmp_path, monkeypatch):
     def fails(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(files.os, "fsync", fails)
+    monkeypatch.setattr(writing.os, "fsync", fails)
     with pytest.raises(LibraryError, match="No space left"):
         named_library().save(target)
     assert target.read_bytes() == b"precious"

@@ -71,6 +71,7 @@ def run(args: argparse.Namespace) -> None:
     import numpy as np
 
     from mplearn.library import PrimitiveLibrary
+    from mplearn.writing import written_whole
 
     suffix = args.to.suffix.lower()
     if suffix not in _WRITERS:
@@ -87,7 +88,8 @@ def run(args: argparse.Namespace) -> None:
         rng=np.random.default_rng(args.seed),
     )
     args.to.parent.mkdir(parents=True, exist_ok=True)
-    _WRITERS[suffix](args.to, motion, library)
+    with written_whole(args.to) as file:
+        _WRITERS[suffix](file, motion, library)
     noun = "primitive" if len(path) == 1 else "primitives"
     print(
         f"{len(path)} {noun}, {len(motion.frames)} frames at {motion.rate_hz:g} Hz, "
@@ -102,14 +104,15 @@ def _key(library: PrimitiveLibrary, text: str) -> int | str:
 def _write_npz(path: Path, motion: Trajectory, library: PrimitiveLibrary) -> None:
     import numpy as np
 
-    np.savez(
-        path,
-        frames=motion.frames,
-        rate_hz=motion.rate_hz,
-        channels=np.array(motion.channels),
-        primitive_ids=motion.primitive_ids,
-        starts=motion.starts,
-    )
+    with path.open("wb") as file:  # to a name in capitals numpy appends its own
+        np.savez(
+            file,
+            frames=motion.frames,
+            rate_hz=motion.rate_hz,
+            channels=np.array(motion.channels),
+            primitive_ids=motion.primitive_ids,
+            starts=motion.starts,
+        )
 
 
 def _write_csv(path: Path, motion: Trajectory, library: PrimitiveLibrary) -> None:

@@ -43,6 +43,11 @@ class InertConsole(Console):
                 text = printable(text, "\n").encode(encoding, "backslashreplace").decode(encoding)
             yield Segment(text, style, control)
 
+    def on_broken_pipe(self) -> None:
+        """Let the command see that nobody reads any more, instead of ending it with code 1."""
+        self.quiet = True
+        raise BrokenPipeError
+
 
 def open_console(*, stderr: bool = False) -> Console:
     """Return the console of a command."""

@@ -6,12 +6,15 @@ what would steer a terminal is spelled out.
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from typing import Any, TextIO
 
+_NOWHERE = Path(os.devnull)
 _RESET = "\x1b[0m"
 _UNUSUAL = re.compile(r"[^ -~]")
 
@@ -63,10 +66,14 @@ class InertStream:
 
 @contextmanager
 def inert_output() -> Iterator[None]:
-    """Let nothing printed inside steer the terminal."""
+    """Let nothing printed inside steer the terminal; where a stream is closed, it is nowhere."""
     before = sys.stdout, sys.stderr
-    sys.stdout, sys.stderr = InertStream(before[0]), InertStream(before[1])
-    try:
-        yield
-    finally:
-        sys.stdout, sys.stderr = before
+    with ExitStack() as opened:
+        sys.stdout, sys.stderr = (
+            InertStream(opened.enter_context(_NOWHERE.open("w")) if stream is None else stream)
+            for stream in before
+        )
+        try:
+            yield
+        finally:
+            sys.stdout, sys.stderr = before

@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 
 from mplearn.errors import InvalidValueError
+from mplearn.writing import written_whole
 
 from .format import Format
 from .motion import RobotMotion
@@ -73,7 +75,8 @@ def export(
             shutil.rmtree(path)
         elif path.is_dir():
             raise InvalidValueError(f"{path} is a folder; {format.name} is one file")
-        format.write(path, part, model)
+        with written_whole(path) if format.suffix else nullcontext(path) as place:
+            format.write(place, part, model)
         write_sidecar(path, format.name, part, model)
     return tuple(path for path, _ in jobs)
 

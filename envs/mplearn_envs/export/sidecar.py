@@ -16,6 +16,7 @@ import numpy as np
 
 from mplearn.errors import RecordingError
 from mplearn.recording import FloatArray
+from mplearn.writing import written_whole
 
 from .motion import RobotMotion
 from .robot_model import RobotModel
@@ -96,7 +97,8 @@ def write_sidecar(
         "bodies": list(model.body_names),
         "motions": clips,
     }
-    sidecar_path(path).write_text(json.dumps(content, separators=(",", ":")), encoding="utf-8")
+    with written_whole(sidecar_path(path)) as file:
+        file.write_text(json.dumps(content, separators=(",", ":")), encoding="utf-8")
 
 
 def read_sidecar(path: Path) -> Sidecar | None:

@@ -33,16 +33,17 @@ class GMRNPZ(Format):
     def write(self, path: Path, motions: Sequence[RobotMotion], model: RobotModel) -> None:
         """Write one motion."""
         (motion,) = motions
-        np.savez(
-            path,
-            fps=np.array(motion.rate_hz),
-            root_pos=motion.root_pos,
-            root_rot=motion.root_quat[:, [1, 2, 3, 0]],
-            dof_pos=motion.joint_pos,
-            local_body_pos=seen_from_the_base(model, motion.joint_pos).astype(np.float32),
-            link_body_list=np.array(model.body_names),
-            joint_names=np.array(model.joint_names),
-        )
+        with path.open("wb") as file:  # to a name in capitals numpy appends its own
+            np.savez(
+                file,
+                fps=np.array(motion.rate_hz),
+                root_pos=motion.root_pos,
+                root_rot=motion.root_quat[:, [1, 2, 3, 0]],
+                dof_pos=motion.joint_pos,
+                local_body_pos=seen_from_the_base(model, motion.joint_pos).astype(np.float32),
+                link_body_list=np.array(model.body_names),
+                joint_names=np.array(model.joint_names),
+            )
 
     def read(self, path: Path, model: RobotModel) -> tuple[Reading, ...]:
         """Return the motion of a file."""

@@ -59,7 +59,8 @@ class MjlabNPZ(Format):
         content["fps"] = np.array([motion.rate_hz])
         content["joint_names"] = np.array(model.joint_names)
         content["body_names"] = np.array(model.body_names)
-        np.savez(path, **content)
+        with path.open("wb") as file:  # to a name in capitals numpy appends its own
+            np.savez(file, **content)
 
     def read(self, path: Path, model: RobotModel) -> tuple[Reading, ...]:
         """Return the motion of a file."""
