@@ -370,7 +370,7 @@ def backup(path: str | Path, to: str | Path) -> Path:
     path, to = path_of("path", path), path_of("to", to)
     if to.exists():
         raise InvalidValueError(f"{to} exists already; a backup is a new file")
-    if not is_begun(path):
+    if path.exists() and not is_begun(path):
         raise NotAStoreError(f"{path} holds no store: it was never finished")
     connection = open_reading(path)
     try:

@@ -143,6 +143,8 @@ def test_others_read_it_while_it_grows(tmp_path: Path) -> None:
         copy = backup(path, tmp_path / "copy.db")
         with pytest.raises(InvalidValueError, match="exists already"):
             backup(path, copy)
+        with pytest.raises(NotAStoreError, match="there is no store"):
+            backup(tmp_path / "none.db", tmp_path / "other.db")
         feed(life, 4500)
     assert reader.refresh()
     assert reader.life.n_frames == 4500

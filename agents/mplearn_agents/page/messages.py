@@ -122,6 +122,7 @@ def request(text: str) -> Header:
         raise InvalidValueError(f"a request has at most {LONGEST_REQUEST} characters")
     try:
         asked = json.loads(text)
+        as_text(asked)  # 1e999 is a number to Python's reader, and nothing that can be passed on
     except (ValueError, RecursionError) as error:
         raise InvalidValueError(f"a request must be JSON, not {text[:60]!r}") from error
     if not isinstance(asked, dict) or not isinstance(asked.get("do"), str):
