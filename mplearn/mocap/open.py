@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -217,8 +217,18 @@ def open_takes(
     positions: bool = False,
     hints: Hints | None = None,
     strict: bool = False,
+    through: Callable[[Collection[str]], Iterable[str]] = iter,
 ) -> Takes:
     r"""Read all takes as `open_recordings` does, and tell which cannot be read, without warnings.
+
+    Args:
+        path: As for `open_recordings`, as the others.
+        rate_hz: Resample to this rate [1/s].
+        positions: Joint-centre positions instead of joint angles.
+        hints: What the files do not say about themselves.
+        strict: Whether a take that cannot be read is an error.
+        through: Passes on the names of all takes, in order, each as it is its turn to be read: a
+            bar of progress.
 
     Example:
         >>> from pathlib import Path
@@ -233,9 +243,9 @@ def open_takes(
     takes, unreadable = _found_in(Path(path))
     if unreadable and (strict or not takes):
         raise next(iter(unreadable.values()))
-    for name, take in takes.items():
+    for name in through(takes):
         try:
-            found.extend(_read_each(take, rate_hz, positions, hints))
+            found.extend(_read_each(takes[name], rate_hz, positions, hints))
         except RecordingError as error:
             if strict or len(takes) == 1:
                 raise

@@ -19,9 +19,12 @@ from rich.console import Console
 from rich.table import Table
 
 from mplearn import open_recording
+from mplearn.errors import RecordingError
 from mplearn.library import PrimitiveLibrary
+from mplearn.mocap import open_takes
 from mplearn_agents import cli
 from mplearn_agents.cli import build_parser, command_modules, main
+from mplearn_agents.recordings.reading import shown_reading
 from mplearn_agents.terminal import console as consoles
 from mplearn_agents.terminal.console import InertConsole
 from mplearn_agents.terminal.inert import InertStream, inert_output, printable
@@ -553,3 +556,19 @@ def test_streams_are_put_back():
     with inert_output():
         assert sys.stdout is not before[0]
     assert (sys.stdout, sys.stderr) == before
+
+
+def test_reading_many_takes_shows_how_far_it_is(tmp_path):
+    for name in ("one", "two", "three"):
+        rows = "".join(f"{k / 50:.2f},{k % 7}\n" for k in range(100))
+        (tmp_path / f"{name}.csv").write_text("time_s,elbow\n" + rows)
+    (tmp_path / "torn.csv").write_text("time_s,elbow\n0.1,up\n")
+    for terminal in (True, False):
+        shown = io.StringIO()
+        with shown_reading(Console(file=shown, force_terminal=terminal, width=80)) as through:
+            takes = open_takes(tmp_path, through=through)
+        assert [each.name for each in takes.recordings] == ["one", "three", "two"]
+        assert list(takes.unreadable) == ["torn"]
+        assert ("reading" in shown.getvalue() and "4 of 4" in shown.getvalue()) == terminal
+    with pytest.raises(RecordingError, match="torn"):
+        open_takes(tmp_path, strict=True, through=lambda names: reversed(list(names)))

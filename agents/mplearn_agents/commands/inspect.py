@@ -14,6 +14,7 @@ from mplearn_agents.recordings.reading import (
     hints_of,
     say_left_out,
     say_not_read,
+    shown_reading,
 )
 
 if TYPE_CHECKING:
@@ -47,9 +48,14 @@ def run(args: argparse.Namespace) -> None:
 
     console = open_console()
     with command_line():
-        takes = open_takes(
-            args.data, positions=True, hints=hints_of(args, joint_axes=True), strict=args.strict
-        )
+        with shown_reading(open_console(stderr=True)) as through:
+            takes = open_takes(
+                args.data,
+                positions=True,
+                hints=hints_of(args, joint_axes=True),
+                strict=args.strict,
+                through=through,
+            )
         names = None if args.map is None else read_map(args.map)
         found = [inspect(recording, names) for recording in takes.recordings]
     if args.json:

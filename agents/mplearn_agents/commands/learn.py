@@ -20,6 +20,7 @@ from mplearn_agents.recordings.reading import (
     say_bodies,
     say_left_out,
     say_takes,
+    shown_reading,
 )
 from mplearn_agents.terminal.arguments import count, positive
 from mplearn_agents.terminal.exit_codes import INTERRUPTED, NOT_KEPT
@@ -122,12 +123,14 @@ def _learn_from_files(args: argparse.Namespace) -> int:
 
     console = open_console()
     with command_line():
-        takes = open_takes(
-            args.data,
-            positions=args.observe != "channels",
-            hints=hints_of(args, joint_axes=args.observe == "robot"),
-            strict=args.strict,
-        )
+        with shown_reading(console) as through:
+            takes = open_takes(
+                args.data,
+                positions=args.observe != "channels",
+                hints=hints_of(args, joint_axes=args.observe == "robot"),
+                strict=args.strict,
+                through=through,
+            )
         say_takes(console, takes)
         recordings = _of_persons(args, takes.recordings)
         recordings = _as_learned(args, recordings, console)

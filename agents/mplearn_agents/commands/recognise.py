@@ -16,6 +16,7 @@ from mplearn_agents.recordings.reading import (
     say_bodies,
     say_left_out,
     say_takes,
+    shown_reading,
 )
 
 if TYPE_CHECKING:
@@ -117,7 +118,10 @@ def _read(
     positions = bool(library.body) or are_markers(library.channels)
     with command_line():
         hints = hints_of(args, joint_axes=bool(library.body))
-        takes = open_takes(args.data, positions=positions, hints=hints, strict=args.strict)
+        with shown_reading(aside) as through:
+            takes = open_takes(
+                args.data, positions=positions, hints=hints, strict=args.strict, through=through
+            )
     say_takes(aside, takes)
     recordings = takes.recordings
     if library.body:

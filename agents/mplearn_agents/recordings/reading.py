@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,16 @@ if TYPE_CHECKING:
     from mplearn.recording import Recording
 
 _SHOWN = 8  # names in a line
+
+
+@contextmanager
+def shown_reading(console: Console) -> Iterator[Callable[[Collection[str]], Iterable[str]]]:
+    """Yield what shows in a terminal how many of how many takes are read: `open_takes`' through."""
+    from mplearn_agents.terminal.progress import open_progress
+
+    shown = console if console.is_terminal else None
+    with open_progress(shown, "{task.completed:.0f} of {task.total:.0f}") as bar:
+        yield lambda names: names if len(names) < 2 else bar.track(names, description="reading")
 
 
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
