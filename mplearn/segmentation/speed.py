@@ -29,7 +29,8 @@ class ZeroVelocityConfig:
             around it.
         still_share: Below this share of the running speed the body counts as still.
         still_s: A pause lasts at least this long [s].
-        min_length_s: Shortest motion [s].
+        min_length_s: Shortest motion [s]; of a stream's first half of it, for that may have begun
+            before the stream.
         max_length_s: An open segment is closed at this length [s].
         memory_s: Time constant of the running speed [s].
         trust: How much what is known about the motion's end counts, see `Segmenter.scaffold`:

@@ -35,6 +35,19 @@ def test_segments_tile_the_stream(name, rate_hz):
     assert_tiles(segments, len(frames))
 
 
+@pytest.mark.parametrize("name", ["kohlmorgen-lemm", "zero-velocity"])
+@pytest.mark.parametrize("rate_hz", [30.0, 100.0, 200.0])
+@pytest.mark.parametrize("turn_s", [0.21, 0.25, 0.3, 0.4])
+def test_a_stream_that_begins_in_the_midst_of_a_motion_is_cut_at_its_first_turn(
+    name, rate_hz, turn_s
+):
+    t = np.arange(round(4 * rate_hz)) / rate_hz
+    swing = np.sin(np.pi * (t + 0.5 - turn_s))  # turns then, and each second after
+    segments = make_segmenter(name, 2, rate_hz).segment(np.stack([swing, 0.5 * swing], axis=1))
+    ends = np.array([each.end for each in segments[:3]]) / rate_hz
+    np.testing.assert_allclose(ends, turn_s + np.arange(3.0), atol=1.01 / rate_hz)
+
+
 @every_segmenter
 @given(seed=st.integers(0, 10_000), scale=st.sampled_from([1e-6, 1.0, 1e6]))
 @settings(max_examples=15, deadline=None)
