@@ -22,6 +22,12 @@ _DOUBLE = ir.DoubleType()
 _VECTOR = ir.VectorType(_DOUBLE, LANES)
 _UNDEFINED = ir.Constant(_VECTOR, ir.Undefined)
 _FIRST = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+_WIDE = ir.VectorType(_DOUBLE, 2 * LANES)
+_BOTH = ir.Constant(ir.VectorType(ir.IntType(32), 2 * LANES), list(range(2 * LANES)))
+_HALVES = [
+    ir.Constant(ir.VectorType(ir.IntType(32), LANES), list(range(start, start + LANES)))
+    for start in (0, LANES)
+]
 
 
 def _require_contiguous(*arrays: Any) -> None:
@@ -106,6 +112,70 @@ def _squares(context: Any, builder: Any, signature: Any, args: Any) -> Any:
 
 
 row_squares: Any = intrinsic(_row_squares)
+
+
+def _pair_squares(
+    _context: Any, rows: Any, row: Any, others: Any, at: Any, out: Any
+) -> tuple[Any, Callable[..., Any]]:
+    """Sum the squared offsets of `LANES` rows from two others; each sum as `row_squares` has it.
+
+    It is called as ``pair_squares(rows, row, others, at, out)``: ``out[i, m]`` becomes what
+    `row_squares` makes of ``rows[row + i]`` and ``others[at + m]``, in about half the time that two
+    calls take: two rows share a vector of twice the width.
+
+    Args:
+        rows: Shape (N, K).
+        row: First row, at most N - `LANES`.
+        others: Shape (M, K).
+        at: First of the two others, at most M - 2.
+        out: Shape (`LANES`, 2, `LANES`).
+    """
+    _require_contiguous(rows, others, out)
+    return types.void(rows, types.intp, others, types.intp, out), _pairs
+
+
+def _pairs(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    """Emit the code of `pair_squares`."""
+
+    def array(k: int) -> Any:
+        return context.make_array(signature.args[k])(context, builder, args[k])
+
+    def values(data: Any, place: Any) -> Any:
+        return builder.load(_vector_at(builder, builder.gep(data, [place])), align=8)
+
+    def joined(low: Any, high: Any) -> Any:
+        return builder.shuffle_vector(low, high, _BOTH)
+
+    rows, others, out, row, at = array(0), array(2), array(4), args[1], args[3]
+    _, width = _emit.unpack_tuple(builder, rows.shape)
+    starts = [builder.mul(builder.add(row, row.type(k)), width) for k in range(LANES)]
+    theirs = [builder.mul(builder.add(at, at.type(m)), width) for m in range(2)]
+    pairs = list(zip(starts[::2], starts[1::2], strict=True))
+    sums = {
+        (k, m): _emit.alloca_once_value(builder, _WIDE([0.0] * (2 * LANES)))
+        for k in range(len(pairs))
+        for m in range(2)
+    }
+    with _emit.for_range(builder, builder.udiv(width, row.type(LANES))) as loop:
+        step = builder.mul(loop.index, row.type(LANES))
+        ones = [values(others.data, builder.add(each, step)) for each in theirs]
+        twice = [joined(one, one) for one in ones]
+        for k, pair in enumerate(pairs):
+            two = joined(*(values(rows.data, builder.add(each, step)) for each in pair))
+            for m, one in enumerate(twice):
+                offset = builder.fsub(two, one)
+                term = builder.fmul(offset, offset)
+                builder.store(builder.fadd(builder.load(sums[k, m]), term), sums[k, m])
+    for (k, m), total in sums.items():
+        both = builder.load(total)
+        for side, lanes in enumerate(_HALVES):
+            half = builder.shuffle_vector(both, both, lanes)
+            place = builder.gep(out.data, [row.type(LANES * (2 * (2 * k + side) + m))])
+            builder.store(half, _vector_at(builder, place), align=8)
+    return context.get_dummy_value()
+
+
+pair_squares: Any = intrinsic(_pair_squares)
 
 
 def _tile(context: Any, builder: Any, signature: Any, args: Any) -> Any:

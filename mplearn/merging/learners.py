@@ -61,11 +61,15 @@ def merge_learners(learners: Iterable[MotionLearner], people: Sequence[str] = ()
         )
     for other in learners[1:]:
         _check_rules(learners[0], other)
-    return merged_learner((_copied(each) for each in learners), people)
+    merged = merged_learner((_copied(each) for each in learners), people)
+    merged.tree.wake()
+    return merged
 
 
 def merged_learner(learners: Iterable[MotionLearner], people: Sequence[str] = ()) -> MotionLearner:
     """Return what `merge_learners` makes of some, all of which are used up.
+
+    Of people whose learners' models are made lazily, they are made once they are asked for.
 
     Raises:
         InvalidValueError: As `merge_learners`; some are used up by then.
@@ -79,7 +83,6 @@ def merged_learner(learners: Iterable[MotionLearner], people: Sequence[str] = ()
         300
     """
     merged, several = _merged(learners, people)
-    merged.tree.wake()
     if several:
         merged.chain.revise(merged.tree.prune())
     return merged

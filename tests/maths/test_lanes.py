@@ -5,7 +5,7 @@ import pytest
 from numba.core.errors import TypingError
 
 from mplearn.maths.compiling import njit
-from mplearn.maths.sums import LANES, row_squares, squares_tile
+from mplearn.maths.sums import LANES, pair_squares, row_squares, squares_tile
 
 
 @njit()
@@ -51,4 +51,23 @@ def test_each_lane_sums_every_fourth_value(width: int) -> None:
     wanted = np.zeros((LANES, LANES))
     for k in range(width - width % LANES):
         wanted[:, k % LANES] += (rows[2:, k] - one[k]) ** 2
+    np.testing.assert_array_equal(out, wanted)
+
+
+@njit()
+def pairs(rows, row, others, at, out):  # type: ignore[no-untyped-def]
+    pair_squares(rows, row, others, at, out)
+
+
+@pytest.mark.parametrize("width", [3, 4, 7, 1251])
+def test_sums_of_two_at_once_are_those_of_each(width: int) -> None:
+    rng = np.random.default_rng(width)
+    rows, others = rng.normal(size=(6, width)), rng.normal(size=(5, width))
+    others[4, 0] = np.nan
+    out, wanted = np.full((LANES, 2, LANES), 7.0), np.empty((LANES, 2, LANES))
+    pairs(rows, 2, others, 3, out)
+    for m in range(2):
+        alone = np.empty((LANES, LANES))
+        sums(rows, 2, others[3 + m], alone)
+        wanted[:, m] = alone
     np.testing.assert_array_equal(out, wanted)

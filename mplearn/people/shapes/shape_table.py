@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...maths.compiling import njit
-from ...maths.sums import LANES, row_squares
+from ...maths.sums import LANES, pair_squares, row_squares
 from ...recording import FloatArray, IntArray
 from ...tree import MirrorMap
 from .shape import Shape, ShapeState, mirrored
@@ -185,7 +185,7 @@ def _root_of(
     return products
 
 
-_BLOCK = 32  # rows that the processor's cache holds twice
+_BLOCK = 64  # rows that the cache of a core holds
 
 
 @njit(cache=True)
@@ -193,13 +193,11 @@ def _put_among(rows: FloatArray, slots: IntArray, out: FloatArray) -> None:
     """Put the squared distances of all rows from each other, as `_row` has them, at their slots."""
     n = len(rows)
     for start in range(0, n, _BLOCK):
-        for first in range(0, start + 1, _BLOCK):
-            for i in range(start, min(start + _BLOCK, n)):
-                end = min(first + _BLOCK, i)
-                if end > first:
-                    found = _row(rows[first:end], rows[i])
-                    for k, j in enumerate(slots[first:end]):
-                        out[slots[i], j] = out[j, slots[i]] = found[k]
+        end = min(start + _BLOCK, n)
+        found = _across(rows[start:end], rows[:end])
+        for j in range(end):
+            for i in range(max(start, j + 1), end):
+                out[slots[i], slots[j]] = out[slots[j], slots[i]] = found[i - start, j]
     for slot in slots:
         out[slot, slot] = 0.0
 
@@ -227,11 +225,26 @@ def _put_both_ways(across: FloatArray, slots: IntArray, others: IntArray, out: F
 @njit(cache=True)
 def _across(rows: FloatArray, others: FloatArray) -> FloatArray:
     """Return the squared distance of each row from each of others as `_row` does, (n, m)."""
-    out = np.empty((len(rows), len(others)))
-    for start in range(0, len(rows), _BLOCK):
-        end = min(start + _BLOCK, len(rows))
-        for j in range(len(others)):
-            out[start:end, j] = _row(rows[start:end], others[j])
+    n, m = len(rows), len(others)
+    out, sums = np.empty((n, m)), np.empty((LANES, 2, LANES))
+    if n < LANES or m < 2:
+        for j in range(m):
+            out[:, j] = _row(rows, others[j])
+        return out
+    whole = rows.shape[1] - rows.shape[1] % LANES
+    for start in range(0, n, _BLOCK):
+        for at in range(0, m, 2):
+            at = min(at, m - 2)
+            for first in range(start, min(start + _BLOCK, n), LANES):
+                first = min(first, n - LANES)
+                pair_squares(rows, first, others, at, sums)
+                for i in range(LANES):
+                    for j in range(2):
+                        total = sums[i, j]
+                        for k in range(whole, rows.shape[1]):
+                            total[0] += (rows[first + i, k] - others[at + j, k]) ** 2
+                        found = (total[0] + total[1]) + (total[2] + total[3])
+                        out[first + i, at + j] = found
     return out
 
 
