@@ -142,7 +142,8 @@ def agglomerate(
         The group of each leaf, named by its first one, shape (n,).
     """
     at = np.flatnonzero(known.firm | ~_covered(direct, known.people, known.firm))
-    totals, barred = _laid_out(direct, image, at, known.people, known.apart, config.link_own)
+    totals, barred = np.empty((len(at), len(at), 2)), np.empty((len(at), len(at)), np.bool_)
+    _lay_out(direct, image, at, known.people, known.apart, config.link_own, totals, barred)
     told = np.argwhere(known.together[np.ix_(at, at)]) if known.together.any() else _NO_PAIRS
     groups = np.arange(len(direct))
     groups[at] = at[_agglomerate(totals, barred, told, config.link, config.reach, config.sided)]
@@ -172,26 +173,25 @@ def _covered(direct: FloatArray, people: IntArray, firm: BoolArray) -> BoolArray
 
 
 @njit(cache=True)
-def _laid_out(
+def _lay_out(
     direct: FloatArray,
     image: FloatArray,
     at: IntArray,
     people: IntArray,
     apart: BoolArray,
     link_own: float,
-) -> tuple[FloatArray, BoolArray]:
-    """Return both distances of each pair of some leaves, (n, n, 2), and which must not join.
+    totals: FloatArray,
+    barred: BoolArray,
+) -> None:
+    """Put down both distances of each pair of some leaves, (n, n, 2), and which must not join.
 
     They lie side by side, for a join writes a column of both.
     """
-    n = len(at)
-    totals, barred = np.empty((n, n, 2)), np.empty((n, n), dtype=np.bool_)
     for i, a in enumerate(at):
         for j, b in enumerate(at):
             totals[i, j, 0], totals[i, j, 1] = direct[a, b], image[a, b]
             own = people[a] == people[b]
             barred[i, j] = (own and direct[a, b] > link_own) or apart[a, b]
-    return totals, barred
 
 
 @njit(cache=True)

@@ -194,7 +194,8 @@ def _put_among(rows: FloatArray, slots: IntArray, out: FloatArray) -> None:
     n = len(rows)
     for start in range(0, n, _BLOCK):
         end = min(start + _BLOCK, n)
-        found = _across(rows[start:end], rows[:end])
+        found = np.empty((end - start, end))
+        _put_across(rows[start:end], rows[:end], found)
         for j in range(end):
             for i in range(max(start, j + 1), end):
                 out[slots[i], slots[j]] = out[slots[j], slots[i]] = found[i - start, j]
@@ -222,15 +223,22 @@ def _put_both_ways(across: FloatArray, slots: IntArray, others: IntArray, out: F
             out[one, other] = out[other, one] = across[i, j]
 
 
-@njit(cache=True)
 def _across(rows: FloatArray, others: FloatArray) -> FloatArray:
     """Return the squared distance of each row from each of others as `_row` does, (n, m)."""
+    out = np.empty((len(rows), len(others)))  # in large pages, which numba's own are not
+    _put_across(rows, others, out)
+    return out
+
+
+@njit(cache=True)
+def _put_across(rows: FloatArray, others: FloatArray, out: FloatArray) -> None:
+    """Put the squared distance of each row from each of others into an array, (n, m)."""
     n, m = len(rows), len(others)
-    out, sums = np.empty((n, m)), np.empty((LANES, 2, LANES))
     if n < LANES or m < 2:
         for j in range(m):
             out[:, j] = _row(rows, others[j])
-        return out
+        return
+    sums = np.empty((LANES, 2, LANES))
     whole = rows.shape[1] - rows.shape[1] % LANES
     for start in range(0, n, _BLOCK):
         for at in range(0, m, 2):
@@ -245,7 +253,6 @@ def _across(rows: FloatArray, others: FloatArray) -> FloatArray:
                             total[0] += (rows[first + i, k] - others[at + j, k]) ** 2
                         found = (total[0] + total[1]) + (total[2] + total[3])
                         out[first + i, at + j] = found
-    return out
 
 
 @njit(cache=True)
