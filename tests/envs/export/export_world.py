@@ -49,6 +49,28 @@ def swapped_joints(motion: RobotMotion, model: RobotModel) -> RobotMotion:
     return replace(motion, joint_pos=joints)
 
 
+def backward_joint(motion: RobotMotion, model: RobotModel) -> RobotMotion:
+    sign = np.ones(len(model.joint_names))
+    sign[np.ptp(motion.joint_pos, axis=0).argmax()] = -1.0
+    return replace(motion, joint_pos=sign * motion.joint_pos)
+
+
+def inches(motion: RobotMotion, model: RobotModel) -> RobotMotion:
+    return replace(motion, root_pos=motion.root_pos / 0.0254)
+
+
+def turned(motion: RobotMotion, model: RobotModel) -> RobotMotion:
+    from scipy.spatial.transform import Rotation
+
+    turn = Rotation.from_euler("z", 75, degrees=True)
+    quat = turn * Rotation.from_quat(motion.root_quat, scalar_first=True)
+    return replace(
+        motion,
+        root_pos=turn.apply(motion.root_pos),
+        root_quat=quat.as_quat(scalar_first=True),
+    )
+
+
 def other_rate(motion: RobotMotion, model: RobotModel) -> RobotMotion:
     return replace(motion.resampled(2.0 * motion.rate_hz), rate_hz=motion.rate_hz)
 
@@ -80,6 +102,9 @@ OF_MOTIONS: dict[str, tuple[Corrupt, str]] = {
     "rate": (other_rate, "rate"),
     "too high": (too_high, "place"),
     "y up": (y_up, "axes"),
+    "one joint backward": (backward_joint, "mirrored"),
+    "inches": (inches, "unit"),
+    "turned": (turned, "axes"),
 }
 
 

@@ -15,6 +15,7 @@ from mplearn_envs.robot import humanoid
 BODIES_ALONE = {"bvh", "gltf"}
 OF_HINGES = {  # of which these hold no angles
     "degrees", "centimetres", "quaternion order", "joints breadth first", "two joints swapped",
+    "one joint backward", "inches",
 }  # fmt: skip
 ALONE = {"degrees", "centimetres", "quaternion order", "too high", "y up"}  # by the file alone
 FORMATS = list(formats())

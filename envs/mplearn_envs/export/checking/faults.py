@@ -25,10 +25,14 @@ from .misfit import angles_between, postures, some
 _LENGTHS = {
     0.01: "in centimetres, not metres",
     0.001: "in millimetres, not metres",
+    0.0254: "in inches, not metres",
+    0.3048: "in feet, not metres",
     100.0: "100 times too small, as metres taken for centimetres are",
 }
 _RATES = (5.0, 1000.0)  # that motions are played at
 _FARTHEST_M = 3.0  # that places are off
+_BACKWARD = 0.5  # of how far a hinge's angles are off, if they are those of the other way
+_TURNED_RAD = 0.02  # that all is turned by, at least
 _FEW = 12
 
 
@@ -138,8 +142,11 @@ def _bodies(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
 def _permuted(what: str, found: IntArray, names: Sequence[str]) -> str:
     """Say which parts stand in others' places, given where each was found, shape (n,)."""
     wrong = [names[k] for k in np.flatnonzero(found != np.arange(len(found))).tolist()]
-    more = ", ..." if len(wrong) > 4 else ""
-    return f"{len(wrong)} {what} are permuted: {', '.join(wrong[:4])}{more}" if wrong else ""
+    return f"{len(wrong)} {what} are permuted: {_listed(wrong)}" if wrong else ""
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names[:4]) + (", ..." if len(names) > 4 else "")
 
 
 def _joints(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
@@ -159,6 +166,16 @@ def _joints(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
     found = _assigned(apart)
     if said := _permuted("joints", found, model.joint_names):
         yield Fault("joints permuted", said, _joint_order(reading, found))
+    backward = np.abs(angles + reading.joint_pos[frames]).mean(axis=0)
+    flipped = np.flatnonzero(backward < _BACKWARD * np.diagonal(apart))
+    if len(flipped):
+        names = [model.joint_names[k] for k in flipped.tolist()]
+        sign = np.where(np.isin(np.arange(len(model.joint_names)), flipped), -1.0, 1.0)
+        yield Fault(
+            "mirrored",
+            f"{_listed(names)} turn the other way",
+            _hinges(reading, lambda values: values * sign),
+        )
 
 
 def _mirrored(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
@@ -235,9 +252,19 @@ def _axes(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
         (np.array([half, half, 0.0, 0.0]), "y points up, not z"),
         (np.array([0.5, 0.5, 0.5, 0.5]), "y points up and z ahead, not z up and x ahead"),
     ):
-        turn = quaternion_to_matrix(quat)
-        turned = _placed(reading, partial(_turned, turn))
-        yield Fault("axes", problem, _quats(turned, partial(_product, quat)))
+        yield Fault("axes", problem, _all_turned(reading, quat))
+    meant = evidence.meant
+    if meant is None:
+        return
+    at = np.clip(np.round(meant.times_s * reading.rate_hz).astype(int), 0, len(reading) - 1)
+    own, wanted = (quaternion_to_matrix(quat) for quat in (reading.root_quat[at], meant.quat[:, 0]))
+    between = own @ np.swapaxes(wanted, 1, 2)
+    sines, cosines = between[:, 1, 0] - between[:, 0, 1], between[:, 0, 0] + between[:, 1, 1]
+    angle = float(np.arctan2(sines.sum(), cosines.sum()))
+    if abs(angle) > _TURNED_RAD:
+        back = np.array([np.cos(angle / 2), 0.0, 0.0, -np.sin(angle / 2)])
+        problem = f"all is turned by {np.degrees(angle):.4g} degrees about the vertical"
+        yield Fault("axes", problem, _all_turned(reading, back))
 
 
 def _velocities(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
@@ -316,13 +343,7 @@ class Mirror:
 
     def joints(self, reading: Reading) -> Reading:
         """Return a reading with its hinges mirrored."""
-
-        def seen(values: FloatArray | None) -> FloatArray | None:
-            return None if values is None else values[:, self.joint] * self.sign
-
-        return replace(
-            reading, joint_pos=seen(reading.joint_pos), joint_vel=seen(reading.joint_vel)
-        )
+        return _hinges(reading, lambda values: values[:, self.joint] * self.sign)
 
     def bodies(self, reading: Reading) -> Reading:
         """Return a reading with its bodies mirrored."""
@@ -389,6 +410,21 @@ def _placed(reading: Reading, change: Callable[[FloatArray], FloatArray]) -> Rea
     )
 
 
+def _all_turned(reading: Reading, quat: FloatArray) -> Reading:
+    turned = _placed(reading, partial(_turned, quaternion_to_matrix(quat)))
+    return _quats(turned, partial(_product, quat))
+
+
+def _hinges(reading: Reading, change: Callable[[FloatArray], FloatArray]) -> Reading:
+    """Return a reading with other angles of hinges, and velocities."""
+    pos, speed = reading.joint_pos, reading.joint_vel
+    return replace(
+        reading,
+        joint_pos=None if pos is None else change(pos),
+        joint_vel=None if speed is None else change(speed),
+    )
+
+
 def _scaled(reading: Reading, factor: float, *, base: bool, bodies: bool) -> Reading:
     pos, linear = reading.body_pos, reading.body_lin_vel
     return replace(
@@ -418,13 +454,7 @@ def _body_order(reading: Reading, order: IntArray) -> Reading:
 
 
 def _joint_order(reading: Reading, order: IntArray) -> Reading:
-    assert reading.joint_pos is not None
-    velocities = reading.joint_vel
-    return replace(
-        reading,
-        joint_pos=reading.joint_pos[:, order],
-        joint_vel=None if velocities is None else velocities[:, order],
-    )
+    return _hinges(reading, lambda values: values[:, order])
 
 
 def _assigned_bodies(reading: Reading, model: RobotModel) -> IntArray:
