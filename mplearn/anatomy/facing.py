@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..errors import BodyError
-from ..mocap.options import option
+from ..option_names import option
 from ..recording import FloatArray
 
 # from what lies behind to what lies ahead of it: of feet, of the pelvis, of chest and face

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import BodyError
-from ..mocap.options import option
+from ..option_names import option
 from .joint_tree import JointTree
 from .name_hints import says_leg
 from .plan import LimbPair, Plan

@@ -15,7 +15,7 @@ import numpy as np
 from ..body import MarkerSet, find_marker_set, human_body, marker_set
 from ..body.marker_sets.marker_set import plain_name
 from ..errors import BodyError
-from ..mocap.options import option
+from ..option_names import option
 from ..recording import FloatArray, Recording
 from .body_map import BodyMap
 from .facing import check_facing

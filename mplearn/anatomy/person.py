@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import BodyError
-from ..mocap.options import option
+from ..option_names import option
 from ..recording import FloatArray
 from .joint_tree import JointTree
 from .likeness import confidence

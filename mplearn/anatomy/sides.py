@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import BodyError
-from ..mocap.options import option
+from ..option_names import option
 from ..recording import FloatArray
 from .facing import MirroredError
 from .joint_tree import JointTree

@@ -14,9 +14,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..errors import BodyError
-from ..mocap.options import option
 from ..mocap.people import each_person
 from ..mocap.skeletons.kinematics import AXIS_MARK
+from ..option_names import option
 from ..recording import Recording, Skeleton
 from .body_map import BodyMap
 from .joint_tree import JointTree

@@ -25,7 +25,7 @@ from ..graph import (
 )
 from ..offers import ask
 from ..recording import FloatArray, Recording
-from ..state import from_plain, require, to_plain, within
+from ..state import from_plain, is_database, require, to_plain, within
 from ..tree.recogniser import Recogniser, Recognition
 from .content import FILES, LibraryState
 from .novelty import AnomalyScore, MotionNovelty, novelty_of
@@ -33,7 +33,6 @@ from .primitive import Primitive, TreeNode
 from .segment_table import SegmentTable
 
 Key: TypeAlias = int | str
-_STORE = b"SQLite format 3\0"
 
 
 @dataclass(frozen=True, eq=False)
@@ -486,7 +485,7 @@ class PrimitiveLibrary:
             LibraryError: The file is missing, damaged, foreign, or of a newer version.
             StoreError: It is a store that cannot be read.
         """
-        if _is_store(Path(path)):
+        if is_database(Path(path)):
             library: PrimitiveLibrary = ask("read a library from a store")(path)
             return library
         content = FILES.read(Path(path))
@@ -564,14 +563,3 @@ class PrimitiveLibrary:
 
 def _tree_node(node: tuple[int, int | None, int]) -> TreeNode:
     return node if isinstance(node, TreeNode) else TreeNode(*node)
-
-
-def _is_store(path: Path) -> bool:
-    """Whether a file is a store, by its first bytes."""
-    if not path.is_file():  # a pipe would be waited for
-        return False
-    try:
-        with path.open("rb") as file:
-            return file.read(len(_STORE)) == _STORE
-    except OSError:
-        return False

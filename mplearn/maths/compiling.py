@@ -30,7 +30,6 @@ from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 from numba.core.extending import _Intrinsic
 from numba.extending import overload
-from numba.np import arrayobj
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 _ASKED = "raise_with_shape_context"  # what numba asks in that case
@@ -39,7 +38,7 @@ _NO_C: dict[str, Any] = {"no_cfunc_wrapper": True}
 _NO_PYTHON: dict[str, Any] = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
 
 
-def njit(**options: Any) -> Callable[[_Kernel], _Kernel]:
+def njit(*, cache: bool = False, **options: Any) -> Callable[[_Kernel], _Kernel]:
     """Return numba's decorator of this name; what it keeps on disk is what it would compile now.
 
     Example:
@@ -54,7 +53,7 @@ def njit(**options: Any) -> Callable[[_Kernel], _Kernel]:
         made: Any = numba.njit(**options)(function)
         if hasattr(made, "py_func"):  # else numba is switched off
             made._compiler = _Compiler(made._compiler)
-            if options.get("cache"):
+            if cache:
                 made._cache = _Cache(function)
         return cast("_Kernel", made)
 
@@ -110,6 +109,8 @@ class _Compiler:
 
 @contextmanager
 def _short_message() -> Iterator[None]:
+    from numba.np import arrayobj  # with half of numba: late, for what is only defined
+
     usual = getattr(arrayobj, _ASKED, None)  # numba lets one thread at a time compile
     setattr(arrayobj, _ASKED, _raise_of_shapes)
     try:

@@ -1,10 +1,11 @@
 """Recordings of human motion from files, and markers followed through their gaps."""
 
+from ..gaps import GapConfig as GapConfig
+from ..gaps import GapTracker as GapTracker
+from ..option_names import command_line as command_line
 from .files import bad_file as bad_file
 from .files import read_text as read_text
 from .findings import Findings as Findings
-from .gaps import GapConfig as GapConfig
-from .gaps import GapTracker as GapTracker
 from .joining import join_by_name as join_by_name
 from .joining import with_channels as with_channels
 from .open import FoundTakes as FoundTakes
@@ -15,7 +16,6 @@ from .open import open_recording as open_recording
 from .open import open_recordings as open_recordings
 from .open import open_takes as open_takes
 from .open import take_names as take_names
-from .options import command_line as command_line
 from .people import each_person as each_person
 from .placing.size import UNITS_M as UNITS_M
 from .placing.size import named_unit as named_unit

@@ -14,6 +14,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from ..errors import RecordingError, RecordingWarning
+from ..option_names import option
 from ..recording import ReadReport, Recording
 from .files import (
     bad_file,
@@ -39,7 +40,6 @@ from .markers.qualisys import QualisysReader
 from .markers.trc import TRCReader
 from .markers.ui_prmd import UIPRMDReader
 from .markers.xdf import XDFReader
-from .options import option
 from .packed.archives import archive_kind, archive_of, is_archive
 from .people import each_person
 from .placing.handedness import right_handed

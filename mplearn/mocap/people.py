@@ -9,9 +9,9 @@ from itertools import product
 
 import numpy as np
 
+from ..option_names import option
 from ..recording import ReadReport, Recording, Skeleton, marker_channels
 from .markers.names import WORD_MARKS, shared_start
-from .options import option
 from .skeletons.kinematics import AXIS_MARK
 
 FEWEST_JOINTS = 12  # of a person's skeleton

@@ -22,7 +22,9 @@ from .fields import newer as newer
 from .fields import require as require
 from .fields import require_no_cycle as require_no_cycle
 from .fields import saved_as as saved_as
+from .files import SQLITE as SQLITE
 from .files import FileFormat as FileFormat
+from .files import is_database as is_database
 from .settings import from_settings as from_settings
 from .settings import to_settings as to_settings
 from .structure import from_plain as from_plain

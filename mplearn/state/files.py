@@ -23,6 +23,7 @@ from .packing import as_json, from_json, packed, unpacked
 _MAX_BYTES = 1 << 30  # of the content of a file that claims to hold many times its own size
 _DENSEST = 8  # times its size that a larger one may hold
 _DAMAGED = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, LookupError, ValueError)
+SQLITE = b"SQLite format 3\0"  # how a database begins
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # a fixed date: equal contents are equal files
 
 
@@ -133,6 +134,23 @@ class FileFormat:
 def checksum(body: Any, blob: bytes) -> str:
     """Return the hash of packed content, 64 hexadecimal digits."""
     return hashlib.sha256(as_json(body) + b"\0" + blob).hexdigest()
+
+
+def is_database(path: Path) -> bool:
+    """Whether a file is a database, as a store is, by its first bytes.
+
+    Example:
+        >>> from pathlib import Path
+        >>> is_database(Path("none.db"))
+        False
+    """
+    if not path.is_file():  # a pipe would be waited for
+        return False
+    try:
+        with path.open("rb") as file:
+            return file.read(len(SQLITE)) == SQLITE
+    except OSError:
+        return False
 
 
 def _parts(path: Path) -> tuple[bytes, bytes]:

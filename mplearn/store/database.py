@@ -17,24 +17,13 @@ from ..errors import (
     StoreVersionError,
     StoreWriteError,
 )
+from ..state import SQLITE
 from .schema import APPLICATION_ID, VERSION, migrate, version_of
 
 BUSY_S = 10.0
-MAGIC = b"SQLite format 3\0"
 _PAGE = 4096
 _WAL_BYTES = 16 * 2**20  # to which the file of what is not yet in the store shrinks again
 _CANNOT_WRITE = ("full", "readonly", "read-only", "disk I/O", "unable to open")
-
-
-def looks_like_one(path: Path) -> bool:
-    """Whether a file is a store by its first bytes; it may still be another program's."""
-    if not path.is_file():  # a pipe would be waited for
-        return False
-    try:
-        with path.open("rb") as file:
-            return file.read(len(MAGIC)) == MAGIC
-    except OSError:
-        return False
 
 
 def open_writing(path: Path, *, check: bool = True) -> sqlite3.Connection:
@@ -149,10 +138,10 @@ def look_at(path: Path) -> None:
         return
     try:
         with path.open("rb") as file:
-            head = file.read(len(MAGIC))
+            head = file.read(len(SQLITE))
     except OSError as error:
         raise NotAStoreError(f"{path} cannot be read: {error.strerror}") from error
-    if head and head != MAGIC:
+    if head and head != SQLITE:
         raise NotAStoreError(f"{path} is no store, or its beginning is damaged")
 
 

@@ -21,10 +21,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> None:
     """Rename the primitive and save the library."""
     from mplearn.library import PrimitiveLibrary
-    from mplearn.store.database import looks_like_one
+    from mplearn.state import is_database
     from mplearn_agents.commands import store
 
-    if looks_like_one(args.library):
+    if is_database(args.library):
         print(store.rename(args.library, args.primitive, args.name))
         return
     library = PrimitiveLibrary.load(args.library)

@@ -10,8 +10,7 @@ from typing import Protocol, TypeAlias, runtime_checkable
 
 from mplearn.errors import LibraryError
 from mplearn.library import PrimitiveLibrary
-from mplearn.store import StoreReader
-from mplearn.store.database import looks_like_one
+from mplearn.state import is_database
 
 
 @runtime_checkable
@@ -41,7 +40,7 @@ class LibrarySource:
     """
 
     def __init__(self, source: Source) -> None:
-        if isinstance(source, (str, Path)) and looks_like_one(Path(source)):
+        if isinstance(source, (str, Path)) and is_database(Path(source)):
             source = _of_store(Path(source))
         self.source = source
         self.live = isinstance(source, Learner) or (
@@ -70,6 +69,8 @@ class LibrarySource:
 
 def _of_store(path: Path) -> Callable[[], PrimitiveLibrary]:
     """Return what gives the library of a store as it is when it is asked."""
+    from mplearn.store import StoreReader  # with all that learns: what needs no store starts sooner
+
     reader = StoreReader(path)
 
     def now() -> PrimitiveLibrary:

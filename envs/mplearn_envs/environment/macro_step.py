@@ -384,12 +384,10 @@ class MacroStepEnv(PlainSpec, gymnasium.Env[Observation, np.int64]):
         choices, current = episode.choices, episode.current
         if step is None:
             step = StepInfo(zmp_margin_m=float(episode.measured.support_margin[0]))
-        infeasible = np.zeros(self.capacity, np.int8)
-        infeasible[list(choices.refused)] = 1
         info = {
             "action_mask": choices.mask_at(self._n_speeds),
             "transition_prior": choices.prior_at(self._n_speeds),
-            "infeasible": infeasible,
+            "infeasible": choices.infeasible(),
             "dead_end": choices.dead_end,
             "library_version": self._version,
             "primitive": -1 if current is None else current,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal, NamedTuple, TypeAlias
 
 import mujoco
@@ -88,7 +89,7 @@ class Body:
         if self.pushes_per_minute > 0 and not self.steps:
             raise InvalidValueError("body: a robot that is pushed needs steps=True")
 
-    @property
+    @cached_property
     def certain(self) -> bool:
         """Whether there is nothing to draw."""
         return all(getattr(self, name) == 0.0 for name in _LARGEST)

@@ -32,11 +32,20 @@ class Choices(NamedTuple):
 
     def mask_at(self, n_speeds: int) -> NDArray[np.int8]:
         """Return the mask of actions at so many speeds, a block each, fresh."""
-        return np.tile(self.mask, n_speeds)
+        return self.mask.copy() if n_speeds == 1 else np.concatenate([self.mask] * n_speeds)
 
     def prior_at(self, n_speeds: int) -> FloatArray:
         """Return the prior of actions at so many speeds: that of the first, fresh."""
-        return np.append(self.prior, np.zeros((n_speeds - 1) * len(self.prior)))
+        if n_speeds == 1:
+            return self.prior.copy()
+        return np.concatenate((self.prior, np.zeros((n_speeds - 1) * len(self.prior))))
+
+    def infeasible(self) -> NDArray[np.int8]:
+        """Return 1 where a slot is refused, shape (capacity,), fresh."""
+        infeasible = np.zeros(len(self.mask), np.int8)
+        for slot in self.refused:
+            infeasible[slot] = 1
+        return infeasible
 
 
 def drawn_slot(weights: FloatArray, rng: np.random.Generator) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Collection, Hashable
+from itertools import takewhile
 from typing import Any, NamedTuple
 from weakref import WeakValueDictionary
 
@@ -191,23 +192,20 @@ class Repertoire:
         if not self.ids:
             return self._choices({})
         with self.skills.lock:
-            gaps = self._gaps(reference)
+            gaps, lifted = self._gaps(reference), reference.lifted
             near = sorted(self._known, key=lambda id: (gaps[id], id))
             # no more is judged than is needed
-            first = next((id for id in near if self._starts_on(id, reference.lifted)), None)
+            first = next((id for id in near if self._starts_on(id, lifted)), None)
             other_feet = first is None
             if first is None:
                 first = next((id for id in near if self.skills.feasibility(id).feasible), None)
             if first is None:
                 raise RobotError(self._nothing_feasible(near))
-            within = [id for id in near if gaps[id] <= gaps[first] + ENTRY_GAP]
-            if not other_feet:
-                within = [
-                    id
-                    for id in within
-                    if self._starts_on(id, reference.lifted)
-                    or not self.skills.feasibility(id).feasible
-                ]
+            within = []
+            for id in takewhile(lambda id: gaps[id] <= gaps[first] + ENTRY_GAP, near):
+                verdict = self.skills.feasibility(id)
+                if other_feet or not verdict.feasible or verdict.starts_up == lifted:
+                    within.append(id)
             return self._choices({id: float(self.library[id].n_exemplars) for id in within})
 
     def from_place(self, choices: Choices, place: Reference) -> Choices:

@@ -7,7 +7,7 @@ import numpy as np
 from mplearn.errors import BodyError
 from mplearn.maths.rigid_fit import fit_similarity
 from mplearn.maths.rotations import matrix_to_quaternion
-from mplearn.mocap.options import option
+from mplearn.option_names import option
 from mplearn.recording import FloatArray, IntArray
 
 from ..kinematics.tree import KinematicTree

@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import RecordingError
+from ...option_names import option
 from ...recording import FloatArray, Recording
 from ..files import bad_file, stem
 from ..findings import Findings
-from ..options import option
 from ..rates import rate_beside
 from ..reader import Hints, Reader
 from .egocentric import seen_from_the_body

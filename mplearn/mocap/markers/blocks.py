@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ...option_names import option
 from ...recording import FloatArray, Recording
 from ..clock import Clock, even_clock
 from ..files import bad_file, cmu_subject, stem
 from ..findings import Findings
 from ..numbers import measured_rows, not_seen
-from ..options import option
 from ..placing.placed_markers import placed_markers
 from ..placing.space import Space
 from ..rates import rate_beside

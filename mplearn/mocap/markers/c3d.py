@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InvalidValueError
+from ...option_names import option
 from ...recording import FloatArray, Recording
 from ..files import bad_file, read_bytes
 from ..findings import Findings
-from ..options import option
 from ..placing.placed_markers import placed_markers
 from ..placing.size import said_unit
 from ..placing.space import Space, to_z_up

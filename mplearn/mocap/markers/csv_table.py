@@ -33,12 +33,12 @@ from typing import ClassVar
 import numpy as np
 
 from ...errors import RecordingError
+from ...option_names import option
 from ...recording import FloatArray, IntArray, LabelledSegment, Recording
 from ..clock import Clock, even_clock, in_seconds
 from ..files import bad_file, head_text, read_text, stem
 from ..findings import Findings
 from ..numbers import measured_rows, says_missing, without_unseen
-from ..options import option
 from ..placing.placed_markers import placed_markers
 from ..placing.size import named_unit
 from ..placing.space import Space

@@ -12,11 +12,11 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ...errors import RecordingError
+from ...option_names import option
 from ...recording import BoolArray, FloatArray, IntArray, Recording
 from ..files import bad_file, read_bytes
 from ..findings import Findings
 from ..numbers import without_unseen
-from ..options import option
 from ..placing.placed_markers import placed_markers
 from ..placing.size import named_unit, spread_of
 from ..placing.space import Space

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ...option_names import option
 from ...recording import FloatArray, Recording
 from ..files import bad_file
-from ..options import option
 from .part_names import place_of
 
 _LOOK = 400  # frames

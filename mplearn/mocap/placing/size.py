@@ -13,9 +13,9 @@ from unicodedata import normalize
 
 import numpy as np
 
+from ...option_names import option
 from ...recording import FloatArray
 from ..files import bad_file
-from ..options import option
 from ..reader import Hints
 from .part_names import LINKS_M, place_of
 

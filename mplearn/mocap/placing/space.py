@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InvalidValueError
+from ...option_names import option
 from ...recording import FloatArray
 from ..files import bad_file
 from ..findings import Findings
-from ..options import option
 from ..reader import DIRECTIONS, Hints
 from .size import UNITS_M, Unit, find_unit, spread_of
 from .vertical import find_vertical

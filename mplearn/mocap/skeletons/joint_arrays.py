@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import RecordingError
+from ...option_names import option
 from ...recording import FloatArray, Recording
 from ..files import bad_file, suffix
 from ..findings import Findings
 from ..markers.columns import MEDIAPIPE_POSE
 from ..markers.pictures import hold_scores, warn_of_pictures
 from ..numbers import without_unseen
-from ..options import option
 from ..placing.placed_markers import placed_markers
 from ..placing.space import Space
 from ..rates import rate_beside

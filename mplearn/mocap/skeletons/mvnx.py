@@ -20,10 +20,10 @@ from pathlib import Path
 import numpy as np
 
 from ...maths.rotations import quaternion_to_matrix
+from ...option_names import option
 from ...recording import FloatArray, Recording, Skeleton, marker_channels
 from ..files import bad_file, read_text, stem
 from ..findings import Findings
-from ..options import option
 from ..placing.space import Space, placed
 from ..reader import Hints, Reader
 from .mvnx_file import SAME_RATE, MVNXFile, read_mvnx

@@ -9,10 +9,10 @@ import numpy as np
 
 from ...maths.continuous_euler import continuous_euler
 from ...maths.rotations import matrix_to_euler
+from ...option_names import option
 from ...recording import FloatArray, Recording, marker_channels
 from ..files import bad_file, cmu_subject, stem
 from ..findings import Findings
-from ..options import option
 from ..placing.part_names import HEIGHTS, place_of
 from ..placing.space import Space, placed
 from ..reader import Hints

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from ...maths.rotations import matrix_to_quaternion, rotation_vector_to_matrix
+from ...option_names import option
 from ...recording import BoolArray, FloatArray, Recording
 from ..files import bad_file, suffix
 from ..findings import Findings
-from ..options import option
 from ..placing.space import Space
 from ..rates import rate_beside
 from ..reader import Hints, Reader

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ...option_names import option
 from ...recording import FloatArray
 from ..files import bad_file
 from ..findings import Findings
-from ..options import option
 from ..placing.size import Unit, likeliest_unit
 from ..reader import Hints
 

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ...option_names import option
 from ...recording import FloatArray, Recording, Skeleton, marker_channels
 from ..files import bad_file, head, read_bytes, stem
 from ..findings import Findings
 from ..markers.c3d import space_of
 from ..markers.c3d_file import parse_c3d
-from ..options import option
 from ..placing.space import Space, placed
 from ..reader import Hints, Reader
 from .kinematics import AXIS_M, AXIS_MARK

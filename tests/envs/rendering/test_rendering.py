@@ -92,6 +92,13 @@ def test_making_an_environment_is_light():
         "mplearn_envs.rendering.renderer",
         "scipy.signal",
         "torch",
+        "mplearn.learner",  # nor what learns, keeps or reads recordings
+        "mplearn.store",
+        "mplearn.people",
+        "mplearn.segmentation",
+        "mplearn.mocap",
+        "mplearn.tables",
+        "sqlite3",
     )
     done = run(
         "import sys, gymnasium, mplearn_envs; gymnasium.make('mplearn/PrimitiveHumanoid-v0');"

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ....option_names import option
 from ....recording import FloatArray, IntArray
 from ...files import bad_file
 from ...findings import Findings
-from ...options import option
 from .numbers import missing_or_number, split_glued
 
 _HEADER = re.compile(r"\s*(frame\s*time|frames?)\s*:?\s*(?![a-z])(.*)", re.IGNORECASE)

@@ -32,7 +32,7 @@ def command_line() -> Iterator[None]:
     """While this lasts, messages name the options of the ``mplearn`` command.
 
     Example:
-        >>> from mplearn.mocap.options import option
+        >>> from mplearn.option_names import option
         >>> option("unit_m")
         'Hints(unit_m=...)'
         >>> with command_line():
