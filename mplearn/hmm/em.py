@@ -64,7 +64,7 @@ def equal_split(
     frames: FloatArray, weights: FloatArray, offsets: IntArray, statistics: Statistics
 ) -> None:
     """Add the statistics of each sequence cut into N equal parts."""
-    stays, moves = statistics.stays, statistics.moves
+    emitted, stays, moves = statistics.emitted, statistics.stays, statistics.moves
     n_states = len(stays)
     for s in range(len(offsets) - 1):
         n_frames = offsets[s + 1] - offsets[s]
@@ -76,7 +76,7 @@ def equal_split(
                 else:
                     moves[n] += 1
             row = offsets[s] + t
-            accumulate(frames, row, weights[row], n, statistics.emitted)
+            accumulate(frames, row, weights[row], n, emitted)
 
 
 @njit(cache=True)
@@ -87,9 +87,9 @@ def expectation(
 
     An impossible sequence adds nothing but its likelihood, -inf.
     """
-    offsets, weights = batch.offsets, batch.weights
+    frames, weights, offsets = batch.frames, batch.weights, batch.offsets
     log_stay, log_next = model.log_stay, model.log_next
-    stays, moves = statistics.stays, statistics.moves
+    emitted, stays, moves = statistics.emitted, statistics.stays, statistics.moves
     n_states = len(model.means)
     gaussians = Gaussians(model.means, model.variances, log_norms(model.variances))
     likelihood = 0.0
@@ -118,7 +118,7 @@ def expectation(
                             arrival + log_next[n] + densities[n + 1, t + 1] + beta[t + 1, n + 1]
                         )
                 row = begin + t
-                accumulate(batch.frames, row, share * weights[row], n, statistics.emitted)
+                accumulate(frames, row, share * weights[row], n, emitted)
     return likelihood
 
 

@@ -134,8 +134,8 @@ def expectation(
     statistics: Statistics,
 ) -> float:
     """Add the expected statistics of all sequences; return their log-likelihood."""
-    offsets, weights = batch.offsets, batch.weights
-    lengths, squares = statistics.lengths, statistics.squares
+    frames, weights, offsets = batch.frames, batch.weights, batch.offsets
+    lengths, squares, emitted = statistics.lengths, statistics.squares, statistics.emitted
     n_states = len(gaussians.means)
     likelihood = 0.0
     for s in range(len(offsets) - 1):
@@ -171,6 +171,5 @@ def expectation(
                 occupied += change[n, t]
                 if occupied > 1e-14:
                     row = begin + t
-                    share = occupied * weights[row]
-                    accumulate(batch.frames, row, share, n, statistics.emitted)
+                    accumulate(frames, row, occupied * weights[row], n, emitted)
     return likelihood
