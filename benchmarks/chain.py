@@ -63,7 +63,7 @@ def rows() -> list[tuple[str, str, str, str]]:
     }
     for name in ("kohlmorgen-lemm", "zero-velocity"):
         segmenter = make_segmenter(name, seen.shape[1], recording.rate_hz)
-        stages[f"segmentation, {name}"] = lambda s=segmenter: [s.update(each) for each in seen]
+        stages[f"segmentation, {name}"] = lambda s=segmenter: s.segment(seen)
     took = {name: timed(function) for name, function in stages.items()}
     took["from features on: view, segmentation, tree, graph"] = timed(
         lambda: MotionLearner(LearnerConfig(features.channels, features.rate_hz)).learn_many(

@@ -100,14 +100,19 @@ class SpeedSegmenter(Segmenter):
         frame = self._numbers(frame)
         if frame.shape != (self.n_channels,):
             raise FrameError(f"a frame must have shape ({self.n_channels},), not {frame.shape}")
-        return self.advance(frame[None])[1]
+        return self._advanced(frame[None])[1]
 
     def advance(self, frames: FloatArray) -> tuple[int, list[Segment]]:
         """Take frames until one closes segments; see `Segmenter.advance`."""
         frames = self._numbers(frames)
         if frames.ndim != 2 or frames.shape[1] != self.n_channels:
             raise FrameError(f"frames must have shape (T, {self.n_channels}), not {frames.shape}")
+        return self._advanced(frames)
+
+    def _advanced(self, frames: FloatArray) -> tuple[int, list[Segment]]:
         taken, n = self._steps(frames)
+        if n == 0:
+            return taken, []
         if n < 0 and taken == 0:
             frame = frames[0]
             bad = np.flatnonzero(~np.isfinite(frame))
@@ -115,7 +120,7 @@ class SpeedSegmenter(Segmenter):
                 f"{len(bad)} of {self.n_channels} channels are not finite (the first is channel "
                 f"{bad[0]}: {frame[bad[0]]}); fill gaps before segmenting"
             )
-        return taken, self._closed(max(n, 0))
+        return taken, self._closed(n)
 
     def _numbers(self, given: FloatArray) -> FloatArray:
         try:
@@ -124,7 +129,7 @@ class SpeedSegmenter(Segmenter):
             raise FrameError(f"a frame must be {self.n_channels} numbers: {error}") from None
 
     def _closed(self, n: int) -> list[Segment]:
-        """Return the first so many segments of `_out`."""
+        """Return the first so many segments of `_out`; none where n is -1."""
         return [
             Segment(
                 int(cut["start"]),
@@ -134,7 +139,7 @@ class SpeedSegmenter(Segmenter):
                 bool(cut["still"]),
                 CAUSES[cut["cause"]],
             )
-            for cut in self._out[:n]
+            for cut in self._out[: max(n, 0)]
         ]
 
     def scaffold(self, weights: FloatArray | None = None, ending: float = 0.5) -> None:
