@@ -3,12 +3,15 @@
 A `Blob` or `SharedState` is packed into one string of bytes, whose hash is its key; whatever holds
 it refers to it by that. As long as the part stays the same object, neither is worked out again: a
 checkpoint costs what has changed since the last one.
+
+A long row of parts is itself kept in parts, of about `_ROW` each. Where one ends is said by the key
+of its last, not by its place, so that one that changes, comes or goes changes those near it alone.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
@@ -19,7 +22,8 @@ from .packing import as_json, from_json, packed, unpacked
 from .structure import from_plain
 
 T = TypeVar("T")
-_KEY = "$key"
+_KEY, _ROWS = "$key", "$rows"
+_ROW = 64  # a power of two, to 256
 _WHOLE = "$whole 3"  # what a document names that, with its parts, leaves out no field of now
 _WHOLE_THEN = ("$whole", "$whole 2")  # or none of those that there were then
 
@@ -49,12 +53,26 @@ class Checkpoint(NamedTuple):
 Part: TypeAlias = Blob | SharedState
 
 
+class _Content(NamedTuple):
+    """What a part was packed into.
+
+    Attributes:
+        key: Hash of its bytes.
+        inner: The parts that it refers to itself.
+        below: Keys of all parts that it is made of, each after those that it refers to itself.
+    """
+
+    key: str
+    inner: tuple[Part, ...]
+    below: tuple[str, ...]
+
+
 def checkpoint(state: Any, known: Container[str] = ()) -> Checkpoint:
     """Return a state in bytes, without the shared parts that are kept somewhere already.
 
     Args:
         state: The state.
-        known: Keys of the parts that are kept.
+        known: Keys of the parts that are kept, with all that they refer to.
 
     Example:
         >>> import numpy as np
@@ -65,18 +83,33 @@ def checkpoint(state: Any, known: Container[str] = ()) -> Checkpoint:
     found: dict[str, None] = {}
     new: dict[str, bytes] = {}
 
-    def note(part: Part) -> dict[str, str]:
-        known_content = _content(part)
-        key, inner, data = _packed(part) if known_content is None else (*known_content, b"")
-        if key not in found:
-            for each in inner:
+    def note(part: Part) -> str:
+        content, data = _content(part), b""
+        if content is None:
+            content, data = _packed(part)
+        if content.key in known:
+            found.update(dict.fromkeys((*content.below, content.key)))
+        elif content.key not in found:
+            for each in content.inner:
                 note(each)
-            found[key] = None
-            if key not in known:
-                new[key] = data or _packed(part)[2]
-        return {_KEY: key}
+            found[content.key] = None
+            new[content.key] = data or _packed(part)[1]
+        return content.key
 
-    document = to_bytes({_WHOLE: to_plain(state, note, whole=True)})
+    def note_row(keys: Sequence[str]) -> str:
+        data = to_bytes({_ROWS: " ".join(keys)})
+        key = hash_of(data)
+        found[key] = None
+        if key not in known:
+            new[key] = data
+        return key
+
+    def share(each: Part | Sequence[SharedState]) -> dict[str, str]:
+        if isinstance(each, (Blob, SharedState)):
+            return {_KEY: note(each)}
+        return {_ROWS: " ".join(map(note_row, _rows(map(note, each))))}
+
+    document = to_bytes({_WHOLE: to_plain(state, share, whole=True)})
     return Checkpoint(document, tuple(found), new)
 
 
@@ -116,6 +149,8 @@ def _put_together(value: Any, part: Callable[[str], bytes], seen: dict[str, Any]
         ]
     if not isinstance(value, dict):
         return value
+    if _ROWS in value:
+        return _row(value[_ROWS], part, seen)
     if _KEY not in value:
         return {
             name: _below(name, item, part, seen) if isinstance(item, (dict, list)) else item
@@ -124,8 +159,16 @@ def _put_together(value: Any, part: Callable[[str], bytes], seen: dict[str, Any]
     key = value[_KEY]
     if not isinstance(key, str):
         raise StateError(f"a part must be named by its key, not {key!r:.60}")
+    return _fetched(key, part, seen)
+
+
+def _fetched(key: str, part: Callable[[str], bytes], seen: dict[str, Any]) -> Any:
+    """Return the content of a part by its key."""
     if key not in seen:
-        data = _fetched(part, key)
+        try:
+            data = part(key)
+        except LookupError as error:
+            raise StateError(f"part {key} is missing") from error
         if hash_of(data) != key:
             raise StateError(f"part {key} is damaged: its content has another key")
         content = _put_together(from_bytes(data), part, seen)
@@ -133,11 +176,34 @@ def _put_together(value: Any, part: Callable[[str], bytes], seen: dict[str, Any]
     return seen[key]
 
 
+def _row(keys: Any, part: Callable[[str], bytes], seen: dict[str, Any]) -> list[Any]:
+    """Return a row of parts, those of rows that it consists of one after another."""
+    if not isinstance(keys, str):
+        raise StateError(f"a row of parts must be named by its keys, not {keys!r:.60}")
+    row = []
+    for key in keys.split():
+        content = _fetched(key, part, seen)
+        row += content if isinstance(content, list) else [content]
+    return row
+
+
 def _below(place: str, value: Any, part: Callable[[str], bytes], seen: dict[str, Any]) -> Any:
     try:
         return _put_together(value, part, seen)
     except StateError as error:
         raise error.below(place) from None
+
+
+def _rows(keys: Iterator[str]) -> Iterator[list[str]]:
+    """Cut a row of keys behind each whose last digits are 0."""
+    row: list[str] = []
+    for key in keys:
+        row.append(key)
+        if int(key[-2:], 16) % _ROW == 0:
+            yield row
+            row = []
+    if row:
+        yield row
 
 
 def key_of(part: Part) -> str:
@@ -148,28 +214,36 @@ def key_of(part: Part) -> str:
         >>> key_of(Blob(np.zeros(3))) == key_of(Blob(np.zeros(3))) != key_of(Blob(np.ones(3)))
         True
     """
-    known = _content(part)
-    return _packed(part)[0] if known is None else known[0]
+    return _made_of(part).key
 
 
-def _content(part: Part) -> tuple[str, tuple[Part, ...]] | None:
-    """Return the key of a part and the parts that it refers to itself, if it was packed before."""
-    found: tuple[str, tuple[Part, ...]] | None = getattr(part, "content", None)
+def _content(part: Part) -> _Content | None:
+    """Return what a part was packed into, if it was."""
+    found: _Content | None = getattr(part, "content", None)
     return found
 
 
-def _packed(part: Part) -> tuple[str, tuple[Part, ...], bytes]:
-    """Pack a part: return its key, the parts that it refers to itself, and its bytes."""
+def _made_of(part: Part) -> _Content:
+    """Return what a part is packed into, worked out once."""
+    return _content(part) or _packed(part)[0]
+
+
+def _packed(part: Part) -> tuple[_Content, bytes]:
+    """Pack a part: return what refers to it, and its bytes."""
     inner: list[Part] = []
 
-    def note(each: Part) -> dict[str, str]:
+    def note(each: Part | Sequence[SharedState]) -> Any:
+        if not isinstance(each, (Blob, SharedState)):
+            return [note(item) for item in each]
         inner.append(each)
         return {_KEY: key_of(each)}
 
     data = to_bytes(part.array if isinstance(part, Blob) else fields_of(part, note, whole=True))
     key = hash_of(data)
-    object.__setattr__(part, "content", (key, tuple(inner)))
-    return key, tuple(inner), data
+    below = {name: None for each in inner for name in (*_made_of(each).below, key_of(each))}
+    content = _Content(key, tuple(inner), tuple(below))
+    object.__setattr__(part, "content", content)
+    return content, data
 
 
 def hash_of(data: bytes) -> str:
@@ -207,10 +281,3 @@ def from_bytes(data: bytes) -> Any:
     """
     length = int.from_bytes(data[:8], "little")
     return unpacked(from_json(data[8 : 8 + length]), memoryview(data)[8 + length :])
-
-
-def _fetched(part: Callable[[str], bytes], key: str) -> bytes:
-    try:
-        return part(key)
-    except LookupError as error:
-        raise StateError(f"part {key} is missing") from error

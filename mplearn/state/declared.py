@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
-from typing import Any, TypeAlias, cast
+from typing import Any, TypeAlias, TypeGuard, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,7 +99,8 @@ class Blob:
         return f"Blob{self.array.shape}"
 
 
-Share: TypeAlias = Callable[[Blob | SharedState], Any]
+Share: TypeAlias = Callable[[Blob | SharedState | tuple[SharedState, ...]], Any]
+MANY = 32  # parts in a row that are kept in parts of them
 
 
 def to_plain(value: Any, share: Share | None = None, *, whole: bool = False) -> Any:
@@ -109,7 +110,8 @@ def to_plain(value: Any, share: Share | None = None, *, whole: bool = False) -> 
 
     Args:
         value: A state, a configuration, or anything they hold.
-        share: Says what stands for a part that is kept by its content; the part itself by default.
+        share: Says what stands for a part that is kept by its content, or for a row of more than
+            `MANY` such states; the parts themselves by default.
         whole: With all fields, as what is stored has them: one that is lost is then missed. Else a
             `newer` one is left out where it has the value that its absence means, so that equal
             content of any version has one hash.
@@ -126,6 +128,8 @@ def to_plain(value: Any, share: Share | None = None, *, whole: bool = False) -> 
     if isinstance(value, Blob):
         return value.array
     if isinstance(value, (tuple, list)):
+        if share is not None and len(value) > MANY and _is_row(value):
+            return share(value)
         return [to_plain(item, share, whole=whole) for item in value]
     if isinstance(value, dict):
         return {key: to_plain(value[key], share, whole=whole) for key in sorted(value)}
@@ -134,6 +138,10 @@ def to_plain(value: Any, share: Share | None = None, *, whole: bool = False) -> 
     if is_dataclass(value):
         return fields_of(value, share, whole=whole)
     return value.item() if isinstance(value, np.generic) else value
+
+
+def _is_row(value: Any) -> TypeGuard[tuple[SharedState, ...]]:
+    return all(isinstance(item, SharedState) for item in value)
 
 
 def fields_of(value: Any, share: Share | None = None, *, whole: bool = False) -> dict[str, Any]:
