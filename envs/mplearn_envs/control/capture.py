@@ -31,6 +31,38 @@ _LAG_S = 0.05  # in which a foot gathers speed
 _PRICES = (20.0, 2.0, 0.5, 0.3)
 
 
+class Falling(NamedTuple):
+    """How a robot stands that will fall unless it steps.
+
+    Attributes:
+        corners: Of both soles in their feet's frames, shape (2, 4, 3) [m].
+        feet: Where they are: x, y [m] and yaw [rad], shape (2, 3).
+        dcm: The DCM, shape (2,) [m].
+        rate: Of the pendulum [1/s].
+    """
+
+    corners: FloatArray
+    feet: FloatArray
+    dcm: FloatArray
+    rate: float
+
+
+class OnItsWay(NamedTuple):
+    """How the foot moves that steps.
+
+    Attributes:
+        since_s: For how long it has been on its way [s].
+        crosses: Whether it was in the air: it may cross the other one, or come down at once.
+        high_m: How high it is [m].
+        sinks: How fast it comes down [m/s].
+    """
+
+    since_s: float
+    crosses: bool
+    high_m: float
+    sinks: float
+
+
 class Reach(NamedTuple):
     """Where a foot can land, as the other one sees it, and how soon.
 
@@ -143,31 +175,22 @@ def nearest_inside(hull: FloatArray, x: float, y: float) -> tuple[float, float]:
 
 @kernel
 def landing_place(
-    corners: FloatArray,
-    stands: FloatArray,
-    side: int,
-    dcm: FloatArray,
-    rate: float,
-    time_s: float,
-    reach: Reach,
-    way: int = BESIDE,
+    falling: Falling, side: int, time_s: float, reach: Reach, way: int
 ) -> tuple[FloatArray, float]:
     """Return where a foot shall land, and how far the DCM will be outside the soles then [m].
 
     Meanwhile the zero-moment point is where in the standing sole it brakes most.
 
     Args:
-        corners: Of both soles in their feet's frames, shape (2, 4, 3) [m].
-        stands: Where the other foot stands, shape (3,).
+        falling: How the robot stands.
         side: Which foot lands.
-        dcm: The DCM now, shape (2,) [m].
-        rate: Of the pendulum [1/s].
         time_s: Until it lands [s].
         reach: Where it can.
         way: On which way it goes there.
     """
+    corners, stands = falling.corners, falling.feet[1 - side]
     sole = outline(corners[1 - side], stands, _INSET_M)
-    then_x, then_y = _dcm_then(sole, dcm, rate, time_s)
+    then_x, then_y = _dcm_then(sole, falling.dcm, falling.rate, time_s)
     away = 1.0 if side == 0 else -1.0
     x, y = turn_in_plane(then_x - stands[0], then_y - stands[1], -stands[2])
     farther = 1.0 + _BEYOND_M / (np.hypot(x, y) + 1e-9)
@@ -268,64 +291,39 @@ def _price(missing: float, far: float, time_s: float, lag: float, reach: Reach) 
 
 @inner_kernel
 def _price_of_next(
-    corners: FloatArray,
-    feet: FloatArray,
-    side: int,
-    place: FloatArray,
-    dcm: FloatArray,
-    rate: float,
-    time_s: float,
-    reach: Reach,
+    falling: Falling, side: int, place: FloatArray, time_s: float, reach: Reach
 ) -> float:
     """Return what the other foot's step costs after one foot has come down at a place."""
-    then, best = np.empty(2), np.inf
-    sole = outline(corners[1 - side], feet[1 - side], _INSET_M)
-    then[0], then[1] = _dcm_then(sole, dcm, rate, time_s)
+    feet, then, best = falling.feet.copy(), np.empty(2), np.inf
+    sole = outline(falling.corners[1 - side], feet[1 - side], _INSET_M)
+    then[0], then[1] = _dcm_then(sole, falling.dcm, falling.rate, time_s)
+    feet[side] = place
+    landed = Falling(falling.corners, feet, then, falling.rate)
     for k in range(int((LONGEST_S - reach.soonest) / _TRY_NEXT_S)):
         next_s = reach.soonest + k * _TRY_NEXT_S
-        there, missing = landing_place(
-            corners, place, 1 - side, then, rate, next_s + _LIFTS_S, reach, BESIDE
-        )
+        there, missing = landing_place(landed, 1 - side, next_s + _LIFTS_S, reach, BESIDE)
         far = way_round(place, feet[1 - side], there, reach)[2]
         best = min(best, _price(missing, far, next_s, _LAG_S, reach))
     return best
 
 
 @kernel
-def choose_step(
-    corners: FloatArray,
-    feet: FloatArray,
-    dcm: FloatArray,
-    rate: float,
-    reach: Reach,
-    only: int,
-    since_s: float = 0.0,
-    crosses: bool = True,
-    high_m: float = 0.0,
-    sinks: float = 0.0,
-) -> Step:
+def choose_step(falling: Falling, reach: Reach, only: int, foot: OnItsWay) -> Step:
     """Return the step that catches the DCM best: inside the soles, without hurry, near and soon.
 
     Only where the other one could not step, for its foot stood alone, feet cross, or come down for
     it to step next; then both steps count.
 
     Args:
-        corners: Of both soles in their feet's frames, shape (2, 4, 3) [m].
-        feet: Where they are: x, y [m] and yaw [rad], shape (2, 3).
-        dcm: The DCM now, shape (2,) [m].
-        rate: Of the pendulum [1/s].
+        falling: How the robot stands.
         reach: Where a foot can land, and how soon.
         only: The one foot that can step; -1 for either.
-        since_s: For how long that foot has been on its way [s].
-        crosses: Whether the one foot that can step was in the air: it may cross the other one, or
-            come down at once.
-        high_m: How high that foot is [m].
-        sinks: How fast it comes down [m/s].
+        foot: How that one moves.
     """
-    best = np.inf
+    feet, since_s, best = falling.feet, foot.since_s, np.inf
     found = Step(max(only, 0), LONGEST_S, feet[max(only, 0)].copy(), np.inf, BESIDE)
     lag = max(_LAG_S - since_s, 0.0)
-    n_ways = 4 if only >= 0 and crosses else 1
+    n_ways = 4 if only >= 0 and foot.crosses else 1
     for side in range(2):
         if only == 1 - side:
             continue
@@ -335,17 +333,16 @@ def choose_step(
                 continue
             soonest = max(reach.soonest - since_s, _SOONEST_S)
             if way == DOWN:
-                soonest = max(reach.down_s - since_s, _LANDS_S, _falls_s(reach, high_m, sinks))
+                falls_s = _falls_s(reach, foot.high_m, foot.sinks)
+                soonest = max(reach.down_s - since_s, _LANDS_S, falls_s)
             for k in range(int((LONGEST_S - since_s - soonest) / _TRY_S) + 1):
                 time_s = soonest + k * _TRY_S
-                place, missing = landing_place(
-                    corners, feet[1 - side], side, dcm, rate, time_s, reach, way
-                )
+                place, missing = landing_place(falling, side, time_s, reach, way)
                 far = way_round(feet[1 - side], feet[side], place, reach)[2]
                 if way == DOWN:
                     price = _price(0.0, far, time_s, lag, reach)
                     if price < best:
-                        later = _price_of_next(corners, feet, side, place, dcm, rate, time_s, reach)
+                        later = _price_of_next(falling, side, place, time_s, reach)
                         price += min(_PRICES[0] * missing, later)
                 else:
                     price = _price(missing, far, time_s, lag, reach)

@@ -22,6 +22,8 @@ from .body_state import LEFT, NEITHER, RIGHT, BodyState, sole_middle
 from .capture import (
     BESIDE,
     DOWN,
+    Falling,
+    OnItsWay,
     Reach,
     choose_step,
     landing_place,
@@ -147,10 +149,8 @@ def begin_stepping(
     stepping.goal[:] = now.dcm
     if up >= 0:
         high_m = max(now.soles[up, :, 2].min() - now.floor, 0.0)
-        sinks = -now.foot_rate[up, 2]
-        step = choose_step(
-            robot.corners, now.feet, now.dcm, now.rate, law.hurried, up, 0.0, True, high_m, sinks
-        )
+        foot = OnItsWay(0.0, up >= 0, high_m, -now.foot_rate[up, 2])
+        step = choose_step(_falling(robot, now), law.hurried, up, foot)
         _lift(robot, stepping, now, up, step.time_s, step.place)
         s.way, s.crosses, s.hurries = step.way, True, True
 
@@ -196,7 +196,8 @@ def plan_step(
         landed = landed or s.hurries or s.time_s > _STOOD_S
         if landed and hull_margin(hull, now.dcm[0], now.dcm[1]) < _LEAVES_M:
             reach = _reach_of(law, stepping)
-            step = choose_step(robot.corners, now.feet, now.dcm, now.rate, reach, NEITHER, 0.0)
+            foot = OnItsWay(0.0, s.crosses, 0.0, 0.0)
+            step = choose_step(_falling(robot, now), reach, NEITHER, foot)
             _lift(robot, stepping, now, step.side, step.time_s, step.place)
             s.way = step.way
     if s.doing != SWINGS:
@@ -209,6 +210,12 @@ def plan_step(
     if s.doing == SWINGS:
         return _on_one_foot(law, robot, stepping, now)
     return _on_both_feet(law, robot, stepping, now)
+
+
+@inner_kernel
+def _falling(robot: ReferenceRobot, now: BodyState) -> Falling:
+    """Return how the robot stands."""
+    return Falling(robot.corners, now.feet, now.dcm, now.rate)
 
 
 @inner_kernel
@@ -268,32 +275,14 @@ def _on_one_foot(
         s.back = False
     if not s.back:
         if s.time_s < law.decides_s:
-            step = choose_step(
-                robot.corners,
-                now.feet,
-                now.dcm,
-                now.rate,
-                _reach_of(law, stepping),
-                side,
-                s.time_s,
-                s.crosses,
-                max(stepping.foot[2] - now.floor - robot.stance.foot_position[side, 2], 0.0),
-                -stepping.foot_rate[2],
-            )
+            high_m = stepping.foot[2] - now.floor - robot.stance.foot_position[side, 2]
+            foot = OnItsWay(s.time_s, s.crosses, max(high_m, 0.0), -stepping.foot_rate[2])
+            step = choose_step(_falling(robot, now), _reach_of(law, stepping), side, foot)
             s.lasts_s = s.time_s + step.time_s
             s.way, stepping.place[:] = step.way, step.place
         elif left > _FIXED_S:
-            place, _ = landing_place(
-                robot.corners,
-                now.feet[1 - side],
-                side,
-                now.dcm,
-                now.rate,
-                left,
-                _reach_of(law, stepping),
-                s.way,
-            )
-            stepping.place[:] = place
+            reach = _reach_of(law, stepping)
+            stepping.place[:], _ = landing_place(_falling(robot, now), side, left, reach, s.way)
         x, y = now.dcm
     else:
         stepping.place[:] = _beside(law, now.feet, side)

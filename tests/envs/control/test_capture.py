@@ -11,7 +11,10 @@ from mplearn_envs.control.capture import (
     BESIDE,
     DOWN,
     IN_FRONT,
+    Falling,
+    OnItsWay,
     Reach,
+    Step,
     choose_step,
     landing_place,
     nearest_inside,
@@ -32,6 +35,12 @@ def corners():
 
 
 FEET = np.array([[0.0, 0.09, 0.0], [0.0, -0.09, 0.0]])
+
+
+def step_of(corners, feet, dcm, reach, only, **foot) -> Step:
+    """Choose a step, with a foot that was just lifted."""
+    lifted = OnItsWay(since_s=0.0, crosses=True, high_m=0.0, sinks=0.0)
+    return choose_step(Falling(corners, feet, dcm, RATE), reach, only, lifted._replace(**foot))
 
 
 def test_nearest_point_of_a_polygon_is_that_of_many():
@@ -66,7 +75,7 @@ def test_foot_lands_where_the_pendulum_will_be(corners, dcm):
     sole = support_hull(corners, FEET, side, 0.008)
     zmp = np.array(nearest_inside(sole, *dcm))
     end = solve_ivp(lambda _, x: RATE * (x - zmp), (0.0, time_s), dcm, rtol=1e-10).y[:, -1]
-    place, missing = landing_place(corners, FEET[1], side, dcm, RATE, time_s, REACH)
+    place, missing = landing_place(Falling(corners, FEET, dcm, RATE), side, time_s, REACH, BESIDE)
     both = support_hull(corners, np.stack((place, FEET[1])), -1, 0.008)
     assert max(0.0, -support_margin(both, end)) == pytest.approx(missing, abs=1e-6)
     assert missing < 0.05
@@ -75,7 +84,7 @@ def test_foot_lands_where_the_pendulum_will_be(corners, dcm):
 @pytest.mark.parametrize("angle", np.arange(8) * np.pi / 4)
 def test_step_goes_where_the_push_goes_and_legs_do_not_cross(corners, angle):
     dcm = np.array([0.03, 0.0]) + 0.2 * np.array([np.cos(angle), np.sin(angle)])
-    step = choose_step(corners, FEET, dcm, RATE, REACH, -1)
+    step = step_of(corners, FEET, dcm, REACH, -1)
     moved = step.place[:2] - FEET[step.side, :2]
     assert moved @ [np.cos(angle), np.sin(angle)] > 0.0
     aside = (step.place[1] - FEET[1 - step.side, 1]) * (1 if step.side == 0 else -1)
@@ -86,7 +95,7 @@ def test_step_goes_where_the_push_goes_and_legs_do_not_cross(corners, angle):
 
 def test_only_one_foot_may_step(corners):
     for side in (0, 1):
-        assert choose_step(corners, FEET, np.array([0.2, 0.0]), RATE, REACH, side).side == side
+        assert step_of(corners, FEET, np.array([0.2, 0.0]), REACH, side).side == side
 
 
 CROSSING = REACH._replace(across=0.3)
@@ -144,16 +153,16 @@ def test_who_stands_on_one_foot_and_falls_beyond_it_crosses_it(corners, side, an
     dcm = FEET[1 - side, :2] + 0.17 * np.array([np.cos(a), beyond * np.sin(a)])
     feet = FEET.copy()
     feet[side, 0] += 0.1 if angle <= 90 else -0.1
-    step = choose_step(corners, feet, dcm, RATE, CROSSING, side)
+    step = step_of(corners, feet, dcm, CROSSING, side)
     across = beyond * (step.place[1] - FEET[1 - side, 1])
     if angle in (60.0, 90.0, 120.0):
         assert step.way == (IN_FRONT if angle <= 90 else BEHIND)
         assert 0.0 < across <= CROSSING.across + 1e-12
     if step.way != BESIDE:  # it does not land upon the other foot
         assert abs(step.place[0]) >= CROSSING.clear - 1e-12
-    without = choose_step(corners, feet, dcm, RATE, REACH, side)
+    without = step_of(corners, feet, dcm, REACH, side)
     assert without.way == BESIDE and step.missing_m <= without.missing_m
-    either = choose_step(corners, feet, dcm, RATE, CROSSING, -1)
+    either = step_of(corners, feet, dcm, CROSSING, -1)
     assert either.way == BESIDE
 
 
@@ -161,10 +170,10 @@ def test_who_stands_on_one_foot_and_falls_beyond_it_crosses_it(corners, side, an
 def test_who_crosses_lands_on_the_side_of_the_foot_that_crosses(corners, side):
     """So that what is left drives the robot to where the other foot can step."""
     own = 1.0 if side == 0 else -1.0
-    dcm, stands = FEET[1 - side, :2] + np.array([-0.17, 0.02 * own]), FEET[1 - side]
+    dcm = FEET[1 - side, :2] + np.array([-0.17, 0.02 * own])
+    falling = Falling(corners, FEET, dcm, RATE)
     places = [
-        landing_place(corners, stands, side, dcm, RATE, 0.3, CROSSING._replace(inwards=x), BEHIND)
-        for x in (0.0, 0.05)
+        landing_place(falling, side, 0.3, CROSSING._replace(inwards=x), BEHIND) for x in (0.0, 0.05)
     ]
     (straight, _), (inwards, missing) = places
     assert own * (inwards[1] - straight[1]) == pytest.approx(0.05)
@@ -179,7 +188,7 @@ def test_who_falls_beyond_the_foot_that_stands_comes_down_for_it_to_step(corners
     """No single step reaches there: two do, by the pendulum's differential equation."""
     beyond = -1.0 if side == 0 else 1.0
     dcm = FEET[1 - side, :2] + np.array([0.05, 0.09 * beyond])
-    step = choose_step(corners, FEET, dcm, RATE, COMING_DOWN, side)
+    step = step_of(corners, FEET, dcm, COMING_DOWN, side)
     assert step.way == DOWN
     assert beyond * (FEET[1 - side, 1] - step.place[1]) >= COMING_DOWN.close - 1e-12
     sole = support_hull(corners, FEET, side, 0.008)
@@ -187,9 +196,9 @@ def test_who_falls_beyond_the_foot_that_stands_comes_down_for_it_to_step(corners
     then = solve_ivp(lambda _, x: RATE * (x - zmp), (0.0, step.time_s), dcm, rtol=1e-10).y[:, -1]
     feet = FEET.copy()
     feet[side] = step.place
-    second = choose_step(corners, feet, then, RATE, COMING_DOWN, -1)
+    second = step_of(corners, feet, then, COMING_DOWN, -1)
     assert second.side == 1 - side and second.missing_m < 0.01
-    single = choose_step(corners, FEET, dcm, RATE, COMING_DOWN, side, crosses=False)
+    single = step_of(corners, FEET, dcm, COMING_DOWN, side, crosses=False)
     assert single.missing_m > 0.05 and single.way == BESIDE
 
 
@@ -197,9 +206,9 @@ def test_who_falls_beyond_the_foot_that_stands_comes_down_for_it_to_step(corners
 def test_a_foot_comes_down_as_gently_as_told(corners, sinks):
     """By the cubic from its height and velocity to rest, whose end is the hardest."""
     dcm = FEET[0, :2] + np.array([0.05, 0.09])
-    hard = choose_step(corners, FEET, dcm, RATE, COMING_DOWN, 1, high_m=0.18, sinks=sinks)
+    hard = step_of(corners, FEET, dcm, COMING_DOWN, 1, high_m=0.18, sinks=sinks)
     gentle = COMING_DOWN._replace(gently=80.0)
-    soft = choose_step(corners, FEET, dcm, RATE, gentle, 1, high_m=0.18, sinks=sinks)
+    soft = step_of(corners, FEET, dcm, gentle, 1, high_m=0.18, sinks=sinks)
     assert hard.way == soft.way == DOWN and hard.time_s == COMING_DOWN.down_s
 
     def ends(time_s):
@@ -215,5 +224,5 @@ def test_a_foot_comes_down_as_gently_as_told(corners, sinks):
 
 def test_a_foot_on_its_way_is_sooner_there(corners):
     dcm = np.array([0.2, 0.0])
-    on_its_way = choose_step(corners, FEET, dcm, RATE, REACH, 0, 0.1)
-    assert on_its_way.time_s < choose_step(corners, FEET, dcm, RATE, REACH, 0, 0.0).time_s
+    on_its_way = step_of(corners, FEET, dcm, REACH, 0, since_s=0.1)
+    assert on_its_way.time_s < step_of(corners, FEET, dcm, REACH, 0, since_s=0.0).time_s
