@@ -14,7 +14,7 @@ from mplearn.state import checkpoint
 from mplearn_agents.learning.pauses import short_pauses
 
 from .live import _resident_mb
-from .states import _CHANNELS, _RATE_HZ, Teacher, teach
+from .states import _CHANNELS, _RATE_HZ, Teacher, one_more, teach
 
 _STAGES = (300, 1_000, 5_000)
 _AT_ONCE, _TIMES = 20, 3  # motions that are shown together, and how often
@@ -56,6 +56,8 @@ def _stages(teacher: Teacher, learner: MotionLearner) -> list[tuple[str, str, st
             (title + "slowest frame between", _ms(max(frames)), "", _FRAME_MS),
         ]
         table += _kept(learner, title)
+        more = one_more(learner, teacher, stage, set(checkpoint(learner.state()).parts))
+        table += [(f"{title}one more, {what}", took, "", "") for what, took in more.items()]
     return table
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -61,7 +62,7 @@ class HistoryTable:
     def copy(self) -> HistoryTable:
         """Return an independent copy."""
         twin = HistoryTable(self.order, self.capacity)
-        twin._followers = {context: dict(after) for context, after in self._followers.items()}
+        twin._followers = dict(self._followers)  # what followed one is never changed in place
         twin._size = self._size
         return twin
 
@@ -83,11 +84,15 @@ class HistoryTable:
 
     def to_array(self) -> IntArray:
         """Return the entries, shape (E, order + 3): length, context padded with 0, next, count."""
+        padding = [(0,) * (self.order - length) for length in range(self.order + 1)]
         rows = [
-            (len(context), *context, *(0,) * (self.order - len(context)), next_id, count)
-            for context, next_id, count in self.entries()
+            (len(context), *context, *padding[len(context)], next_id, count)
+            for context, followers in self._followers.items()
+            for next_id, count in followers.items()
         ]
-        return np.array(rows, dtype=np.int64).reshape(len(rows), self.order + 3)
+        width = self.order + 3
+        flat = np.fromiter(chain.from_iterable(rows), np.int64, len(rows) * width)
+        return flat.reshape(len(rows), width)
 
     @classmethod
     def from_array(cls, order: int, capacity: int, rows: IntArray) -> HistoryTable:
@@ -99,9 +104,9 @@ class HistoryTable:
 
     def _add(self, context: tuple[int, ...], next_id: int, count: int) -> None:
         followers = self._followers.pop(context, {})
-        self._followers[context] = followers  # the latest seen stands last
         self._size += next_id not in followers
-        followers[next_id] = followers.get(next_id, 0) + count
+        count += followers.get(next_id, 0)
+        self._followers[context] = {**followers, next_id: count}  # the latest seen stands last
 
     def _forget(self) -> None:
         entries = list(self.entries())

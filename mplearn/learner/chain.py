@@ -7,6 +7,7 @@ from bisect import bisect_left
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
+from operator import attrgetter
 from typing import Annotated, Any
 
 import numpy as np
@@ -83,6 +84,13 @@ class SeenSegmentsState(SharedState):
 
 
 _DTYPES = ("i8", "i8", "?", "i8", "i8", "f8", "i8", "?", "i8", "i8", "i8")
+
+
+_fields = attrgetter(*(each.name for each in fields(SeenSegment)))
+
+
+def _state_of(segments: Sequence[SeenSegment]) -> SeenSegmentsState:
+    return SeenSegmentsState.of(tuple(map(_plain, segments)))
 
 
 def _plain(seen: SeenSegment) -> tuple[Any, ...]:
@@ -363,9 +371,9 @@ class Chain:
             blocks.setdefault(seen.number // BLOCK, []).append(seen)
         kept = {}
         for at, segments in blocks.items():
-            now = tuple(map(_plain, segments))
+            now = tuple(map(_fields, segments))
             known = self._kept.get(at)
-            kept[at] = known if known and known[0] == now else (now, SeenSegmentsState.of(now))
+            kept[at] = known if known and known[0] == now else (now, _state_of(segments))
         self._kept = kept
         states = tuple(state for _, state in kept.values())
         return ChainState(states, self._paused_frames, self._broken, len(self._segments))

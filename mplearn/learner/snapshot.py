@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from ..body import View
 from ..graph import TransitionGraph
 from ..hmm import LeftRightHMM
 from ..library import Primitive, PrimitiveLibrary, TreeNode
 from ..people import PeopleTree
+from ..recording import FloatArray
 from ..state import SharedState
 from ..tree import Node
 
@@ -19,6 +21,22 @@ _LOOKED_AT = 256  # primitives that `prepare` looks at in one part
 class FrozenState(SharedState):
     """A primitive that stays as it was when it was frozen."""
 
+    primitive: Primitive
+
+
+class _Made(NamedTuple):
+    """A primitive that was made of a node.
+
+    Attributes:
+        changed_at: When the node had changed, as it says.
+        basis: What its model depends on besides it, see `PeopleTree.model_basis`.
+        seen: Its model in the tree.
+        primitive: What was made of it.
+    """
+
+    changed_at: int
+    basis: FloatArray | None
+    seen: LeftRightHMM
     primitive: Primitive
 
 
@@ -40,7 +58,7 @@ class Snapshots:
         self._channels = channels
         self._rate_hz = rate_hz
         self._body = body
-        self._made: dict[int, tuple[LeftRightHMM, Primitive]] = {}
+        self._made: dict[int, _Made] = {}
         self._nodes: dict[int, TreeNode] = {}
         self._left: list[int] | None = None  # what `prepare` has still to look at
         self.frozen: dict[int, FrozenState] = {}
@@ -48,7 +66,7 @@ class Snapshots:
     def freeze(self, tree: PeopleTree, id: int) -> None:
         """Let a primitive be what it is now in all libraries to come."""
         (node,) = (node for node in tree.nodes if node.id == id)
-        self.frozen[id] = FrozenState(self._primitive(tree, node)[1])
+        self.frozen[id] = FrozenState(self._primitive(tree, node, tree.model_basis).primitive)
 
     def prepare(self, tree: PeopleTree) -> bool:
         """Make one of the primitives that `take` would have to make; return whether none is left.
@@ -66,12 +84,14 @@ class Snapshots:
     def _prepare(self, tree: PeopleTree, left: list[int]) -> bool:
         part = set(left[-_LOOKED_AT:]) & set(tree.leaves)
         nodes = {node.id: node for node in tree.nodes if node.id in part}
+        basis = tree.model_basis
         for _ in range(min(len(left), _LOOKED_AT)):
             id = left.pop()
-            made = self._primitive(tree, nodes[id]) if id in nodes else None
-            if made and (id not in self._made or self._made[id][1] is not made[1]):
+            if id in nodes:
+                before, made = self._made.get(id), self._primitive(tree, nodes[id], basis)
                 self._made[id] = made
-                return False
+                if before is None or before.primitive is not made.primitive:
+                    return False
         if left:
             return False
         self._left = None
@@ -87,12 +107,14 @@ class Snapshots:
             graph: Their transitions.
         """
         with tree.still():
-            nodes = {node.id: node for node in tree.nodes}
-            self._made = {id: self._primitive(tree, nodes[id]) for id in tree.leaves}
+            nodes, basis = {node.id: node for node in tree.nodes}, tree.model_basis
+            self._made = {id: self._primitive(tree, nodes[id], basis) for id in tree.leaves}
         self._nodes = {id: self._node(node) for id, node in nodes.items()}
         primitives = [
-            replace(self.frozen[id].primitive, parent=made.parent) if id in self.frozen else made
-            for id, (_, made) in self._made.items()
+            replace(self.frozen[id].primitive, parent=made.primitive.parent)
+            if id in self.frozen
+            else made.primitive
+            for id, made in self._made.items()
         ]
         return PrimitiveLibrary(
             primitives=tuple(primitives),
@@ -110,17 +132,19 @@ class Snapshots:
         known = self._nodes.get(node.id)
         return known if known is not None and known == now else TreeNode(*now)
 
-    def _primitive(self, tree: PeopleTree, node: Node) -> tuple[LeftRightHMM, Primitive]:
-        """Return a primitive, with the model in the tree that it was made of."""
+    def _primitive(self, tree: PeopleTree, node: Node, basis: FloatArray | None) -> _Made:
+        """Return a primitive as its node is now: the same object, if it has not changed."""
+        known = self._made.get(node.id)
+        if known and known.changed_at == node.changed_at and known.basis is basis is not None:
+            return known
         seen = tree.model(node.id)  # the same one, as long as the exemplars are
         mean_duration_s = node.n_frames / node.n_placed / self._rate_hz
-        model, made = self._made.get(node.id, (None, None))
-        if made is not None and model is seen:
-            now = (node.n_placed, mean_duration_s, node.parent)
+        if known is not None and known.seen is seen:
+            now, made = (node.n_placed, mean_duration_s, node.parent), known.primitive
             if (made.n_exemplars, made.mean_duration_s, made.parent) == now:
-                return seen, made
+                return _Made(node.changed_at, basis, seen, made)
         view = self._view
-        return seen, Primitive.from_exemplars(
+        made = Primitive.from_exemplars(
             node.id,
             read_model(view, seen),
             [view.read(frames) for frames in tree.exemplars(node.id)],
@@ -129,6 +153,7 @@ class Snapshots:
             mean_duration_s=mean_duration_s,
             parent=node.parent,
         )
+        return _Made(node.changed_at, basis, seen, made)
 
 
 def read_model(view: View, seen: LeftRightHMM) -> LeftRightHMM:

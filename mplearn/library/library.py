@@ -84,18 +84,20 @@ class PrimitiveLibrary:
     def __post_init__(self) -> None:
         object.__setattr__(self, "primitives", tuple(self.primitives))
         object.__setattr__(self, "channels", tuple(self.channels))
-        object.__setattr__(self, "tree", tuple(map(_tree_node, self.tree)))
+        tree = tuple(node if type(node) is TreeNode else TreeNode(*node) for node in self.tree)
+        object.__setattr__(self, "tree", tree)
         ids = [primitive.id for primitive in self.primitives]
         names = [primitive.name for primitive in self.primitives]
         for what, values in (("ids", ids), ("names", names), ("channels", self.channels)):
             if len(set(values)) != len(values):
                 twice = [value for value, n in Counter(map(str, values)).items() if n > 1]
                 raise InvalidValueError(f"{what} of a library must differ, not {', '.join(twice)}")
+        n_channels = len(self.channels)
         for primitive in self.primitives:
-            if primitive.hmm.n_channels != len(self.channels):
+            if primitive.hmm.n_channels != n_channels:
                 raise InvalidValueError(
                     f"primitive {primitive.id} has {primitive.hmm.n_channels} channels, "
-                    f"the library {len(self.channels)}"
+                    f"the library {n_channels}"
                 )
             if primitive.rate_hz != self.rate_hz:
                 raise InvalidValueError(
@@ -559,7 +561,3 @@ class PrimitiveLibrary:
 
     def _known(self, sequence: Sequence[Key | None]) -> History:
         return [None if key is None else self[key].id for key in sequence]
-
-
-def _tree_node(node: tuple[int, int | None, int]) -> TreeNode:
-    return node if isinstance(node, TreeNode) else TreeNode(*node)

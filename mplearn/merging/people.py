@@ -119,7 +119,7 @@ def _of_several(trees: Sequence[PeopleTree], people: Sequence[Mapping[int, int]]
             sharing.provisional.join(part.people[each.person], each.primitive + part.ids, shapes)
         for id, node in theirs.above.items():
             new = id + part.ids
-            sharing.above[new] = Node(new, None, node.born_at, history=list(node.history))
+            sharing.above[new] = Node(new, None, node.born_at, history=node.history)
         sharing.parents |= {
             id + part.ids: above + part.ids if above != ROOT else ROOT
             for id, above in theirs.parents.items()

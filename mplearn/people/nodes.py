@@ -28,17 +28,17 @@ def nodes_of(
     """
     nodes = {ROOT: Node(ROOT, None, 0)}
     for id, node in above.items():
-        nodes[id] = Node(id, parents[id], node.born_at, history=list(node.history))
+        nodes[id] = Node(id, parents[id], node.born_at, history=node.history)
     for id in sorted({leaf.primitive for leaf in leaves}):
         nodes[id] = Node(id, parents[id], n_seen)
     for person, tree in trees.items():
         waiting = tree.node(ROOT)
-        nodes[ROOT].members += [numbers[person][n] for n in waiting.members]
+        nodes[ROOT].members += tuple(numbers[person][n] for n in waiting.members)
         nodes[ROOT].n_placed += waiting.n_placed
         nodes[ROOT].n_frames += waiting.n_frames
     for leaf in leaves:
         own = trees[leaf.person].node(leaf.local)
-        members = [numbers[leaf.person][n] for n in own.members]
+        members = tuple(numbers[leaf.person][n] for n in own.members)
         node = nodes[leaf.primitive]
         node.members += members
         node.n_placed += own.n_placed
@@ -54,12 +54,12 @@ def nodes_of(
                 own.matrix,
                 own.n_placed,
                 own.n_frames,
-                history=list(own.history),
+                history=own.history,
                 frozen=own.frozen,
             )
     for node in nodes.values():
         if node.parent is not None:
-            nodes[node.parent].children.append(node.id)
+            nodes[node.parent].children += (node.id,)
     return tuple(nodes[id] for id in sorted(nodes))
 
 

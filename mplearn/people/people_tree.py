@@ -138,6 +138,11 @@ class PeopleTree:
         """Return a node's group model: fitted to its exemplars as they came, at their rate."""
         return self._primitives.model(id)
 
+    @property
+    def model_basis(self) -> FloatArray | None:
+        """What models depend on besides their exemplars; None where each has to be asked for."""
+        return self._primitives.model_basis
+
     def n_placed(self, id: int) -> int:
         """Return how many segments were ever placed in a node, those of all people.
 

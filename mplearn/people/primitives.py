@@ -59,6 +59,10 @@ class Primitives(Protocol):
     def model(self, id: int) -> LeftRightHMM:
         """Return a node's group model."""
 
+    @property
+    def model_basis(self) -> FloatArray | None:
+        """What models depend on besides their exemplars; None where each has to be asked for."""
+
     def n_placed(self, id: int) -> int:
         """Return how many segments were ever placed in a node."""
 
@@ -144,6 +148,11 @@ class OnePersonsPrimitives:
     def model(self, id: int) -> LeftRightHMM:
         """Return the model of a node of the tree."""
         return self.tree.model(id)
+
+    @property
+    def model_basis(self) -> FloatArray | None:
+        """What models of the tree depend on besides their exemplars."""
+        return self.tree.model_basis
 
     def n_placed(self, id: int) -> int:
         """Return how many segments were ever placed in a node of the tree."""
@@ -281,6 +290,10 @@ class SharedPrimitives:
         if known is None or len(known[0]) != len(models) or any(map(is_not, known[0], models)):
             known = self._models[id] = models, common_model(models, self.exemplars(id))
         return known[1]
+
+    @property
+    def model_basis(self) -> None:
+        """Nothing: nodes of several people are put together whenever they are asked for."""
 
     def n_placed(self, id: int) -> int:
         """Return how many segments were ever placed in any of the leaves."""

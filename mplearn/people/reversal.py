@@ -227,9 +227,7 @@ def _follow_above(sharing: Sharing, gone: SharedSide, back: SharedSide) -> None:
             sharing.above.pop(node.id, None)
             sharing.parents.pop(node.id, None)
     for node in back.above:
-        sharing.above.setdefault(
-            node.id, Node(node.id, None, node.born_at, history=list(node.history))
-        )
+        sharing.above.setdefault(node.id, Node(node.id, None, node.born_at, history=node.history))
     wanted = dict(back.parents)
     for id in {*sharing.primitives, *sharing.above}:
         parent = wanted.get(id, sharing.parents.get(id, ROOT))

@@ -210,7 +210,7 @@ class Sharing:
 
     def put_above(self, id: int, children: Iterable[int]) -> None:
         """Let what was a primitive be a node above others."""
-        self.above[id] = Node(id, None, self.n_seen, history=[("split", self.n_seen)])
+        self.above[id] = Node(id, None, self.n_seen, history=(("split", self.n_seen),))
         for child in children:
             self.parents[child] = id
 
@@ -411,8 +411,7 @@ class Sharing:
             for own in state.numbers
         }
         self.above = {
-            node.id: Node(node.id, None, node.born_at, history=list(node.history))
-            for node in state.above
+            node.id: Node(node.id, None, node.born_at, history=node.history) for node in state.above
         }
         self.parents = dict(state.parents)
         self.constraints.load_state(state.constraints)

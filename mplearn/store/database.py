@@ -18,7 +18,7 @@ from ..errors import (
     StoreWriteError,
 )
 from ..state import SQLITE
-from .schema import APPLICATION_ID, VERSION, migrate, version_of
+from .schema import APPLICATION_ID, READABLE, VERSION, migrate, version_of
 
 BUSY_S = 10.0
 _PAGE = 4096
@@ -76,7 +76,7 @@ def open_reading(path: Path, *, check: bool = False) -> sqlite3.Connection:
             if not _has_tables(connection):
                 raise NotAStoreError(f"{path} holds no store: it was never finished")
             _check(connection, path, check=check)
-            if version_of(connection) < VERSION:
+            if version_of(connection) < READABLE:
                 raise StoreVersionError(
                     f"{path} is of version {version_of(connection)}, this is {VERSION}: open it "
                     "for writing once, as `mplearn store check` does"

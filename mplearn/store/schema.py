@@ -53,6 +53,7 @@ MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (_tables, _digest
 """Step k turns version k into k + 1."""
 
 VERSION = len(MIGRATIONS)
+READABLE = 2  # from this version on a file can be read as it is
 
 
 def migrate(connection: sqlite3.Connection, to: int = VERSION) -> int:

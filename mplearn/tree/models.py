@@ -43,6 +43,14 @@ class GroupModels:
         self._kept: dict[int, tuple[tuple[_Members, _Members], Model]] = {}
         self._floor_of_bank = self._variances = np.zeros(0)
 
+    @property
+    def basis(self) -> FloatArray | None:
+        """What models depend on besides their exemplars: one object as long as that is the same.
+
+        None where it is other nodes, too.
+        """
+        return self._floor() if self._config.max_chains == 1 else None
+
     def of(self, id: int) -> Model:
         """Return a node's model: of one chain, or of as many as it needs to be told apart.
 

@@ -130,7 +130,7 @@ def _index(
         node = Node(leaf, ROOT, 0)
         for each in group:
             bank.add(number, bank.model(centred(each, tree.config.normalisation)))
-            node.members.append(number)
+            node.members += (number,)
             number += 1
         node.matrix = bank.matrix(node.members)
         index.put(node, bank)

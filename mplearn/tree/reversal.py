@@ -16,7 +16,7 @@ import numpy as np
 
 from ..recording import FloatArray, IntArray
 from ..state import Array, State
-from .nodes.node import Node, NodeState
+from .nodes.node import Node, NodeState, without_one
 from .nodes.search import mean_nearest
 from .nodes.structure import Structure
 from .placement import ROOT
@@ -310,9 +310,9 @@ class _Reversal:
             memory.hold(*own)
             if node is not None:
                 stale.append(list(node.members))
-            history = list(node.history if node else new.history)
+            history = node.history if node else new.history
             nodes[id] = Node.from_state(new)
-            nodes[id].history = [*history, ("undone", self.when)]
+            nodes[id].history = (*history, ("undone", self.when))
             self._extend(nodes[id], own)
         for id in self.gone:
             del nodes[id]
@@ -368,10 +368,11 @@ class _Reversal:
             mine = [id for id in nodes if nodes[id].parent == node.id]
             order = [*(self.new[node.id].children if node.id in self.new else ()), *node.children]
             places = {id: place for place, id in reversed(list(enumerate(order)))}
-            node.children = sorted(mine, key=lambda id: (places.get(id, len(order)), id))
+            node.children = tuple(sorted(mine, key=lambda id: (places.get(id, len(order)), id)))
         for id in [id for id in self.new if id in nodes and id in inner - {ROOT}]:
             if not nodes[id].children:  # what was below it is gone since
-                nodes[nodes[id].parent or ROOT].children.remove(id)
+                node = nodes[nodes[id].parent or ROOT]
+                node.children = without_one(node.children, id)
                 self.memory.release(*nodes.pop(id).members)
         structure.reindex()
         structure.tune()

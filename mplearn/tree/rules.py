@@ -83,7 +83,7 @@ def form_primitives(structure: Structure, node: Node, when: int) -> Change:
             inside = [n for n, distance in zip(others, row, strict=True) if distance <= radius]
             change = change.then(structure.take_in(child, inside))
     if was_leaf and change.born:
-        node.history.append(("split", when))
+        node.history += (("split", when),)
         change = change._replace(splits=(Split(node.id, change.born),))
     return change
 

@@ -311,6 +311,14 @@ class PrimitiveTree:
         return self._models.of(id)
 
     @property
+    def model_basis(self) -> FloatArray | None:
+        """What models depend on besides their exemplars: one object as long as that is the same.
+
+        None where it is other nodes, too: then each model has to be asked for.
+        """
+        return self._models.basis
+
+    @property
     def bank(self) -> ExemplarBank:
         """Models of the segments that the tree remembers, by number; only the tree changes it."""
         return self._memory.bank
@@ -495,7 +503,7 @@ class PrimitiveTree:
         numbers = chosen_groups(leaf, groups)
         change = self._structure.split(leaf, numbers, self.n_seen)
         for born in change.born:
-            self.node(born).apart = set(change.born) - {born}
+            self.node(born).apart = frozenset(change.born) - {born}
         return self._edited(change)
 
     def merge(self, first: int, second: int) -> Change:
@@ -509,7 +517,7 @@ class PrimitiveTree:
         joint = self._structure.joint(older, younger)
         change = self._structure.merge(older, younger, joint, self.n_seen)
         older.whole = True
-        older.apart.discard(older.id)
+        older.apart -= {older.id}
         return self._edited(change)
 
     def reparent(self, id: int, parent: int) -> Change:

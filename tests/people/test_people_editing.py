@@ -77,7 +77,7 @@ def test_split_sends_each_persons_leaf_to_one_side(tree, learned):
     assert set(change.born) == set(change.splits[0].into)
     assert sorted(people_of(tree, into) for into in change.splits[0].into) == [[0], [1, 2]]
     assert {to for _, to in change.moved} == set(change.born)
-    assert tree.node(id).children == sorted(change.born)
+    assert tree.node(id).children == tuple(sorted(change.born))
     assert count(tree) == before
     sound(tree)
     one, two = change.born

@@ -24,6 +24,7 @@ from mplearn.state import (
     from_plain,
     require,
     resumed,
+    to_bytes,
     to_plain,
     validated,
 )
@@ -66,6 +67,9 @@ def part(seed, n=3, d=2):
     return Part(np.arange(n), frames, np.abs(rng.normal(size=(n, n))))
 
 
+MANY = tuple(part(k, 1) for k in range(40))
+
+
 def whole(seed=0, **changes):
     parts = (part(seed), part(seed + 1, 2))
     values = Whole(3, 0.5, np.inf, "one", None, True, "ä", (Pair(1, None),), (("a", 1),), parts)
@@ -103,9 +107,44 @@ def test_a_checkpoint_writes_only_what_is_new():
     assert (back.n_seen, back.parts[0]) == (4, changed)
 
 
+@pytest.mark.parametrize("n", [31, 32, 33, 400])
+def test_a_long_row_of_parts_costs_what_changes_in_it(n):
+    row = tuple(part(k, 1) for k in range(n))
+    first = checkpoint(whole(parts=row))
+    kept = dict(first.new)
+    assert resumed(Whole, first.document, kept.__getitem__) == whole(parts=row)
+    if n == 400:  # it names rows
+        assert len(first.document) - len(checkpoint(whole(parts=row[:1])).document) < 32 * 40
+    other = part(n, 1)
+    for now, n_new in (
+        ((*row[:7], other, *row[8:]), 2),
+        ((*row, other), 2),
+        ((other, *row), 2),
+        (row[:3] + row[4:], 0),
+    ):
+        later = checkpoint(whole(parts=now), first.parts)
+        rows = [key for key in later.new if b"$rows" in later.new[key]]
+        assert len(later.new) - len(rows) == n_new and len(rows) <= 2
+        held = {key: (kept | later.new)[key] for key in later.parts}  # no other part is needed
+        asked: list[str] = []
+        back = resumed(
+            Whole,
+            later.document,
+            lambda key, held=held, asked=asked: asked.append(key) or held[key],
+        )
+        assert back == whole(parts=now) and set(asked) == set(later.parts)
+
+
 def test_equal_content_has_one_key_whoever_made_it():
     assert checkpoint(whole(3)).document == checkpoint(whole(3)).document
     assert checkpoint(whole(3)).parts != checkpoint(whole(4)).parts
+
+
+@pytest.mark.parametrize("named", [3, None, ["a"], {"a": 1}, "none", "none none"])
+def test_a_row_that_names_no_parts_is_named(named):
+    document = to_bytes({"$whole 3": to_plain(whole(), whole=True) | {"parts": {"$rows": named}}})
+    with pytest.raises(StateError, match=r"^parts: "):
+        resumed(Whole, document, {}.__getitem__)
 
 
 def test_parts_that_are_lost_or_damaged_are_named():
@@ -194,9 +233,9 @@ def test_typed_states_are_checked_as_well_and_shared_parts_stay_the_same_objects
 
 
 @settings(max_examples=200, deadline=None)
-@given(data=st.data())
-def test_damaged_checkpoints_never_end_in_a_raw_error(data):
-    kept = checkpoint(whole())
+@given(data=st.data(), parts=st.sampled_from([(), MANY]))
+def test_damaged_checkpoints_never_end_in_a_raw_error(data, parts):
+    kept = checkpoint(whole(parts=parts) if parts else whole())
     parts = dict(kept.new) | {"": kept.document}
     name = data.draw(st.sampled_from(sorted(parts)))
     damaged = bytearray(parts[name])

@@ -79,7 +79,7 @@ def test_a_primitive_is_born_of_its_second_demonstration_and_confirmed_by_the_th
     assert not other.recognised
     node = tree.node(second.node_id)
     assert node.n_placed == 3
-    assert node.history == [("born", 4)]
+    assert node.history == (("born", 4),)
 
 
 @pytest.mark.parametrize("least", [2, 3, 4, 5])

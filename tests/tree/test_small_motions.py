@@ -68,7 +68,7 @@ def test_two_executions_may_differ_nearly_as_much_as_they_move(size: float) -> N
     )
     apart = tree.bank.distances(tree.bank[first], [second])[0]
     assert 0.84 < apart / np.sqrt(np.prod(tree.bank.extents([first, second]))) < 1.1
-    assert tree.node(tree.leaves[-1]).members == [first, second]
+    assert tree.node(tree.leaves[-1]).members == (first, second)
 
 
 def test_what_stands_still_belongs_to_no_small_motion() -> None:

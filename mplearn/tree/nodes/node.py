@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import count
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -14,6 +15,7 @@ from ..exemplars.spread import without
 from .clustering import most_redundant
 
 Happening: TypeAlias = Literal["born", "split", "merged", "moved", "undone"]
+_CHANGES = count()  # of all nodes
 
 
 class StoodFor(NamedTuple):
@@ -76,6 +78,8 @@ class NodeState(SharedState):
 class Node:
     """A group of similar segments; a leaf is a primitive.
 
+    Nothing of it is changed in place but by setting an attribute, which is noticed.
+
     Attributes:
         id: Identity, for life.
         parent: Id of the node above; None at the root.
@@ -93,6 +97,7 @@ class Node:
         apart: Ids of leaves that a person said are other motions: the rules never merge them.
         frozen: Whether a person said that it is to stay as it is: nothing changes its exemplars.
         stood_for: Segments and frames that went for want of room, by the exemplar nearest to them.
+        changed_at: A number that no node had before, since it changed.
 
     Example:
         >>> import numpy as np
@@ -108,24 +113,29 @@ class Node:
     id: int
     parent: int | None
     born_at: int
-    members: list[int] = field(default_factory=list)
+    members: tuple[int, ...] = ()
     matrix: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     n_placed: int = 0
     n_frames: int = 0
-    children: list[int] = field(default_factory=list)
-    settled: set[int] = field(default_factory=set)
-    history: list[tuple[Happening, int]] = field(default_factory=list)
+    children: tuple[int, ...] = ()
+    settled: frozenset[int] = frozenset()
+    history: tuple[tuple[Happening, int], ...] = ()
     whole: bool = False
-    apart: set[int] = field(default_factory=set)
+    apart: frozenset[int] = frozenset()
     frozen: bool = False
-    stood_for: dict[int, tuple[int, int]] = field(default_factory=dict)
-    _kept: tuple[tuple[Any, ...], NodeState] | None = field(default=None, repr=False)
+    stood_for: Mapping[int, tuple[int, int]] = field(default_factory=dict)
+    changed_at: int = field(init=False, repr=False)
+    _kept: NodeState | None = field(init=False, repr=False)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set an attribute, and let its state be made anew."""
+        self.__dict__.update({name: value, "changed_at": next(_CHANGES), "_kept": None})
 
     def __eq__(self, other: object) -> bool:
         """Whether it is a node of the same content, frames apart."""
         if not isinstance(other, Node):
             return NotImplemented
-        same = self.id == other.id and self._plain() == other._plain()
+        same = self._plain() == other._plain()
         return same and np.array_equal(self.matrix, other.matrix)
 
     @property
@@ -150,16 +160,15 @@ class Node:
         grown[:k, :k] = self.matrix
         grown[k, :k] = grown[:k, k] = row
         self.matrix = grown
-        self.members.append(number)
+        self.members += (number,)
 
     def remove(self, positions: list[int]) -> list[int]:
         """Let exemplars go, and return their numbers."""
-        gone = [self.members[i] for i in positions]
-        self.members = [m for i, m in enumerate(self.members) if i not in set(positions)]
+        gone, places = [self.members[i] for i in positions], set(positions)
+        self.members = tuple(m for i, m in enumerate(self.members) if i not in places)
         self.matrix = without(self.matrix, positions)
-        self.settled.difference_update(gone)
-        for number in gone:
-            self.stood_for.pop(number, None)
+        self.settled -= set(gone)
+        self.stood_for = {n: of for n, of in self.stood_for.items() if n not in gone}
         return gone
 
     def thin(self, most: int, length_of: Callable[[int], int]) -> list[int]:
@@ -185,7 +194,7 @@ class Node:
     def stand_for(self, number: int, n: int, n_frames: int) -> None:
         """Let an exemplar stand for so many segments, and frames, more."""
         known = self.stood_for.get(number, (0, 0))
-        self.stood_for[number] = known[0] + n, known[1] + n_frames
+        self.stood_for = {**self.stood_for, number: (known[0] + n, known[1] + n_frames)}
 
     def state(self, blob_of: Callable[[int], Blob]) -> NodeState:
         """Return everything, with the exemplars: the same object as long as nothing has changed.
@@ -193,9 +202,9 @@ class Node:
         Args:
             blob_of: Returns the frames of an exemplar, by its number.
         """
-        now = self._plain()
-        if self._kept is None or self._kept[0] != now or self._kept[1].matrix is not self.matrix:
-            state = NodeState(
+        made = self._kept
+        if made is None:
+            made = NodeState(
                 id=self.id,
                 parent=self.parent,
                 born_at=self.born_at,
@@ -204,16 +213,16 @@ class Node:
                 matrix=self.matrix,
                 n_placed=self.n_placed,
                 n_frames=self.n_frames,
-                children=tuple(self.children),
+                children=self.children,
                 settled=tuple(sorted(self.settled)),
-                history=tuple(self.history),
+                history=self.history,
                 whole=self.whole,
                 apart=tuple(sorted(self.apart)),
                 frozen=self.frozen,
                 stood_for=tuple(StoodFor(n, *of) for n, of in sorted(self.stood_for.items())),
             )
-            self._kept = now, state
-        return self._kept[1]
+            self.__dict__["_kept"] = made
+        return made
 
     @classmethod
     def from_state(cls, state: NodeState) -> Node:
@@ -222,26 +231,30 @@ class Node:
             id=state.id,
             parent=state.parent,
             born_at=state.born_at,
-            members=state.members.tolist(),
+            members=tuple(state.members.tolist()),
             matrix=state.matrix,
             n_placed=state.n_placed,
             n_frames=state.n_frames,
-            children=list(state.children),
-            settled=set(state.settled),
-            history=list(state.history),
+            children=state.children,
+            settled=frozenset(state.settled),
+            history=state.history,
             whole=state.whole,
-            apart=set(state.apart),
+            apart=frozenset(state.apart),
             frozen=state.frozen,
             stood_for={number: (n, n_frames) for number, n, n_frames in state.stood_for},
         )
-        node._kept = node._plain(), state
+        node.__dict__["_kept"] = state
         return node
 
     def _plain(self) -> tuple[Any, ...]:
-        """Return all that is changed in place, for comparison."""
+        """Return all but the distances, for comparison."""
         return (
-            *(self.parent, self.born_at, self.n_placed, self.n_frames, self.whole, self.frozen),
-            *(tuple(self.members), tuple(self.children), tuple(self.history)),
-            *(tuple(sorted(self.settled)), tuple(sorted(self.apart))),
-            tuple(sorted(self.stood_for.items())),
+            *(self.id, self.parent, self.born_at, self.n_placed, self.n_frames),
+            *(self.whole, self.frozen, self.members, self.children, self.history),
+            *(self.settled, self.apart, self.stood_for),
         )
+
+
+def without_one(ids: tuple[int, ...], gone: int) -> tuple[int, ...]:
+    """Return ids less one of them."""
+    return tuple(id for id in ids if id != gone)

@@ -10,7 +10,7 @@ from ...recording import FloatArray, IntArray
 from ..config import TreeConfig
 from ..exemplars.memory import SegmentMemory
 from ..placement import ROOT, Change, Merge, Reparent, Split
-from .node import Node
+from .node import Node, without_one
 from .search import NodeIndex
 
 
@@ -111,10 +111,10 @@ class Structure:
 
     def child(self, parent: Node, members: Sequence[int], when: int) -> Node:
         """Form a node below another from some of its exemplars."""
-        child = Node(self.next_id, parent.id, when, history=[("born", when)])
+        child = Node(self.next_id, parent.id, when, history=(("born", when),))
         self.next_id += 1
         places = [parent.members.index(number) for number in members]
-        child.members = list(members)
+        child.members = tuple(members)
         child.matrix = parent.matrix[np.ix_(places, places)]
         child.n_placed = len(members)
         child.n_frames = sum(map(self.length_of, members))
@@ -122,9 +122,9 @@ class Structure:
         if parent.id == ROOT:
             self.memory.release(*parent.remove(places))
         else:
-            parent.settled.update(members)
+            parent.settled = parent.settled.union(members)
         self.nodes[child.id] = child
-        parent.children.append(child.id)
+        parent.children += (child.id,)
         self._thin(child)
         self._note(parent, child)
         return child
@@ -149,7 +149,7 @@ class Structure:
 
     def split(self, leaf: Node, groups: Sequence[Sequence[int]], when: int) -> Change:
         """Form a leaf of each group of a leaf's exemplars; it becomes the node above them."""
-        leaf.history.append(("split", when))
+        leaf.history += (("split", when),)
         n_kept = len(leaf.members)
         born: list[int] = []
         moved: list[tuple[int, int]] = []
@@ -167,12 +167,12 @@ class Structure:
         older.matrix = joint
         older.members += younger.members
         twice = [i for i, n in enumerate(older.members) if n in older.members[:i]]
-        stood_for = younger.stood_for | older.stood_for
+        stood_for = {**younger.stood_for, **older.stood_for}
         self.memory.release(*older.remove(twice))  # in both since something was undone
         older.stood_for = stood_for
         older.n_placed += younger.n_placed
         older.n_frames += younger.n_frames
-        older.history.append(("merged", when))
+        older.history += (("merged", when),)
         older.apart |= younger.apart
         for node in self.nodes.values():
             if younger.id in node.apart:
@@ -202,19 +202,19 @@ class Structure:
     def reparent(self, node: Node, parent: Node, when: int) -> Change:
         """Hang a node below another inner node, which learns its exemplars."""
         above = self.nodes[node.parent if node.parent is not None else ROOT]
-        above.children.remove(node.id)
+        above.children = without_one(above.children, node.id)
         places = [i for i, number in enumerate(above.members) if number in node.members]
         if above.id != ROOT:
             self.memory.release(*above.remove(places))
         node.parent = parent.id
-        node.history.append(("moved", when))
-        parent.children.append(node.id)
+        node.history += (("moved", when),)
+        parent.children += (node.id,)
         if parent.id != ROOT:
             bank = self.memory.bank
             for number in [n for n in node.members if n not in parent.members]:
                 parent.add(number, bank.distances(bank[number], parent.members))
                 self.memory.hold(number)
-            parent.settled.update(node.members)
+            parent.settled = parent.settled.union(node.members)
             self._thin(parent)
         change = Change(reparented=(Reparent(node.id, parent.id),)).then(self._tidy(above, when))
         self._note(node, parent, above)
@@ -224,7 +224,7 @@ class Structure:
         """Take a leaf from its place; its exemplars stay held."""
         del self.nodes[leaf.id]
         parent = self.nodes[leaf.parent if leaf.parent is not None else ROOT]
-        parent.children.remove(leaf.id)
+        parent.children = without_one(parent.children, leaf.id)
         self._note(leaf, parent)
         return Change(removed=(leaf.id,)).then(self._tidy(parent, when))
 
@@ -234,14 +234,14 @@ class Structure:
             return Change()
         above = self.nodes[node.parent if node.parent is not None else ROOT]
         del self.nodes[node.id]
-        above.children.remove(node.id)
+        above.children = without_one(above.children, node.id)
         self.memory.release(*node.members)
         change = Change(removed=(node.id,))
         for id in node.children:
             child = self.nodes[id]
             child.parent = above.id
-            child.history.append(("moved", when))
-            above.children.append(id)
+            child.history += (("moved", when),)
+            above.children += (id,)
             change = change.then(Change(reparented=(Reparent(id, above.id),)))
         self._note(node, above, *(self.nodes[id] for id in node.children))
         return change.then(self._tidy(above, when))
