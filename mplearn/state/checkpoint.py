@@ -72,7 +72,7 @@ def checkpoint(state: Any, known: Container[str] = ()) -> Checkpoint:
 
     Args:
         state: The state.
-        known: Keys of the parts that are kept, with all that they refer to.
+        known: Keys of the parts that are kept.
 
     Example:
         >>> import numpy as np
@@ -87,13 +87,14 @@ def checkpoint(state: Any, known: Container[str] = ()) -> Checkpoint:
         content, data = _content(part), b""
         if content is None:
             content, data = _packed(part)
-        if content.key in known:
+        if content.key in known and all(map(known.__contains__, content.below)):
             found.update(dict.fromkeys((*content.below, content.key)))
         elif content.key not in found:
             for each in content.inner:
                 note(each)
             found[content.key] = None
-            new[content.key] = data or _packed(part)[1]
+            if content.key not in known:
+                new[content.key] = data or _packed(part)[1]
         return content.key
 
     def note_row(keys: Sequence[str]) -> str:

@@ -135,6 +135,16 @@ def test_a_long_row_of_parts_costs_what_changes_in_it(n):
         assert back == whole(parts=now) and set(asked) == set(later.parts)
 
 
+@pytest.mark.parametrize("n", [2, 40])
+def test_what_was_lost_of_a_part_that_is_kept_is_written_again(n):
+    """As where parts were being deleted when the process ended, and an undo brings them back."""
+    state = whole(parts=tuple(part(k, 2) for k in range(n)))
+    first = checkpoint(state)
+    for gone in range(0, len(first.parts), 7):
+        key = first.parts[gone]
+        assert set(checkpoint(state, set(first.parts) - {key}).new) == {key}
+
+
 def test_equal_content_has_one_key_whoever_made_it():
     assert checkpoint(whole(3)).document == checkpoint(whole(3)).document
     assert checkpoint(whole(3)).parts != checkpoint(whole(4)).parts
