@@ -122,8 +122,8 @@ def _narrowest(array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         raise StateError(f"a state cannot hold an array of {array.dtype}")
     for dtype in _DTYPES:
         if np.dtype(dtype).kind == kind and np.dtype(dtype).itemsize <= array.dtype.itemsize:
-            with np.errstate(over="ignore"):
+            with np.errstate(over="ignore", invalid="ignore"):
                 narrow = array.astype(dtype)
-            if np.array_equal(narrow.astype(array.dtype), array, equal_nan=kind == "f"):
+            if narrow.astype(array.dtype).tobytes() == array.tobytes():  # what a NaN says, too
                 return np.ascontiguousarray(narrow)
     return np.ascontiguousarray(array)
