@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mplearn.demonstrator import demonstrate
+from mplearn.evaluation.experiments import page_of_peers
 from mplearn.evaluation.experiments.page_of_peers import (
     METHODS,
     activity_peers_table,
@@ -43,6 +44,23 @@ def test_a_take_of_one_activity_is_left_out_and_named(planted: Recording) -> Non
     table = activity_peers_table([alone])
     assert not table.rows
     assert "alone (one activity" in table.note
+
+
+def test_a_library_that_breaks_is_left_out_and_named(
+    planted: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> object:
+        raise KeyError("no such thing")
+
+    ours = METHODS["ours, find_activities"]
+    methods = {"theirs": ("json", "nothing", broken), "ours, find_activities": ours}
+    monkeypatch.setattr(page_of_peers, "METHODS", methods)
+    table = activity_peers_table([planted])
+    assert [row[1] for row in table.rows] == ["ours, find_activities"]
+    assert "theirs, of planted (KeyError: 'no such thing')" in table.note
+    monkeypatch.setattr(page_of_peers, "METHODS", {"ours": ("", "nothing", broken)})
+    with pytest.raises(KeyError, match="no such thing"):
+        activity_peers_table([planted])
 
 
 def test_boundaries_of_each_are_scored_alike() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import tracemalloc
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
@@ -92,35 +92,13 @@ def activity_peers_table(recordings: Iterable[Recording]) -> Table:
             found.append((each, observe(each)))
         elif each.labels:
             left_out.append(f"{each.name} (one activity: there is nothing to tell apart)")
-    for name, (library, told, method) in METHODS.items():
+    for name, (library, _, _) in METHODS.items():
         if library and find_spec(library) is None:
             left_out.append(f"{name} (not installed: pip install {library})")
             continue
         for recording, seen in found:
-            own = seen if not library else resample(seen, min(ACTIVITY_HZ, seen.rate_hz))
-            postures = postures_of(own.frames, own.channels)
-            truth = frame_labels(recording.labels, len(recording))
-            labelled = truth != ""
-            changes = int((truth[labelled][1:] != truth[labelled][:-1]).sum())
-            asked = (postures, own.rate_hz, len(set(truth[labelled].tolist())), changes)
-            peak = _most_allocated(partial(method, *asked))
-            classes, took_s = _timed(partial(method, *asked))
-            at = np.arange(len(truth)) * own.rate_hz / recording.rate_hz
-            frames = classes[np.minimum(at.astype(np.int64), len(classes) - 1)]
-            score = agreement(truth[labelled], frames[labelled])
-            rows.append(
-                (
-                    recording.name,
-                    name,
-                    told,
-                    f"{score.ari:.2f}",
-                    f"{score.covering:.2f}",
-                    f"{score.change_f1:.2f}",
-                    f"{score.n_found} of {score.n_true}",
-                    f"{took_s:.2g} s",
-                    f"{peak / 2**20:.1f} MB",
-                )
-            )
+            row = partial(_activity_row, name, recording, seen)
+            rows += _tried(library, f"{name}, of {recording.name}", row, left_out)
     note = (
         "The same postures of the same recordings. Ours is run at the recording's rate and told "
         f"nothing; the others at {ACTIVITY_HZ:g} Hz and told what the table says: they find change "
@@ -142,6 +120,32 @@ def activity_peers_table(recordings: Iterable[Recording]) -> Table:
     )
 
 
+def _activity_row(name: str, recording: Recording, seen: Recording) -> tuple[str, ...]:
+    library, told, method = METHODS[name]
+    own = seen if not library else resample(seen, min(ACTIVITY_HZ, seen.rate_hz))
+    postures = postures_of(own.frames, own.channels)
+    truth = frame_labels(recording.labels, len(recording))
+    labelled = truth != ""
+    changes = int((truth[labelled][1:] != truth[labelled][:-1]).sum())
+    asked = (postures, own.rate_hz, len(set(truth[labelled].tolist())), changes)
+    peak = _most_allocated(partial(method, *asked))
+    classes, took_s = _timed(partial(method, *asked))
+    at = np.arange(len(truth)) * own.rate_hz / recording.rate_hz
+    frames = classes[np.minimum(at.astype(np.int64), len(classes) - 1)]
+    score = agreement(truth[labelled], frames[labelled])
+    return (
+        recording.name,
+        name,
+        told,
+        f"{score.ari:.2f}",
+        f"{score.covering:.2f}",
+        f"{score.change_f1:.2f}",
+        f"{score.n_found} of {score.n_true}",
+        f"{took_s:.2g} s",
+        f"{peak / 2**20:.1f} MB",
+    )
+
+
 def boundary_peers_table(takes: Iterable[Recording]) -> Table:
     """Cut takes of repeated movements by each library that is installed."""
     seen = [
@@ -149,30 +153,12 @@ def boundary_peers_table(takes: Iterable[Recording]) -> Table:
         for each in split_repetitions(list(takes))
     ]
     rows, left_out = [], []
-    for name, (library, online, cut) in PEERS.items():
+    for name, (library, _, _) in PEERS.items():
         if library and find_spec(library) is None:
             left_out.append(f"{name} (not installed: pip install {library})")
             continue
-        longest = max((frames for _, _, frames in seen), key=len)
-        peak = _most_allocated(partial(cut, longest, BOUNDARY_HZ))
-        scores, took_s = [], 0.0
-        for take, own, frames in seen:
-            cuts, own_s = _timed(partial(cut, frames, BOUNDARY_HZ))
-            took_s += own_s
-            scores.append(_scored(take, own, cuts))
-        score = BoundaryScore.pooled(scores)
-        minutes = sum(own.duration_s for _, own, _ in seen) / 60
-        rows.append(
-            (
-                name,
-                "yes" if online else "no",
-                percent(score.recall),
-                percent(score.precision),
-                f"{score.f1:.3f}",
-                f"{took_s / minutes:.2f} s",
-                f"{peak / 2**20:.0f} MB",
-            )
-        )
+        row = partial(_boundary_row, name, seen)
+        rows += _tried(library, name, row, left_out)
     note = (
         f"{len(seen)} takes of repeated movements, seen as a learner sees them, at "
         f"{BOUNDARY_HZ:g} Hz. True boundaries are the joins of repetitions and the reversal inside "
@@ -187,6 +173,43 @@ def boundary_peers_table(takes: Iterable[Recording]) -> Table:
         tuple(rows),
         f"{note} Left out: {'; '.join(left_out)}." if left_out else note,
     )
+
+
+def _boundary_row(
+    name: str, seen: Sequence[tuple[Recording, Recording, FloatArray]]
+) -> tuple[str, ...]:
+    _, online, cut = PEERS[name]
+    longest = max((frames for _, _, frames in seen), key=len)
+    peak = _most_allocated(partial(cut, longest, BOUNDARY_HZ))
+    scores, took_s = [], 0.0
+    for take, own, frames in seen:
+        cuts, own_s = _timed(partial(cut, frames, BOUNDARY_HZ))
+        took_s += own_s
+        scores.append(_scored(take, own, cuts))
+    score = BoundaryScore.pooled(scores)
+    minutes = sum(own.duration_s for _, own, _ in seen) / 60
+    return (
+        name,
+        "yes" if online else "no",
+        percent(score.recall),
+        percent(score.precision),
+        f"{score.f1:.3f}",
+        f"{took_s / minutes:.2f} s",
+        f"{peak / 2**20:.0f} MB",
+    )
+
+
+def _tried(
+    library: str, what: str, row: Callable[[], tuple[str, ...]], left_out: list[str]
+) -> list[tuple[str, ...]]:
+    """Return a row; none, and why, where another's library breaks: the page goes on without it."""
+    try:
+        return [row()]
+    except Exception as error:
+        if not library:  # ours
+            raise
+        left_out.append(f"{what} ({type(error).__name__}: {error})")
+        return []
 
 
 def _scored(take: Recording, own: Recording, cuts: list[int]) -> BoundaryScore:
