@@ -23,7 +23,7 @@ from mplearn.errors import (
 )
 from mplearn.store import LifelongLearner, Note, Rename, Store, StoreReader, check
 from mplearn.store.life_state import LifeState
-from mplearn.store.schema import VERSION
+from mplearn.store.schema import READABLE, VERSION, migrate, version_of
 
 FRAMES = stream(60)
 OLD = Path(__file__).with_name("life-1.db")  # made by the first version of the tables
@@ -318,6 +318,21 @@ def test_a_store_that_may_only_be_read(
     finally:
         folder.chmod(0o755)
         shutil.rmtree(folder)
+
+
+def test_a_file_that_needs_no_change_to_be_read_is_read_as_it_is(tmp_path: Path) -> None:
+    path = Path(shutil.copy(OLD, tmp_path / "life.db"))
+    connection = sqlite3.connect(path, isolation_level=None)
+    assert (migrate(connection, READABLE), version_of(connection)) == (1, READABLE)
+    connection.close()
+    before = path.read_bytes()
+    known = StoreReader(path).life.n_frames
+    assert known > 0 and path.read_bytes() == before
+    with LifelongLearner.open(path) as life:
+        assert life.n_frames == known
+    connection = sqlite3.connect(path)
+    assert version_of(connection) == VERSION > READABLE
+    connection.close()
 
 
 def test_an_old_file_is_brought_up_to_date(tmp_path: Path) -> None:
