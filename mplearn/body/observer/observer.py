@@ -9,7 +9,8 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from mplearn.errors import BodyError, FrameError, InvalidValueError
-from mplearn.gaps import GapsState, GapTracker
+from mplearn.gaps import GapTracker
+from mplearn.gaps.tracker import GapsState
 from mplearn.recording import BoolArray, FloatArray
 from mplearn.state import Array, Count, State, require, validated, within
 
