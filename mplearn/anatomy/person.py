@@ -23,6 +23,7 @@ _PEOPLE_M = (0.7, 2.3)  # statures
 _UNITS_M = (1.0, 0.01, 0.001, 0.0254 / 0.45, 0.0254, 0.3048, 0.1)  # the most usual first
 ABOVE_SHOULDERS = 0.03  # [m] on the human of 1.75 m: the base of the neck is higher
 NECK_RISE = 0.084
+_FLOOR_M, _FLAT_M = (-0.06, 0.13), 0.6  # of who lies: height of the lowest joint, and thickness
 CLEARLY_UP = 0.85  # cosine between an axis and the way from the ankles to the neck
 STRAIGHT = 0.9  # cosine of a leg's bend at which the zero pose still stands
 
@@ -262,6 +263,10 @@ class Person:
         sign = float(np.sign(tall[axis]))
         if not self.up_in_doubt or (axis == 2 and sign > 0) or abs(tall[axis]) < CLEARLY_UP:
             return
+        heights = self.tree.points[:, :, 2] / self.size  # as of the reference [m]
+        low, high = (float(np.median(end)) for end in (heights.min(axis=1), heights.max(axis=1)))
+        if _FLOOR_M[0] < low < _FLOOR_M[1] and high - low < _FLAT_M:
+            return  # who lies on the floor
         self.turn = np.roll(np.eye(3), (2 - axis), axis=0)
         if sign < 0:
             self.turn = np.diag((1.0, -1.0, -1.0)) @ self.turn

@@ -31,7 +31,11 @@ def test_unit_and_axis_of_any_rig(
 ) -> None:
     rig = replace(rig, unit_m=unit_m, up=up)
     path = write_rig(tmp_path / "rig.bvh", truth.body, truth.postures[::8], 25.0, rig)
-    report = open_recording(path, positions=True).report  # warnings are errors here
+    # hardly any file has x up: where no name tells who is upright, that is said; else warnings are
+    # errors here
+    doubt = pytest.warns(RecordingWarning, match="whether x points up is in doubt")
+    with doubt if up == "x" and rig.names in ("numbers", "german") else nullcontext():
+        report = open_recording(path, positions=True).report
     assert report is not None
     assert report.unit_m == pytest.approx(unit_m)
     assert report.up == up

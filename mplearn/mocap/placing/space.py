@@ -203,7 +203,7 @@ def _settled_up(
             f"{found.up} is taken as the vertical axis, by feet, head and floor; {said} {space.up} "
             f"({option('up_axis')} sets it)"
         )
-    told = space.says_up and not found.contradicts
+    told = space.says_up and not found.contradicts and not found.inverted
     if found.doubtful and not told and len(names) >= _FEW:
         findings.warn(f"whether {found.up} points up is in doubt; {option('up_axis')} settles it")
     return found.up
