@@ -103,7 +103,8 @@ def find_vertical(
     ground = _Ground.unseen()
     parts = [part for part in (place_of(name).part for name in names) if part]
     # what is lowest of an arm tells nothing; among points whose names say nothing there may be feet
-    if len(parts) < _MOST * len(names) or not _STANDS.isdisjoint(parts):
+    has_feet = len(parts) < _MOST * len(names) or not _STANDS.isdisjoint(parts)
+    if has_feet:
         ground = _Ground.of(first, seen, names)
         evidence += ground.evidence + _by_contact(first, after, seen, rate_hz)
         evidence += _by_stature(first, seen)
@@ -114,7 +115,8 @@ def find_vertical(
     else:
         likely = up == start or (up in _UPWARD and not posture.any())
         ahead = float(evidence[up] - np.delete(evidence, up).max())
-        sure = likely and ahead >= _IN_DOUBT and ground.is_only(up)
+        settled = ground.is_only(up) if has_feet else posture[up] >= _TELLING
+        sure = likely and ahead >= _IN_DOUBT and bool(settled)
     sure = sure and (says_so or not ground.may_be_lain_on(up))
     inverted = bool(posture[up ^ 1] >= _TELLING) and not ground.at_zero[up]
     return Vertical(DIRECTIONS[up], up != start, not sure, inverted, tuple(map(float, evidence)))
