@@ -31,6 +31,7 @@ _USUAL = 1.5  # nat: its format does
 _NAMES = 5.0
 _BENT = 0.4  # of that, where the body is bent
 _TELLING = 2.0
+_LEANING = 3.0  # nat: who is bent, and yet more upright than not
 _LEVEL_SPREAD = 0.05  # of the stature: names closer than this in height tell little
 _MOST = 0.8  # of the points: so many names tell what there is
 _STANDS = frozenset(("toe", "heel", "ankle"))
@@ -103,8 +104,7 @@ def find_vertical(
     ground = _Ground.unseen()
     parts = [part for part in (place_of(name).part for name in names) if part]
     # what is lowest of an arm tells nothing; among points whose names say nothing there may be feet
-    has_feet = len(parts) < _MOST * len(names) or not _STANDS.isdisjoint(parts)
-    if has_feet:
+    if len(parts) < _MOST * len(names) or not _STANDS.isdisjoint(parts):
         ground = _Ground.of(first, seen, names)
         evidence += ground.evidence + _by_contact(first, after, seen, rate_hz)
         evidence += _by_stature(first, seen)
@@ -115,9 +115,10 @@ def find_vertical(
     else:
         likely = up == start or (up in _UPWARD and not posture.any())
         ahead = float(evidence[up] - np.delete(evidence, up).max())
-        settled = ground.is_only(up) if has_feet else posture[up] >= _TELLING
-        sure = likely and ahead >= _IN_DOUBT and bool(settled)
-    sure = sure and (says_so or not ground.may_be_lain_on(up))
+        leans = up == start and bool(posture[up] >= _LEANING) and ground.agrees(up)
+        sure = likely and ahead >= _IN_DOUBT and (leans or ground.is_only(up))
+    agreed = says_so or (up == start == stands and ground.at_zero[up])
+    sure = sure and (agreed or not ground.may_be_lain_on(up))
     inverted = bool(posture[up ^ 1] >= _TELLING) and not ground.at_zero[up]
     return Vertical(DIRECTIONS[up], up != start, not sure, inverted, tuple(map(float, evidence)))
 
