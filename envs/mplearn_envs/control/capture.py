@@ -84,6 +84,7 @@ class Reach(NamedTuple):
         close: How far aside of that it is then [m]; at 0 none comes down so.
         gently: Largest acceleration with which it ends its way down [m/s^2]: one that hits the
             floor throws the robot up, and no foot stands.
+        inside: How far inside the soles the DCM shall be when it lands [m].
     """
 
     ahead: float
@@ -99,6 +100,7 @@ class Reach(NamedTuple):
     down_s: float = 0.1
     close: float = 0.0
     gently: float = np.inf
+    inside: float = 0.0
 
 
 class Step(NamedTuple):
@@ -108,7 +110,8 @@ class Step(NamedTuple):
         side: Which foot, 0 left, 1 right.
         time_s: How long it takes [s].
         place: Where it lands: x, y [m] and yaw [rad], shape (3,).
-        missing_m: How far the DCM will be outside the soles then [m].
+        missing_m: How far the DCM will be outside the soles then, or nearer to their edge than it
+            shall be [m].
         way: `BESIDE`; on which way it crosses the other foot's: `IN_FRONT`, `BEHIND`; or `DOWN`:
             at once, for the other foot to step.
     """
@@ -179,7 +182,8 @@ def landing_place(
 ) -> tuple[FloatArray, float]:
     """Return where a foot shall land, and how far the DCM will be outside the soles then [m].
 
-    Meanwhile the zero-moment point is where in the standing sole it brakes most.
+    Or nearer to their edge than it shall be. Meanwhile the zero-moment point is where in the
+    standing sole it brakes most.
 
     Args:
         falling: How the robot stands.
@@ -207,7 +211,7 @@ def landing_place(
     dx, dy = turn_in_plane(x, away * y, stands[2])
     place = np.array([stands[0] + dx, stands[1] + dy, stands[2]])
     both = hull_of(np.concatenate((sole, outline(corners[side], place, _INSET_M))))
-    return place, max(0.0, -hull_margin(both, then_x, then_y))
+    return place, max(0.0, reach.inside - hull_margin(both, then_x, then_y))
 
 
 @inner_kernel

@@ -41,7 +41,7 @@ _SWING_WEIGHT = 0.2  # of the foot on its way, where not all can be had
 _DAMPING = 0.05
 _AHEAD_S = 0.1  # the base is lowered for where it will be
 _REACH = 0.985  # of the leg
-_TOUCHES_M = 0.006
+_NEAR_M = 0.02  # a foot so near to the floor stands on its whole sole, or soon will
 _PROBE_S = 1e-3
 _COG, _TURN = COG.start, ORIENTATION.start  # rows of the Jacobian
 _FORGETS, _MOST_TORQUE = 0.97, 0.4  # a period; share of the torque limit
@@ -70,7 +70,7 @@ class BodyLaw(NamedTuple):
         rise: And upwards [m/s^2].
         ahead: Which share of its acceleration a foot on its way is given ahead.
         watch: How much of what a joint's velocity misses in a period is made up for by torque in
-            the leg on its way [N m s/rad].
+            the leg on its way [N m s/rad]; not while its foot is held by the floor.
         learns: How fast a joint learns by which share of its velocity's gain its servo is wrong.
     """
 
@@ -280,9 +280,13 @@ def command_legs(
     stance, swings, period_s = robot.stance, swinging(stepping), law.period_s
     points, sides = np.empty((8, 3)), np.empty(8, np.int64)
     n = 0
+    aloft = False
     for side in range(2):
+        low = now.soles[side, :, 2].min() - now.floor
+        if side == swings:
+            aloft = low > 0.0
         for k in range(4):
-            if side != swings and now.soles[side, k, 2] < now.floor + _TOUCHES_M:
+            if side != swings and low < _NEAR_M:
                 points[n], sides[n] = now.soles[side, k] - now.cog, side
                 n += 1
     wrench, base = np.empty(6), now.pose.rotation[0]
@@ -304,7 +308,7 @@ def command_legs(
                     torque -= now.pose.axis[j, i] * turning[i]
         v = now.v[6 + j]
         missed = adapted[0, j] - v
-        watch = law.watch if stance.leg_side[k] == swings else 0.0
+        watch = law.watch if aloft and stance.leg_side[k] == swings else 0.0
         most = _MOST_TORQUE * law.torque[j]
         adapted[1, j] = _FORGETS * adapted[1, j] + watch * missed
         adapted[1, j] = min(max(adapted[1, j], -most), most)

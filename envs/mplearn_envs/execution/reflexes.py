@@ -58,6 +58,7 @@ _TUNED: dict[str, Any] = {  # on pushes at the chest of the humanoid
     "reach": Reach(0.5, 0.4, 0.16, 0.62, 2.2, 0.24, across=0.1, inwards=0.05),
     "hurried_s": 0.2,
     "gently": 60.0,
+    "inside": 0.01,
     "decides_s": 0.1,
     "gain": 4.0,
     "lift_m": 0.035,
@@ -65,7 +66,7 @@ _TUNED: dict[str, Any] = {  # on pushes at the chest of the humanoid
     "moment": 1.0,
     "turn": 30.0,
     "foot": 80.0,
-    "foot_turn": 200.0,
+    "foot_turn": 100.0,
     "crouch_m": 0.08,
     "drop": 3.0,
     "rise": 8.0,
@@ -168,12 +169,13 @@ class Reflexes:
         long, wide = np.ptp(self.reference.corners[..., :2], axis=1).max(axis=0) + _PAST_M
         period_s = float(self._model.opt.timestep)
         reach = _TUNED["reach"]._replace(clear=float(long) + _CROSS_M, apart=float(wide))
-        close_m = float(wide) - _PAST_M + _BESIDE_M
+        hurried = {name: _TUNED[name] for name in ("gently", "inside")}
+        hurried |= {"soonest": _TUNED["hurried_s"], "close": float(wide) - _PAST_M + _BESIDE_M}
         self.law = StepLaw(
             period_s,
             _TUNED["gain"],
             reach,
-            reach._replace(soonest=_TUNED["hurried_s"], close=close_m, gently=_TUNED["gently"]),
+            reach._replace(**hurried),
             np.append(ground[0, :2] - ground[1, :2], 0.0),
             _TUNED["lift_m"],
             _TUNED["decides_s"],
