@@ -28,13 +28,13 @@ class _Made(NamedTuple):
     """A primitive that was made of a node.
 
     Attributes:
-        changed_at: When the node had changed, as it says.
+        revision: That of the node.
         basis: What its model depends on besides it, see `PeopleTree.model_basis`.
         seen: Its model in the tree.
         primitive: What was made of it.
     """
 
-    changed_at: int
+    revision: object
     basis: FloatArray | None
     seen: LeftRightHMM
     primitive: Primitive
@@ -135,14 +135,14 @@ class Snapshots:
     def _primitive(self, tree: PeopleTree, node: Node, basis: FloatArray | None) -> _Made:
         """Return a primitive as its node is now: the same object, if it has not changed."""
         known = self._made.get(node.id)
-        if known and known.changed_at == node.changed_at and known.basis is basis is not None:
+        if known and known.revision is node.revision and known.basis is basis is not None:
             return known
         seen = tree.model(node.id)  # the same one, as long as the exemplars are
         mean_duration_s = node.n_frames / node.n_placed / self._rate_hz
         if known is not None and known.seen is seen:
             now, made = (node.n_placed, mean_duration_s, node.parent), known.primitive
             if (made.n_exemplars, made.mean_duration_s, made.parent) == now:
-                return _Made(node.changed_at, basis, seen, made)
+                return _Made(node.revision, basis, seen, made)
         view = self._view
         made = Primitive.from_exemplars(
             node.id,
@@ -153,7 +153,7 @@ class Snapshots:
             mean_duration_s=mean_duration_s,
             parent=node.parent,
         )
-        return _Made(node.changed_at, basis, seen, made)
+        return _Made(node.revision, basis, seen, made)
 
 
 def read_model(view: View, seen: LeftRightHMM) -> LeftRightHMM:

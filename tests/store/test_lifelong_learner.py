@@ -173,6 +173,15 @@ def test_a_frozen_primitive_does_not_change(taught: MotionLearner, motions: Reco
         assert life.snapshot()[1].n_exemplars == before.n_exemplars
 
 
+def test_what_a_command_leaves_as_it_was_is_not_undone(taught: MotionLearner) -> None:
+    life = life_of(taught)
+    life.execute(Unfreeze(1))  # which is not frozen
+    assert life.reversible() == ()
+    life.execute(Rename(1, "bow"))
+    life.execute(Unfreeze(1))
+    assert life.reversible() == (2,)
+
+
 def test_paused_learning_recognises_and_learns_nothing(
     taught: MotionLearner, later: FloatArray
 ) -> None:

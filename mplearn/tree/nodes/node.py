@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from itertools import count
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -15,7 +14,6 @@ from ..exemplars.spread import without
 from .clustering import most_redundant
 
 Happening: TypeAlias = Literal["born", "split", "merged", "moved", "undone"]
-_CHANGES = count()  # of all nodes
 
 
 class StoodFor(NamedTuple):
@@ -97,7 +95,7 @@ class Node:
         apart: Ids of leaves that a person said are other motions: the rules never merge them.
         frozen: Whether a person said that it is to stay as it is: nothing changes its exemplars.
         stood_for: Segments and frames that went for want of room, by the exemplar nearest to them.
-        changed_at: A number that no node had before, since it changed.
+        revision: Another object after each change, and in each node, of whatever process.
 
     Example:
         >>> import numpy as np
@@ -124,12 +122,12 @@ class Node:
     apart: frozenset[int] = frozenset()
     frozen: bool = False
     stood_for: Mapping[int, tuple[int, int]] = field(default_factory=dict)
-    changed_at: int = field(init=False, repr=False)
-    _kept: NodeState | None = field(init=False, repr=False)
+    revision: object = field(init=False, repr=False)
+    _kept: tuple[object, NodeState] | None = field(init=False, repr=False, default=None)
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Set an attribute, and let its state be made anew."""
-        self.__dict__.update({name: value, "changed_at": next(_CHANGES), "_kept": None})
+        """Set an attribute, and let its state be looked at anew."""
+        self.__dict__.update({name: value, "revision": object()})
 
     def __eq__(self, other: object) -> bool:
         """Whether it is a node of the same content, frames apart."""
@@ -199,11 +197,13 @@ class Node:
     def state(self, blob_of: Callable[[int], Blob]) -> NodeState:
         """Return everything, with the exemplars: the same object as long as nothing has changed.
 
+        What was set to what it is, as by who unfreezes what is not frozen, has not changed.
+
         Args:
             blob_of: Returns the frames of an exemplar, by its number.
         """
-        made = self._kept
-        if made is None:
+        revision, made = self._kept or (None, None)
+        if made is None or not (revision is self.revision or self._is(made)):
             made = NodeState(
                 id=self.id,
                 parent=self.parent,
@@ -221,7 +221,7 @@ class Node:
                 frozen=self.frozen,
                 stood_for=tuple(StoodFor(n, *of) for n, of in sorted(self.stood_for.items())),
             )
-            self.__dict__["_kept"] = made
+        self.__dict__["_kept"] = self.revision, made
         return made
 
     @classmethod
@@ -243,8 +243,12 @@ class Node:
             frozen=state.frozen,
             stood_for={number: (n, n_frames) for number, n, n_frames in state.stood_for},
         )
-        node.__dict__["_kept"] = state
+        node.__dict__["_kept"] = node.revision, state
         return node
+
+    def _is(self, state: NodeState) -> bool:
+        """Whether a state describes it as it is."""
+        return self.matrix is state.matrix and self._plain() == Node.from_state(state)._plain()
 
     def _plain(self) -> tuple[Any, ...]:
         """Return all but the distances, for comparison."""
