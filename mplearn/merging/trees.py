@@ -43,8 +43,8 @@ def merge_trees(trees: Sequence[PrimitiveTree], least: int = 2) -> MergedTree:
 
     A leaf of one becomes one with a leaf of those before it if the distance from the exemplars of
     each to those of the other is, on average, hardly above its radius; one to one, the nearest
-    pairs first. All others stay what they were. Statistics add up as if one tree had seen all
-    segments; those that wait in the roots are placed where they fit now.
+    pairs first. All others, and what is frozen, stay what they were. Statistics add up as if one
+    tree had seen all segments; those that wait in the roots are placed where they fit now.
 
     Models are made once, and distances within nodes measured once, however many trees there are.
 
@@ -213,8 +213,9 @@ def _matches(
     """Return the pairs of leaves that are one primitive.
 
     Of the pairs that are nearest by their mean trajectories those are compared whose most typical
-    exemplars are not far from the other leaf.
+    exemplars are not far from the other leaf. One that is frozen stays as it is.
     """
+    mine, theirs = ([id for id in ids if not tree.node(id).frozen] for ids in (mine, theirs))
     if not (mine and theirs):
         return []
     config, bank = tree.config, tree.bank

@@ -83,6 +83,19 @@ def test_merging_changes_nobody_and_three_are_as_good_as_two(shards) -> None:
     assert counts(nested[0]) == counts(nested[1]) == counts(three)
 
 
+@pytest.mark.parametrize("whose", [0, 1])
+def test_what_is_frozen_stays_as_it_is(shards, whose) -> None:
+    learners = [MotionLearner.from_state(each.state()) for each in shards]
+    id = learners[whose].tree.leaves[0]
+    held = learners[whose].tree.exemplars(id)
+    learners[whose].freeze(id)
+    merged = merge(learners)
+    (frozen,) = [node for node in merged.tree.nodes if node.frozen]
+    assert merged.tree.exemplars(frozen.id) == held
+    assert len(merged.tree.leaves) == len(merge(shards).tree.leaves) + 1
+    assert MotionLearner.from_state(merged.state()).state() == merged.state()
+
+
 def test_exemplars_are_shared_however_many_are_merged(shards) -> None:
     seen = {
         id(frames)
