@@ -202,27 +202,11 @@ class Node:
         Args:
             blob_of: Returns the frames of an exemplar, by its number.
         """
-        revision, made = self._kept or (None, None)
-        if made is None or not (revision is self.revision or self._is(made)):
-            made = NodeState(
-                id=self.id,
-                parent=self.parent,
-                born_at=self.born_at,
-                members=np.array(self.members, np.int64),
-                frames=tuple(map(blob_of, self.members)),
-                matrix=self.matrix,
-                n_placed=self.n_placed,
-                n_frames=self.n_frames,
-                children=self.children,
-                settled=tuple(sorted(self.settled)),
-                history=self.history,
-                whole=self.whole,
-                apart=tuple(sorted(self.apart)),
-                frozen=self.frozen,
-                stood_for=tuple(StoodFor(n, *of) for n, of in sorted(self.stood_for.items())),
-            )
-        self.__dict__["_kept"] = self.revision, made
-        return made
+        kept = self._kept
+        if kept is None or kept[0] is not self.revision:
+            made = kept[1] if kept and self._is(kept[1]) else self._described(blob_of)
+            kept = self.__dict__["_kept"] = self.revision, made
+        return kept[1]
 
     @classmethod
     def from_state(cls, state: NodeState) -> Node:
@@ -245,6 +229,26 @@ class Node:
         )
         node.__dict__["_kept"] = node.revision, state
         return node
+
+    def _described(self, blob_of: Callable[[int], Blob]) -> NodeState:
+        """Return everything, see `state`."""
+        return NodeState(
+            id=self.id,
+            parent=self.parent,
+            born_at=self.born_at,
+            members=np.array(self.members, np.int64),
+            frames=tuple(map(blob_of, self.members)),
+            matrix=self.matrix,
+            n_placed=self.n_placed,
+            n_frames=self.n_frames,
+            children=self.children,
+            settled=tuple(sorted(self.settled)),
+            history=self.history,
+            whole=self.whole,
+            apart=tuple(sorted(self.apart)),
+            frozen=self.frozen,
+            stood_for=tuple(StoodFor(n, *of) for n, of in sorted(self.stood_for.items())),
+        )
 
     def _is(self, state: NodeState) -> bool:
         """Whether a state describes it as it is."""
