@@ -41,6 +41,8 @@ def test_a_fault_of_the_motion_is_found_in_any_format(
     assert not verdict.in_order and not verdict.problems
     assert verdict.misfit.position_m > 0.03
     assert verdict.left.position_m < 2e-5
+    if fault == "one joint backward":
+        assert verdict.faults[0].problem.endswith(" turns the other way")
     if fault in ALONE:
         (verdict,) = check(alone(path), model)
         assert [found.kind for found in verdict.faults] == [kind]

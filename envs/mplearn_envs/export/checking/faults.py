@@ -173,7 +173,7 @@ def _joints(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
         sign = np.where(np.isin(np.arange(len(model.joint_names)), flipped), -1.0, 1.0)
         yield Fault(
             "mirrored",
-            f"{_listed(names)} turn the other way",
+            f"{_listed(names)} turn{'s' * (len(names) == 1)} the other way",
             _hinges(reading, lambda values: values * sign),
         )
 
