@@ -226,3 +226,16 @@ def test_a_foot_on_its_way_is_sooner_there(corners):
     dcm = np.array([0.2, 0.0])
     on_its_way = step_of(corners, FEET, dcm, REACH, 0, since_s=0.1)
     assert on_its_way.time_s < step_of(corners, FEET, dcm, REACH, 0, since_s=0.0).time_s
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_the_pendulum_is_wanted_well_inside_the_soles(corners, side):
+    within = REACH._replace(inside=0.01)
+    for x in (0.1, 0.3, 0.6):
+        falling = Falling(corners, FEET, np.array([x, 0.0]), RATE)
+        (place, missing), (same, more) = (
+            landing_place(falling, side, 0.3, reach, BESIDE) for reach in (REACH, within)
+        )
+        assert np.array_equal(place, same)
+        assert 0.0 <= more - missing <= 0.01 + 1e-12
+    assert missing > 0.0 and more - missing == pytest.approx(0.01)  # that cannot be caught

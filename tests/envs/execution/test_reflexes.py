@@ -59,19 +59,25 @@ def test_push_of_36_ns_is_survived_in_eight_directions(robot, planner, simulatio
     assert not after.fallen and after.n_steps == 0
 
 
+def _survived_amid_a_kick(robot, planner, simulation, share, angle, impulse_ns):
+    """Push with the left foot in the air, after a share of that time; return the steps taken."""
+    simulation.reset()
+    plan = planner.plan(rest_reference(robot), planner.motion(sweep({}, KICK, 0.8), RATE_HZ), 0.5)
+    aloft = np.flatnonzero(plan.up == 0) * (len(plan.commands) // (len(plan.q) - 1))
+    start = int(aloft[int(share * len(aloft))])
+    push = _push(simulation, np.radians(angle), impulse_ns)
+    report = simulation.perform(plan, pushes=push._replace(steps=np.array([[start, start + 25]])))
+    assert not report.fallen
+    assert not simulation.perform(planner.hold(report.end, 1.0)).fallen
+    return report.n_steps
+
+
 @pytest.mark.parametrize("angle", [-45.0, -30.0, 0.0, 90.0])
 def test_who_is_pushed_on_one_foot_puts_the_other_one_down_or_across(
     robot, planner, simulation, angle
 ):
     """The left foot is in the air, the right one stands: to its side only a crossing step helps."""
-    simulation.reset()
-    plan = planner.plan(rest_reference(robot), planner.motion(sweep({}, KICK, 0.8), RATE_HZ), 0.5)
-    aloft = np.flatnonzero(plan.up == 0) * (len(plan.commands) // (len(plan.q) - 1))
-    start = int(aloft[len(aloft) // 2])
-    push = _push(simulation, np.radians(angle), 36.0)
-    report = simulation.perform(plan, pushes=push._replace(steps=np.array([[start, start + 25]])))
-    assert not report.fallen and report.n_steps >= 1
-    assert not simulation.perform(planner.hold(report.end, 1.0)).fallen
+    assert _survived_amid_a_kick(robot, planner, simulation, 0.5, angle, 36.0) >= 1
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5])
@@ -79,14 +85,15 @@ def test_who_is_pushed_past_the_foot_that_stands_comes_down_and_steps_with_that(
     robot, planner, simulation, share
 ):
     """The left foot is in the air: it comes down, the right one steps aside, the left follows."""
-    simulation.reset()
-    plan = planner.plan(rest_reference(robot), planner.motion(sweep({}, KICK, 0.8), RATE_HZ), 0.5)
-    aloft = np.flatnonzero(plan.up == 0) * (len(plan.commands) // (len(plan.q) - 1))
-    start = int(aloft[int(share * len(aloft))])
-    push = _push(simulation, np.radians(-90.0), 24.0)
-    report = simulation.perform(plan, pushes=push._replace(steps=np.array([[start, start + 25]])))
-    assert not report.fallen and report.n_steps >= 3
-    assert not simulation.perform(planner.hold(report.end, 1.0)).fallen
+    assert _survived_amid_a_kick(robot, planner, simulation, share, -90.0, 24.0) >= 3
+
+
+@pytest.mark.parametrize("angle", [105.0, 120.0, 135.0, 150.0])
+def test_a_foot_that_lands_on_its_toes_comes_down_on_its_whole_sole(
+    robot, planner, simulation, angle
+):
+    """Else it stays on them, its heel in the air, and the robot falls over them."""
+    assert _survived_amid_a_kick(robot, planner, simulation, 0.8, angle, 36.0) >= 1
 
 
 def test_small_push_needs_no_step(robot, planner, simulation):
