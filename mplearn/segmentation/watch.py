@@ -88,9 +88,8 @@ def _watch_motion(
         m.rest_frames = p.still
         m.dip_frame = -1
     elif m.valley < share * m.peak and s >= max(m.valley / share, low):
-        shortest = (
-            p.shortest // 2 if m.mode == OPENING else p.shortest
-        )  # it began before the stream
+        # a stream's first motion may have begun before
+        shortest = p.shortest // 2 if m.mode == OPENING else p.shortest
         if m.valley_frame - m.start >= shortest:
             sure = 1.0 - m.valley / (share * m.peak)
             middle = _dip_middle(m, max(m.valley / share, low), speeds)

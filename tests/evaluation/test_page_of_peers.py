@@ -9,6 +9,7 @@ from mplearn.demonstrator import demonstrate
 from mplearn.evaluation.experiments import page_of_peers
 from mplearn.evaluation.experiments.page_of_peers import (
     METHODS,
+    PEERS,
     activity_peers_table,
     boundary_peers_table,
 )
@@ -63,7 +64,7 @@ def test_a_library_that_breaks_is_left_out_and_named(
         activity_peers_table([planted])
 
 
-def test_boundaries_of_each_are_scored_alike() -> None:
+def test_boundaries_of_each_are_scored_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = demonstrate(["BAR", "BAL"] * 8, seed=2, rate_hz=30.0)
     whole = [
         LabelledSegment(a.start, b.end, "raise", "anna")
@@ -78,3 +79,11 @@ def test_boundaries_of_each_are_scored_alike() -> None:
     assert ours[0] == "ours"
     assert float(ours[4]) > 0.7
     assert {row[0] for row in table.rows} >= {"ours", "ruptures, PELT"}
+
+    def broken(*_: object) -> list[int]:
+        raise AttributeError("no trapz")
+
+    monkeypatch.setattr(page_of_peers, "PEERS", {"theirs": ("json", False, broken)} | PEERS)
+    again = boundary_peers_table([take])
+    assert again.rows[0][0] == "ours" and len(again.rows) == len(table.rows)
+    assert "theirs (AttributeError: no trapz)" in again.note
