@@ -89,14 +89,13 @@ def _watch_motion(
         m.dip_frame = -1
     elif m.valley < share * m.peak and s >= max(m.valley / share, low):
         # a stream's first motion may have begun before
-        length = m.valley_frame - m.start
-        if length >= (p.shortest // 2 if m.mode == OPENING and m.start == 0 else p.shortest):
+        shortest = p.shortest // 2 if m.mode == OPENING else p.shortest
+        if m.valley_frame - m.start >= shortest:
             sure = 1.0 - m.valley / (share * m.peak)
             middle = _dip_middle(m, max(m.valley / share, low), speeds)
             cause = DIP if m.valley < hysteresis * m.peak else KNOWN
             n = close(m, p, middle, sure, False, cause, out, 0)
-            if length >= p.shortest:  # less may have been a spike: how fast it moves is not known
-                m.mode = MOVING
+            m.mode = MOVING
         m.valley = s
         m.valley_frame = t
     return n

@@ -48,17 +48,6 @@ def test_a_stream_that_begins_in_the_midst_of_a_motion_is_cut_at_its_first_turn(
     np.testing.assert_allclose(ends, turn_s + np.arange(3.0), atol=1.01 / rate_hz)
 
 
-@pytest.mark.parametrize("name", ["kohlmorgen-lemm", "zero-velocity"])
-@pytest.mark.parametrize("at", [2, 6])
-def test_a_spike_at_the_beginning_does_not_make_all_after_it_still(name, at):
-    t = np.arange(1000) / 50.0
-    frames = np.outer(np.sin(np.pi * (t + 0.4)), [1.0, 0.5])
-    frames[at] += 10.0
-    ends = np.array([each.end for each in make_segmenter(name, 2, 50.0).segment(frames)]) / 50.0
-    for turn_s in np.arange(2.1, 19.0):
-        assert np.abs(ends - turn_s).min() < 0.05
-
-
 @every_segmenter
 @given(seed=st.integers(0, 10_000), scale=st.sampled_from([1e-6, 1.0, 1e6]))
 @settings(max_examples=15, deadline=None)
