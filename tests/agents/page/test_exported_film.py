@@ -4,8 +4,14 @@ import json
 
 import numpy as np
 
+from benchmarks.teaching_session import until
 from mplearn_envs.export import RobotModel, RobotMotion, Span, format_of, perform
 from mplearn_envs.robot import humanoid
+
+
+def shown_s(page):
+    """Return what the clock of a film shows; its policy lets nothing wait inside the page."""
+    return page.evaluate("parseFloat(document.getElementById('clock').textContent)")
 
 
 def test_a_film_shows_what_the_robot_does(new_page, tmp_path):
@@ -14,14 +20,14 @@ def test_a_film_shows_what_the_robot_does(new_page, tmp_path):
     path = tmp_path / "bow.html"
     format_of("html").write(path, [motion], model)
     page = new_page(path.as_uri())
-    page.wait_for_function("parseFloat(document.getElementById('clock').textContent) > 0.1")
+    until(lambda: shown_s(page) > 0.1, 10, "the film plays")
     page.emulate_media(reduced_motion="reduce")
     asked = []
     page.on("request", lambda request: asked.append(request.url))
     page.reload()  # now it waits to be played
     assert page.inner_text("#play") == "Play"
     page.click("#play")
-    page.wait_for_function("parseFloat(document.getElementById('clock').textContent) > 0.1")
+    until(lambda: shown_s(page) > 0.1, 10, "the film plays")
     page.evaluate("film.pause()")
     for frame in (0, len(motion) // 2, len(motion) - 1):
         there = page.evaluate(f"film.bodiesAt({frame}).map((body) => body.p)")

@@ -362,7 +362,7 @@ def test_who_moves_is_drawn_where_there_is_no_robot(new_page):
         server.hear(world.stream())
         server.hear({"kind": "person", "shapes": world.bodies()["person"]})
         page = new_page(server.url)
-        assert page.evaluate(ink) < 100
+        until(lambda: page.evaluate(ink) < 100, 20, "an empty stage")  # all ink until it is drawn
         server.hear(*world.live(0, 10))
         until(lambda: page.evaluate(ink) > 500, 20, "a person")
         assert page.get_attribute("html", "data-figures") is None
