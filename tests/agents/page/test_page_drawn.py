@@ -36,6 +36,18 @@ def rows(page):
     return page.locator("#tree .row")
 
 
+def what_is_sent(page):
+    """Return what says all that a page sends from its next connection on."""
+    sent = []
+    page.on("websocket", lambda socket: socket.on("framesent", lambda text: sent.append(text)))
+
+    def so_far():
+        page.evaluate("0")  # who waits without asking the page hears nothing of it
+        return sent
+
+    return so_far
+
+
 def test_300_primitives_are_legible(server, shown):
     """Each has a line of its own in the tree; the graph shows what is around one."""
     boxes = shown.evaluate(
@@ -339,13 +351,12 @@ def test_a_figure_is_shown_with_its_demonstrations(server, new_page):
     server.hear(world.stream())
     server.hear(world.knowledge(3))
     page = new_page(server.url)
-    sent = []
-    page.on("websocket", lambda socket: socket.on("framesent", lambda text: sent.append(text)))
+    sent = what_is_sent(page)
     page.reload()
     until(lambda: rows(page).count() == 3, 10)
     rows(page).first.click()
-    until(lambda: any('"show"' in text for text in sent), 5)
-    asked = next(json.loads(text) for text in sent if '"show"' in text)
+    until(lambda: any('"show"' in text for text in sent()), 5)
+    asked = next(json.loads(text) for text in sent() if '"show"' in text)
     pose = np.repeat(world.standing()[None], 30, axis=0)
     clip = messages.clip(asked["ref"], 30.0, [pose, pose[:20], pose[:25]])
     number = max(client.number for client in server.hub.clients)
@@ -411,16 +422,15 @@ def test_what_cannot_be_undone_cannot_be_asked_to_be(server, new_page):
     status = {"kind": "status", "source": "made up", "state": "live", "frames": 1}
     server.hear(status | {"undoable": [4, 6], "redoable": [], "entry": 6})
     page = new_page(server.url)
-    sent = []
-    page.on("websocket", lambda socket: socket.on("framesent", lambda text: sent.append(text)))
+    sent = what_is_sent(page)
     page.reload()
     until(lambda: rows(page).count() == 3, 10)
     assert page.locator("#undo").is_enabled()
     assert not page.locator("#redo").is_enabled()
     rows(page).first.click()
     page.keyboard.press("Delete")
-    until(lambda: any('"forget"' in text for text in sent), 5)
-    asked = next(json.loads(text) for text in sent if '"forget"' in text)
+    until(lambda: any('"forget"' in text for text in sent()), 5)
+    asked = next(json.loads(text) for text in sent() if '"forget"' in text)
     number = max(client.number for client in server.hub.clients)
     reply = {"kind": "reply", "client": number, "ref": asked["ref"], "ok": True, "entry": 7}
     server.hear(reply | {"text": "{1} is forgotten"})
@@ -428,11 +438,11 @@ def test_what_cannot_be_undone_cannot_be_asked_to_be(server, new_page):
     until(lambda: undo.count() == 1, 5)  # the status was said before it
     server.hear(status | {"undoable": [4, 6, 7], "redoable": [], "entry": 7})
     undo.click()
-    until(lambda: any('"undo"' in text for text in sent), 5)
-    assert next(json.loads(text) for text in sent if '"undo"' in text)["entry"] == 7
+    until(lambda: any('"undo"' in text for text in sent()), 5)
+    assert next(json.loads(text) for text in sent() if '"undo"' in text)["entry"] == 7
     page.keyboard.press("Delete")
-    until(lambda: sum('"forget"' in text for text in sent) == 2, 5)
-    ref = [json.loads(text)["ref"] for text in sent if '"forget"' in text][-1]
+    until(lambda: sum('"forget"' in text for text in sent()) == 2, 5)
+    ref = [json.loads(text)["ref"] for text in sent() if '"forget"' in text][-1]
     server.hear(reply | {"ref": ref, "entry": 9, "text": "{1} is forgotten"})
     until(lambda: undo.count() == 1, 5)
     server.hear(status | {"undoable": [], "redoable": [9], "entry": 10})
