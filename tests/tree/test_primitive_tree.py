@@ -1,7 +1,9 @@
 """The tree on streams whose truth is known: what it finds, keeps, forgets and refuses."""
 
+import copy
 import hashlib
 import json
+import pickle
 import subprocess
 import sys
 from dataclasses import replace
@@ -218,6 +220,21 @@ def test_state_resumes_bit_for_bit():
     for frames in session[13:]:
         second.insert(frames)
     assert digest(second.state()) == digest(straight.state())
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda tree: pickle.loads(pickle.dumps(tree))])
+def test_a_copy_goes_on_bit_for_bit_and_apart(copied):
+    some, others = Motions(12, D, 4), Motions(12, D, 5)
+    tree = new_tree()
+    for _, frames in some.session(3):
+        tree.insert(frames)
+    twin = copied(tree)
+    before = digest(twin.state())
+    later = [frames for _, frames in some.session(1) + others.session(2)]
+    said = [repr(tree.insert(frames)) for frames in later]
+    assert digest(twin.state()) == before
+    assert [repr(twin.insert(frames)) for frames in later] == said
+    assert digest(twin.state()) == digest(tree.state())
 
 
 def test_a_new_process_gives_the_same_bits():

@@ -103,7 +103,7 @@ class NodeIndex:
         self.members: list[list[int]] = []
         self._ids: list[int] = []
         self._room = np.zeros(_ROOM, _KNOWN)
-        self._known = self._room[:0]
+        self._n = 0
         self._leaf_ids: tuple[int, ...] | None = None
         self._widths: list[float] = []  # `_diameters` of the leaves, in order of size
         self._homes: dict[int, list[int]] | None = None  # nodes by exemplar, once it is asked for
@@ -112,6 +112,11 @@ class NodeIndex:
         n_slow = bank.n_channels * self._waves.shape[1]
         # mean, `nearest_others`, the mean's slow part
         self._of_node = SlotArrays((n_values,), (config.max_exemplars,), (n_slow,))
+
+    @property
+    def _known(self) -> NDArray[np.void]:
+        """What is known of each node, shape (n,); a view of its own in each copy of the index."""
+        return self._room[: self._n]
 
     @property
     def ids(self) -> IntArray:
@@ -160,7 +165,7 @@ class NodeIndex:
         self._leave(id, self.members[k])
         self._leaf_ids = None
         self._known[k:-1] = self._known[k + 1 :]
-        self._known = self._known[:-1]
+        self._n -= 1
         del self._ids[k], self.members[k]
 
     def enter(
@@ -209,10 +214,10 @@ class NodeIndex:
 
     def _open(self, k: int) -> None:
         """Make room for a node at a place."""
-        n = len(self._known)
-        if n == len(self._room):
-            self._room = np.concatenate([self._room, np.zeros(max(n, _ROOM), _KNOWN)])
-        self._known = self._room[: n + 1]
+        if self._n == len(self._room):
+            more = np.zeros(max(self._n, _ROOM), _KNOWN)
+            self._room = np.concatenate([self._room, more])
+        self._n += 1
         self._known[k + 1 :] = self._known[k:-1]
 
     def _forget(self, k: int) -> None:
@@ -400,7 +405,7 @@ class NodeIndex:
     def fork(self) -> NodeIndex:
         """Return an index that knows the same, and goes on apart; see `ExemplarBank.fork`."""
         twin = copy(self)
-        twin._room = twin._known = self._known.copy()
+        twin._room, twin._n = self._known.copy(), self._n
         twin._ids, twin._widths, twin._homes = list(self._ids), list(self._widths), None
         twin.members = list(self.members)
         twin._of_node = self._of_node.fork()
