@@ -151,6 +151,7 @@ class ReadReport:
         notes: What was found out or done that the file does not say, a sentence each.
         warnings: What contradicts itself, or is in doubt, a sentence each; one in doubt names the
             option that settles it.
+        up_in_doubt: Whether another axis than ``up`` may point up.
 
     Example:
         >>> from pathlib import Path
@@ -169,6 +170,7 @@ class ReadReport:
     left_out: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    up_in_doubt: bool = False
 
 
 @dataclass(frozen=True, eq=False)

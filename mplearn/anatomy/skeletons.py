@@ -28,7 +28,6 @@ from .plan import find_half, find_plan
 
 MOST_NODES = 400  # joints at different places; the largest skeletons of people have 165 joints
 SOME_FRAMES = 120  # of a recording are looked at
-_IN_DOUBT = ("points up is in doubt", "no person by its joints")  # which axis is up
 
 
 def recognise_skeleton(recording: Recording, names: Mapping[str, str] | None = None) -> BodyMap:
@@ -76,8 +75,7 @@ def recognise_skeleton(recording: Recording, names: Mapping[str, str] | None = N
             f"named so; {option('names')} says which joint is which"
         )
     report = recording.report
-    told = (*report.notes, *report.warnings) if report else ()
-    doubt = report is None or any(doubtful in text for text in told for doubtful in _IN_DOUBT)
+    doubt = report is None or report.up_in_doubt
     unit_m = (report.unit_m if report else None) or 1.0
     chosen = likelier(recording.name, tree, plan, half, sure=bool(names))
     person = Person(recording.name, tree, chosen, names or {}, unit_m=unit_m, up_in_doubt=doubt)

@@ -13,6 +13,9 @@ class Findings:
     Args:
         format: Name of the dialect.
 
+    Attributes:
+        up_in_doubt: Whether another axis may point up than is taken.
+
     Example:
         >>> findings = Findings("shouts")
         >>> findings.leave_out(["echo"])
@@ -23,6 +26,7 @@ class Findings:
 
     def __init__(self, format: str) -> None:
         self.format = format
+        self.up_in_doubt = False
         self._left_out: list[str] = []
         self._notes: list[str] = []
         self._warnings: list[str] = []
@@ -49,4 +53,5 @@ class Findings:
             tuple(self._left_out),
             tuple(self._notes),
             tuple(self._warnings),
+            self.up_in_doubt,
         )

@@ -205,6 +205,7 @@ def _settled_up(
         )
     told = space.says_up and not found.contradicts and not found.inverted
     if found.doubtful and not told and len(names) >= _FEW:
+        findings.up_in_doubt = True
         findings.warn(f"whether {found.up} points up is in doubt; {option('up_axis')} settles it")
     return found.up
 

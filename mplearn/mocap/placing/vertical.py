@@ -39,6 +39,7 @@ _FLOOR = 3.0  # a wall through the origin looks like one as well
 _FLOOR_M = (-0.06, 0.13)  # height of the lowest points of a standing foot
 _FLAT_M, _STEADY_M = (0.3, 0.4), 0.04  # how high who lies is, or on the side; how steady the level
 _JUST_M, _RESTLESS_M = 0.07, 0.12  # height of the lowest points of who lies, and how it varies
+_LYING_M = (0.06, 0.45)  # height of the middle of who lies, or on the side
 _AT_ZERO_M = 0.02  # so close to where all is counted from is there
 _FLOOR_LIFT_M = 0.25  # jumps are rare and low
 _STEADY, _CONTACT, _TALL = 2.0, 1.0, 1.5  # nat, at most
@@ -117,8 +118,8 @@ def find_vertical(
         ahead = float(evidence[up] - np.delete(evidence, up).max())
         leans = up == start and bool(posture[up] >= _LEANING) and ground.agrees(up)
         sure = likely and ahead >= _IN_DOUBT and (leans or ground.is_only(up))
-    agreed = says_so or (up == start == stands and ground.at_zero[up])
-    sure = sure and (agreed or not ground.may_be_lain_on(up))
+    upright = up == start == stands and bool(ground.at_zero[up])
+    sure = sure and (says_so or not ground.may_be_lain_on(up, upright=upright))
     inverted = bool(posture[up ^ 1] >= _TELLING) and not ground.at_zero[up]
     return Vertical(DIRECTIONS[up], up != start, not sure, inverted, tuple(map(float, evidence)))
 
@@ -130,6 +131,7 @@ class _Ground:
     Attributes:
         at_zero: Whether they are where most laboratories put zero, as feet or who lies, shape (6,).
         lain_on: Whether somebody might lie there, shape (6,).
+        over: Whether the body is on one side of zero, and as far from it as who lies, shape (6,).
         level: Whether who moves goes along it rather than up or down, shape (6,).
         rests: Whether most points stay close above one level, shape (6,).
         from_hips: Whether points are counted from the hips: then no floor is at zero.
@@ -138,6 +140,7 @@ class _Ground:
 
     at_zero: BoolArray
     lain_on: BoolArray
+    over: BoolArray
     level: BoolArray
     rests: BoolArray
     from_hips: bool
@@ -147,7 +150,7 @@ class _Ground:
     def unseen(cls) -> _Ground:
         """Return what is known where no feet are."""
         no = np.zeros(6, dtype=np.bool_)
-        return cls(no, no, ~no, no, False, np.zeros(6))
+        return cls(no, no, no, ~no, no, False, np.zeros(6))
 
     @classmethod
     def of(cls, points: FloatArray, seen: BoolArray, names: tuple[str, ...]) -> _Ground:
@@ -163,13 +166,15 @@ class _Ground:
         flat, wide = ((above < far).sum(axis=(0, 1)) > 0.5 * seen.sum() for far in _FLAT_M)
         rests = flat & (high - least < _STEADY_M)
         lain_on = at_zero & wide & (least <= _JUST_M) & (high <= least + _RESTLESS_M)
+        middle = np.nanmedian(np.where(seen[..., None], along, np.nan), axis=(0, 1))
+        over = at_zero & (middle >= _LYING_M[0]) & (middle <= _LYING_M[1])
         rises_m = high - least
         farthest = rises_m.reshape(3, 2).max(axis=1)
         level = low_lifts | (np.repeat(farthest, 2) < farthest.max())
         range_m = high - low + _ROUGH_M
         steadiness = np.clip(np.log(np.median(range_m) / range_m), -_STEADY, _STEADY)
         evidence = np.where(at_zero, _FLOOR, 0.0) + steadiness
-        return cls(at_zero, lain_on, level, rests, from_hips, evidence)
+        return cls(at_zero, lain_on, over, level, rests, from_hips, evidence)
 
     def agrees(self, up: int) -> bool:
         """Whether nothing speaks against one who is upright along the direction that is usual."""
@@ -188,9 +193,13 @@ class _Ground:
         """Whether a floor is at zero of a direction, and nobody might lie on another."""
         return bool(self.at_zero[up]) and not self._is_elsewhere(up)
 
-    def may_be_lain_on(self, up: int) -> bool:
-        """Whether somebody might lie on a floor at zero of another direction that is usually up."""
-        return any(self.lain_on[k] for k in _UPWARD if k != up)
+    def may_be_lain_on(self, up: int, *, upright: bool) -> bool:
+        """Whether somebody might lie on a floor at zero of another direction that is usually up.
+
+        Who stands upright on the usual floor does so only if all of the body is above the other.
+        """
+        lain_on = self.over if upright else self.lain_on
+        return any(lain_on[k] for k in _UPWARD if k != up)
 
     def _is_elsewhere(self, up: int) -> bool:
         """Whether a floor is at zero of another direction: one likely, or one to lie on."""

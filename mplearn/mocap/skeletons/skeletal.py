@@ -107,6 +107,7 @@ def skeletal_recording(
         findings.note(
             "no person by its joints: unit and vertical axis are those usual in the format"
         )
+        findings.up_in_doubt = hints.up_axis is None
         hints = replace(
             hints, unit_m=hints.unit_m or space.unit_m, up_axis=hints.up_axis or space.up
         )
