@@ -10,7 +10,7 @@ import numpy as np
 from ..recording import FloatArray, Skeleton
 
 TOGETHER = 0.006  # joints closer than this share of the skeleton's extent are one
-LOOSE, LOOSE_M = 0.25, 0.02  # how much a bone may stretch and still be one: of its length, and [m]
+LOOSE, LOOSE_M = 0.5, 0.05  # how much a bone may stretch and still be one: of its length, and [m]
 LIKE, LIKE_FLAT = 0.2, 0.012  # how unlike two bones of a pair may be: relative, of the extent
 
 
