@@ -17,6 +17,7 @@ _TICKS = (1.2e17, 9e17)  # what .NET and Windows count in our days; nanoseconds 
 _EVEN = 0.3  # of a frame: what rounding leaves
 _ROUNDED = 0.6  # of the last decimal: rounding leaves a half, the line through all is not exact
 _OFTEN = 5  # frames that would be missing: where they lie as evenly as rounding has it, none is
+_OFF = 0.75  # of a frame, that the jitter of a clock leaves; where one is missing it is more
 _UNEVEN, _MANY = 0.1, 0.2  # a clock jitters if such a share of its steps is off by such a share
 
 
@@ -53,7 +54,7 @@ class Clock:
         exact = np.where(share == 0.0, values[after - 1], values[after])  # spares NaN beside it
         frames = np.where((share == 0.0) | (share == 1.0), exact, frames)
         near = np.where(share[:, 0] < 0.5, after - 1, after)
-        frames[(gap >= 1.5) & (np.abs(self.places[near] - at) > 0.5)] = np.nan
+        frames[(gap >= 1.5) & (np.abs(self.places[near] - at) > _OFF)] = np.nan
         return frames
 
 
@@ -126,9 +127,10 @@ def _jitters(times_s: FloatArray) -> bool:
     """Whether times lie around an even clock of which no frame is missing, many of them off it."""
     steps = np.diff(times_s)
     uneven = np.abs(steps / np.median(steps) - 1.0) > _UNEVEN
-    even = np.linspace(times_s[0], times_s[-1], len(times_s))
-    off = np.abs(times_s - even).max() / steps.mean()
-    return bool(uneven.mean() >= _MANY and off < 0.5 and steps.max() < 2.5 * steps.mean())
+    index = np.arange(len(times_s), dtype=np.float64)
+    even = np.polyval(np.polyfit(index, times_s - times_s[0], 1), index)
+    off = np.abs(times_s - times_s[0] - even).max() / steps.mean()
+    return bool(uneven.mean() >= _MANY and off < _OFF and steps.max() < 2.5 * steps.mean())
 
 
 def in_seconds(times: FloatArray, unit_s: float | None, findings: Findings) -> FloatArray:

@@ -121,6 +121,24 @@ def test_segments_that_were_not_seen(tmp_path: Path, truth: Truth) -> None:
     assert np.flatnonzero(np.isnan(head).any(axis=1)).tolist() == [3, 4, 5, 6]
 
 
+def test_shoulders_drawn_aside_one_by_one_from_a_trunk_that_begins_between_them(
+    tmp_path: Path, truth: Truth
+) -> None:
+    limbs = limbs_of(truth.body, truth.postures[:100])
+    poses, labels = theia_poses(limbs), list(THEIA_PARTS)
+    torso, *shoulders = (labels.index(name) for name in ("torso", "l_uarm", "r_uarm"))
+    aside = poses[:, shoulders[0], :3, 3] - poses[:, torso, :3, 3]
+    swing = 0.5 * np.sin(np.arange(100) / 8.0)[:, None]
+    for side, sign in zip(shoulders, (1.0, -1.0), strict=True):
+        poses[:, side, :3, 3] += aside * sign * np.maximum(sign * swing, 0.0)
+    poses[:, torso, :3, 3] = sum(poses[:, side, :3, 3] for side in shoulders) / 2
+    names = [f"{segment}_4X4" for segment in labels]
+    body = recognise(opened(write_c3d_poses(tmp_path / "a.c3d", poses, names, rate_hz=RATE_HZ)))
+    assert not body.warnings
+    for side in "lr":
+        assert dict(body.parts)[f"shoulder_{side}"] == (f"{side}_uarm",)
+
+
 @pytest.mark.parametrize("labels", [["a", "b"], ["pelvis_4X4", "box_4X4"], []])
 def test_poses_of_no_person_are_refused(tmp_path: Path, labels: list[str]) -> None:
     poses = np.tile(np.eye(4), (5, 2, 1, 1))

@@ -49,7 +49,7 @@ def spelling(draw: st.DrawFn) -> dict[str, object]:
     return {
         "name": draw(
             st.sampled_from(
-                ["{m}, {A}", "pos_{a}_{m}",
+                ["{m}, {A}", "pos_{a}_{m}", "Pos{A}_{m}",
                  "{m}.{a}", "{m}_{A}", "{m} {a}", "{m}:{A}", "{m}-{a}", "{m}{A}", "{m}_pos_{a}",
                  "{m} ({A})", "{a}_{m}", "Anna:{m}.{a}"]
             )
@@ -123,9 +123,11 @@ def test_names_above_axes_and_units(standing: Recording, tmp_path: Path) -> None
             assert recording.markers == pytest.approx(standing.markers, abs=1e-4, nan_ok=True)
 
 
-def test_a_jittering_clock_is_evened(tmp_path: Path) -> None:
-    rng = np.random.default_rng(0)
-    times = np.arange(200) / 30.0 + rng.uniform(-0.012, 0.012, 200)
+@pytest.mark.parametrize(("kind", "seed"), [("uniform", 0), *(("normal", k) for k in range(4))])
+def test_a_jittering_clock_is_evened(tmp_path: Path, kind: str, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    jitter = rng.uniform(-0.012, 0.012, 200) if kind == "uniform" else rng.normal(0, 0.005, 200)
+    times = np.arange(200) / 30.0 + jitter
     lines = ["time,knee,hip"]
     lines += [f"{t:.6f},{np.sin(3 * t):.8f},{0.1 * t:.8f}" for t in times]
     path = tmp_path / "a.csv"

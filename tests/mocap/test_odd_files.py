@@ -420,12 +420,13 @@ def test_points_of_a_picture_with_a_depth_of_zero_are_told(
     check(path, flat, standing.marker_names, "all points have the same x")
 
 
+@pytest.mark.parametrize("form", ["_{}", "[{}]"])
 def test_numbered_axes_are_not_taken_for_markers_silently(
-    tmp_path: Path, standing: Recording, points: np.ndarray
+    tmp_path: Path, standing: Recording, points: np.ndarray, form: str
 ) -> None:
     path = tmp_path / "a.csv"
     text = table(points, standing.marker_names)
-    path.write_text(re.sub(r"_([xyz])\b", lambda m: f"_{'xyz'.index(m[1])}", text))
+    path.write_text(re.sub(r"_([xyz])\b", lambda m: form.format("xyz".index(m[1])), text))
     report = open_recording(path).report
     assert report is not None and any("end their names in _x" in x for x in report.warnings)
 

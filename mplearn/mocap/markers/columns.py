@@ -47,7 +47,7 @@ _AXES = (
         rf"(?P<name>.+?){_SEP}+(?P<axis>[xyz]){_SEP}+(?:coord(?:inate)?|pos(?:ition)?)$", re.I
     ),
     re.compile(r"(?P<name>.+?)(?P<axis>[xyz])$", re.I),
-    re.compile(rf"(?:(?:pos|position){_SEP}+)?(?P<axis>[xyz]){_SEP}?(?P<name>.+)$", re.I),
+    re.compile(rf"(?:(?:pos|position){_SEP}*)?(?P<axis>[xyz]){_SEP}?(?P<name>.+)$", re.I),
 )  # fmt: skip
 # fmt: off
 _NO_POSITION = frozenset((
@@ -253,7 +253,7 @@ def numbered_triples(names: Sequence[str]) -> list[str]:
     """
     groups: defaultdict[str, list[str]] = defaultdict(list)
     for name in names:
-        if match := re.fullmatch(rf"(.+?){_SEP}?[0-3]", name):
+        if match := re.fullmatch(rf"(.+?){_SEP}?(?:[0-3]|\[[0-3]\])", name):
             groups[match[1]].append(name)
     triples = [", ".join(group) for group in groups.values() if len(group) == 3]
     return triples if 6 * len(triples) > len(names) else []
