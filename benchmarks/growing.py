@@ -71,6 +71,7 @@ def _show(
             shown, slowest = teacher.perform(motion), 0.0
             for _ in shown:
                 begin = time.process_time()
+                learner._form_next()
                 learner.tree.pass_time()
                 slowest = max(slowest, time.process_time() - begin)
             begin = time.process_time()

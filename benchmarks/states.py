@@ -37,6 +37,7 @@ class Teacher:
 
 def teach(learner: MotionLearner, frames: np.ndarray) -> None:
     """Let a learner learn from a segment, as if its segmenter had closed it."""
+    learner._form_rest()
     start = learner.n_frames
     learner.n_frames += len(frames)
     learner._stream_start = learner.n_frames

@@ -45,7 +45,7 @@ from .events import (
 )
 from .foresight import NextMotion
 from .known_motions import INSIDE, UNKNOWN, KnownMotions
-from .learner_state import FILES, LearnerState
+from .learner_state import FILES, Closing, LearnerState
 from .reversal import Known, LearnerEdit
 from .shown_once import with_shown_once
 from .snapshot import Snapshots
@@ -118,6 +118,8 @@ class MotionLearner:
         self._absurd = AbsurdFrames(len(config.channels), config.rate_hz)
         self._paused = False
         self._looking: Recogniser | None = None
+        self._closing: Closing | None = None  # as long as it may form one primitive more
+        self._late: list[Event] = []  # which the next frame brings
         self._under_way = KnownMotions(width, config.rate_hz)
 
     def __repr__(self) -> str:
@@ -304,6 +306,7 @@ class MotionLearner:
             >>> len(change.splits[0].into), len(learner.snapshot())
             (2, 3)
         """
+        self._before_hand()
         return self._edited(self.tree.split(id, groups))
 
     def merge(self, first: int, second: int) -> Change:
@@ -322,10 +325,12 @@ class MotionLearner:
             >>> change.merges[0].kept, learner.snapshot().names
             (1, ('P1',))
         """
+        self._before_hand()
         return self._edited(self.tree.merge(first, second))
 
     def reparent(self, id: int, parent: int) -> Change:
         """Hang a node of the tree below another; see `PeopleTree.reparent`."""
+        self._before_hand()
         return self._edited(self.tree.reparent(id, parent))
 
     def remove(self, id: int, *, forget: bool = False) -> Change:
@@ -342,6 +347,7 @@ class MotionLearner:
             >>> learner.snapshot().names
             ('P1',)
         """
+        self._before_hand()
         return self._edited(self.tree.remove(id, forget=forget))
 
     def freeze(self, id: int) -> Change:
@@ -365,6 +371,7 @@ class MotionLearner:
             >>> [primitive.n_exemplars for primitive in learner.snapshot()]  # it stays
             [6, 12]
         """
+        self._before_hand()
         change = self.tree.freeze(id)
         self._snapshots.freeze(self.tree, id)
         return change
@@ -375,6 +382,7 @@ class MotionLearner:
         Raises:
             UnknownPrimitiveError: There is no such primitive.
         """
+        self._before_hand()
         change = self.tree.freeze(id, frozen=False)
         self._snapshots.frozen.pop(id, None)
         return change
@@ -400,6 +408,7 @@ class MotionLearner:
     def resume(self) -> None:
         """Go on learning; what comes next does not follow what came before."""
         if self._paused:
+            self._before_hand()
             self._paused = False
             self.chain.broken()
 
@@ -410,6 +419,7 @@ class MotionLearner:
 
     def known(self) -> Known:
         """Return what is known of motions now; two of them make a `LearnerEdit`."""
+        self._before_hand()
         frozen = tuple(self._snapshots.frozen.values())
         return Known(self.tree.state(), self.graph.state(), self.chain.state(), frozen)
 
@@ -423,6 +433,7 @@ class MotionLearner:
         Args:
             edit: What to take back: its ``before`` is put in the place of its ``after``.
         """
+        self._before_hand()
         back = edit.reversed()
         found = self.tree.exchange(back.people)
         self.graph.exchange(back.graph, found.heirs, self.tree.leaves)
@@ -528,6 +539,7 @@ class MotionLearner:
             absurd=self._absurd.state(),
             frozen=tuple(self._snapshots.frozen.values()),
             paused=self._paused,
+            closing=self._closing,
         )
 
     @classmethod
@@ -568,7 +580,7 @@ class MotionLearner:
         learner._stream_start, learner._lost_from = state.stream_start, state.lost_from
         learner._lost_why, learner._person = state.lost_why, state.person
         learner._snapshots.frozen = {each.primitive.id: each for each in state.frozen}
-        learner._paused = state.paused
+        learner._paused, learner._closing = state.paused, state.closing
         return learner
 
     def save(self, path: str | Path) -> Path:
@@ -669,6 +681,7 @@ class MotionLearner:
                 events += self._found()
                 events += self._learn(rows[:n])
             else:
+                events += self._form_rest()
                 self._begin_loss(why)
                 bridged = self._bridged(rows[:n])
                 if bridged:
@@ -714,6 +727,7 @@ class MotionLearner:
     def _cut(self) -> list[Event]:
         """Close what is open; what comes next does not follow it."""
         events = [e for segment in self._segmenter.flush() for e in self._close(segment)]
+        events += self._form_rest()
         self._begin_stream()
         return events
 
@@ -731,6 +745,7 @@ class MotionLearner:
             looks = self._under_way.until_look(len(self._buffer))  # may change the segmenter
             taken, segments = self._segmenter.advance(frames[:looks])
             for left in range(taken - 1, -1, -1):
+                events += self._form_next()
                 self.tree.pass_time()
                 if left and self.config.scaffolding:
                     self._under_way.get_on()
@@ -758,6 +773,7 @@ class MotionLearner:
 
     def _close(self, segment: Segment) -> list[Event]:
         """Learn from a segment that the segmenter closed."""
+        events = self._form_rest()
         frames = self._buffer.take(segment.start, segment.end)
         self._buffer.drop_before(segment.end)
         segment = replace(
@@ -769,10 +785,10 @@ class MotionLearner:
         if segment.still or (self._body and np.ptp(frames, axis=0).max() < STILL_M):
             segment = replace(segment, still=True)
             self.chain.paused(segment)
-            return [SegmentClosed(segment)]
+            return [*events, SegmentClosed(segment)]
         if self._paused:
-            return self._look(segment, frames)
-        return self._place(segment, frames)
+            return events + self._look(segment, frames)
+        return events + self._place(segment, frames)
 
     def _look(self, segment: Segment, frames: FloatArray) -> list[Event]:
         """Recognise a segment, shape (L, V), and learn nothing."""
@@ -785,9 +801,45 @@ class MotionLearner:
         return events
 
     def _place(self, segment: Segment, frames: FloatArray) -> list[Event]:
-        """Learn from a segment in which something moves, as it is seen, shape (L, V)."""
+        """Learn from a segment in which something moves, as it is seen, shape (L, V).
+
+        It forms one primitive at most now. What came of it is said once nothing more is to form.
+        """
         goes_on = self.chain.goes_on_with(segment)
-        placement = self.tree.insert(frames, self.person, goes_on=goes_on)
+        placement = self.tree.insert(frames, self.person, goes_on=goes_on, in_turn=True)
+        if not self.tree.to_form:
+            return self._follow(segment, placement)
+        for id in placement.born:
+            self.graph.add_node(id)
+        self._closing = Closing(segment, placement)
+        return []
+
+    def _form_next(self) -> list[Event]:
+        """Form what the latest segment may form yet, one primitive a call; return what came of it.
+
+        Nothing is said before all is formed.
+        """
+        events, self._late = self._late, []
+        if self._closing is None:
+            return events
+        segment, placement = self._closing
+        placement = placement.then(self.tree.form_next())
+        self._closing = Closing(segment, placement) if self.tree.to_form else None
+        return events if self._closing else events + self._follow(segment, placement)
+
+    def _form_rest(self) -> list[Event]:
+        """Form at once all that the latest segment may form yet; return what came of it."""
+        events = self._form_next()
+        while self._closing is not None:
+            events += self._form_next()
+        return events
+
+    def _before_hand(self) -> None:
+        """Form what is to form before a person changes something; the next frame says it."""
+        self._late = self._form_rest()
+
+    def _follow(self, segment: Segment, placement: Placement) -> list[Event]:
+        """Return what came of a segment that was placed, and count what follows what."""
         events: list[Event] = [SegmentClosed(segment, placement)]
         if placement.recognised:
             events.append(Recognised(segment, placement.node_id, placement.distance))

@@ -3,21 +3,35 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from ..errors import StateError
 from ..graph import GraphState
 from ..people import PeopleState
+from ..recording import Segment
 from ..segmentation import SegmenterState
 from ..state import Count, FileFormat, Range, State, from_plain, require, to_plain
+from ..tree import ROOT, Placement
 from .absurd import AbsurdState
 from .buffer import BufferState
 from .chain import ChainState
 from .config import LearnerConfig
 from .snapshot import FrozenState
 from .watching import WatchState
+
+
+class Closing(NamedTuple):
+    """A segment that was closed, and may form one primitive more.
+
+    Attributes:
+        segment: The segment.
+        placement: Where it was put, and what has come of it so far.
+    """
+
+    segment: Segment
+    placement: Placement
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +56,7 @@ class LearnerState(State):
         absurd: What frames of plain channels are held against.
         frozen: Primitives that stay as they were.
         paused: Whether motions are recognised only.
+        closing: The segment that was closed last, while it may form one primitive more.
 
     Example:
         >>> import numpy as np
@@ -70,6 +85,7 @@ class LearnerState(State):
     absurd: AbsurdState
     frozen: tuple[FrozenState, ...] = ()
     paused: bool = False
+    closing: Closing | None = None
 
     def check(self) -> None:
         """Check that the stages have seen the same."""
@@ -109,6 +125,26 @@ class LearnerState(State):
             inside = (block.end <= self.n_frames) & (block.number < self.tree.n_seen)
             inside &= block.decided_at <= self.n_frames
             require(bool(inside.all()), f"{place}.end", "must have been seen")
+        self._check_closing()
+
+    def _check_closing(self) -> None:
+        """Check that a segment may form one primitive more just where the tree says so."""
+        forms = any(each.tree.to_form for each in self.tree.trees)
+        require(forms == (self.closing is not None), "closing", "must be there if something forms")
+        if self.closing is None:
+            return
+        segment, placement = self.closing
+        seen = segment.end <= self.n_frames and segment.decided_at <= self.n_frames
+        require(seen, "closing.segment", "must have been seen")
+        latest = self.tree.n_seen - 1
+        require(placement.number == latest, "closing.placement.number", f"must be {latest}")
+        ids = {placement.node_id, *placement.born, *(to for _, to in placement.moved)}
+        there = ids <= {ROOT, *self.tree.primitives}
+        require(there, "closing.placement", "must name primitives of the tree")
+        known = placement.nearest is None or 0 < placement.nearest < self.tree.free_id
+        require(known, "closing.placement.nearest", "must be a node of the tree, now or before")
+        like = placement.like is None or 0 <= placement.like < latest
+        require(like, "closing.placement.like", "must be an earlier segment")
 
 
 def _one_watch(content: dict[str, Any]) -> dict[str, Any]:
@@ -130,7 +166,7 @@ FILES = FileFormat(
     "mplearn-learner",
     "learner",
     StateError,
-    5,
-    migrations={1: _one_watch, 2: _whole, 3: _whole, 4: _whole},
+    6,
+    migrations={1: _one_watch, 2: _whole, 3: _whole, 4: _whole, 5: _whole},
     compression=1,
 )

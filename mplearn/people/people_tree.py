@@ -197,13 +197,22 @@ class PeopleTree:
 
     # ---- learning
 
-    def insert(self, frames: FloatArray, person: int = 0, *, goes_on: bool = False) -> Placement:
+    def insert(
+        self,
+        frames: FloatArray,
+        person: int = 0,
+        *,
+        goes_on: bool = False,
+        in_turn: bool = False,
+    ) -> Placement:
         """Place a segment, shape (L, D), and let the trees grow.
 
         Args:
             frames: The segment.
             person: Who moves.
             goes_on: Whether it begins in the frame in which the person's one before it ended.
+            in_turn: Whether it forms one primitive at most now, as long as there is one person; see
+                `PrimitiveTree.insert`.
 
         Returns:
             As `PrimitiveTree.insert`, of primitives; its distance is that to the nearest of the
@@ -219,11 +228,21 @@ class PeopleTree:
             self.sharing()
             self._trees[person] = self._new_tree()
             self._require_exemplars()
-        placement = self._trees[person].insert(frames, goes_on=goes_on)
+        in_turn = in_turn and self._primitives.in_turn
+        placement = self._trees[person].insert(frames, goes_on=goes_on, in_turn=in_turn)
         if placement.refused:
             return placement
         self.n_seen += 1
         return self._primitives.follow(person, placement, frames)
+
+    @property
+    def to_form(self) -> int:
+        """Primitives that the latest segment may form yet, at most."""
+        return self._primitives.to_form
+
+    def form_next(self) -> Change:
+        """Form one more of them; see `PrimitiveTree.form_next`."""
+        return self._primitives.form_next()
 
     def pass_time(self) -> None:
         """Let a frame pass; see `PrimitiveTree.pass_time`."""
@@ -303,6 +322,8 @@ class PeopleTree:
         """Return what people share; where there is one person, as if others were to come."""
         primitives = self._primitives
         if not isinstance(primitives, SharedPrimitives):
+            while primitives.to_form:
+                primitives.form_next()
             rules = self.config, self.people_config
             sharing = Sharing(*rules, self._trees, primitives.next_id, self.mirror)
             self._primitives = primitives = SharedPrimitives(sharing)

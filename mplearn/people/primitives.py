@@ -75,6 +75,17 @@ class Primitives(Protocol):
     def follow(self, person: int, placement: Placement, frames: FloatArray) -> Placement:
         """Take note of what a person's tree did with a segment; return what it means for all."""
 
+    @property
+    def in_turn(self) -> bool:
+        """Whether a segment may form one primitive at most, and `form_next` the others."""
+
+    @property
+    def to_form(self) -> int:
+        """Primitives that `form_next` may form yet, at most."""
+
+    def form_next(self) -> Change:
+        """Form one more of the primitives that the latest segment may form yet."""
+
     def split(self, id: int, groups: Sequence[Sequence[int]] | None) -> Change:
         """Split a primitive."""
 
@@ -170,6 +181,20 @@ class OnePersonsPrimitives:
         """Return what the tree said."""
         self._count(placement.born)
         return placement
+
+    @property
+    def in_turn(self) -> bool:
+        """True: nothing depends on which were formed at once."""
+        return True
+
+    @property
+    def to_form(self) -> int:
+        """Primitives that the tree may form yet."""
+        return self.tree.to_form
+
+    def form_next(self) -> Change:
+        """Form one more in the tree."""
+        return self._edited(self.tree.form_next())
 
     def split(self, id: int, groups: Sequence[Sequence[int]] | None) -> Change:
         """Split a leaf of the tree."""
@@ -320,6 +345,20 @@ class SharedPrimitives:
     def follow(self, person: int, placement: Placement, frames: FloatArray) -> Placement:
         """Take note of what a person's tree did with a segment; return what it means for all."""
         return self.sharing.follow(person, placement, frames)
+
+    @property
+    def in_turn(self) -> bool:
+        """False: which leaves are one primitive is found out of all that are formed."""
+        return False
+
+    @property
+    def to_form(self) -> int:
+        """None: all were formed at once."""
+        return 0
+
+    def form_next(self) -> Change:
+        """Form nothing."""
+        return Change()
 
     def split(self, id: int, groups: Sequence[Sequence[int]] | None) -> Change:
         """Split a primitive, and people's leaves where their exemplars go apart."""

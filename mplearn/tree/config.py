@@ -113,7 +113,8 @@ class TreeConfig:
             far to the only other one that it is like: a motion that is cut in two where someone
             hesitated is not two motions.
         max_born: Clusters that become nodes with a segment, at most, so that no frame takes long:
-            others become nodes with the next segments, one after another; inf for no such bound.
+            others become nodes with the next segments, one after another; inf for no such bound. A
+            learner forms one a frame, so what a segment forms is there some frames later.
         confirmed: Members from which on a primitive is sure; with fewer it is provisional.
         patience: A provisional primitive that nothing has joined after so many further segments is
             forgotten; after four times as many as there are primitives, if that is more.

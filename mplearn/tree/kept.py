@@ -45,7 +45,7 @@ class KeptTree(PrimitiveTree):
         """
         state = validated(state)
         self._check_fits(state)
-        self.n_seen, self._state = state.n_seen, state
+        self.n_seen, self.to_form, self._state = state.n_seen, state.to_form, state
         self._nodes = {node.id: Node.from_state(node) for node in state.nodes}
         for name in _MADE:
             self.__dict__.pop(name, None)

@@ -163,3 +163,20 @@ class Placement(NamedTuple):
     removed: tuple[int, ...] = ()
     nearest: int | None = None
     like: int | None = None
+
+    def then(self, later: Change) -> Placement:
+        """Return where the segment is, and what came of it, after a later change, too.
+
+        Example:
+            >>> first = Placement(4, ROOT, False, 2.1, 3.0, born=(7,))
+            >>> both = first.then(Change(born=(8,), moved=((2, 8), (4, 8))))
+            >>> both.born, both.node_id, both.moved
+            ((7, 8), 8, ((2, 8),))
+        """
+        moved = dict(later.moved)
+        home = moved.pop(self.number, self.node_id)
+        home = next((merge.kept for merge in later.merges if merge.absorbed == home), home)
+        others = tuple(move for move in later.moved if move[0] != self.number)
+        before = Change(*(getattr(self, name) for name in Change._fields))
+        change = before.then(later._replace(moved=others))
+        return self._replace(node_id=home, **change._asdict())

@@ -41,21 +41,22 @@ _WELL_INSIDE = 0.8  # of its radius
 _UNKNOWN = 3.0  # leaves that the scale of all motion counts for beside that of those
 
 
-def form_primitives(structure: Structure, node: Node, when: int) -> Change:
+def form_primitives(structure: Structure, node: Node, when: int, most: float) -> Change:
     """Form a leaf of each cluster in a node that grew; what else waits in the root may join it.
 
-    Of `max_born` clusters at most, the tightest ones: the others wait for the next segment. A leaf
-    in which others are formed, as the rules are printed, is split: it is a leaf no more.
+    Of so many clusters at most, the tightest ones: the others wait. A leaf in which others are
+    formed, as the rules are printed, is split: it is a leaf no more.
 
     Args:
         structure: The tree.
         node: The root; as printed, any node.
         when: Segments seen.
+        most: Leaves that are formed at most.
     """
     config = structure.config
     was_leaf = node.id != ROOT and node.is_leaf
     change = Change()
-    while len(change.born) < config.max_born:
+    while len(change.born) < most:
         loose = [i for i, n in enumerate(node.members) if node.id == ROOT or n not in node.settled]
         matrix = node.matrix[np.ix_(loose, loose)]
         limit = cutoff(structure, node)
@@ -396,11 +397,12 @@ def _with_the_nearer(
     return np.union1d(first, rest[nearer]), np.union1d(second, rest[~nearer])
 
 
-def shed_outliers(structure: Structure, leaf: Node, when: int) -> Change:
+def shed_outliers(structure: Structure, leaf: Node, when: int, most: float) -> Change:
     """Let a leaf keep its core only where it is wider than motions lie apart.
 
     While little was known its radius reached other motions, which it took in. What is no part of
-    its largest cluster, and lies off that by a gap, waits again to become what it is.
+    its largest cluster, and lies off that by a gap, waits again to become what it is: one of so
+    many primitives, at most, that are formed.
     """
     config, limit = structure.config, structure.memory.valley()
     if leaf.whole or leaf.frozen or leaf.diameter <= limit:
@@ -415,7 +417,8 @@ def shed_outliers(structure: Structure, leaf: Node, when: int) -> Change:
     outliers = [leaf.members[i] for group in away for i in group]
     if not outliers:
         return Change()
-    return structure.shed(leaf, outliers).then(form_primitives(structure, structure.root, when))
+    shed = structure.shed(leaf, outliers)
+    return shed.then(form_primitives(structure, structure.root, when, most))
 
 
 def merge_duplicates(structure: Structure, matches: Sequence[Match], when: int) -> Change:

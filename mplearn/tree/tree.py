@@ -64,6 +64,7 @@ class TreeState(State):
         renewal: Models on their way that will take the place of these; None for none.
         neighbours: See `exemplars.neighbours`; zeros in what was kept before there were any.
         follows: Numbers of the latest segments that began where the one before them ended, rising.
+        to_form: Primitives that the latest segment may form yet, at most.
     """
 
     n_seen: Count
@@ -79,6 +80,7 @@ class TreeState(State):
     follows: Annotated[IntArray, Array(None, low=1)] = field(
         default_factory=lambda: np.zeros(0, np.int64)
     )
+    to_form: Count = 0
 
     def check(self) -> None:
         """Check that the nodes make one tree, and that equal numbers are the same segment."""
@@ -158,6 +160,10 @@ class PrimitiveTree:
         groups: A group number for each channel, 0, 1, ...; channels of a group share one variance,
             so they should share a unit. By default all do.
 
+    Attributes:
+        n_seen: Segments ever seen.
+        to_form: Primitives that the latest segment may form yet, at most; see `form_next`.
+
     Raises:
         InvalidValueError: A value is out of range.
 
@@ -196,6 +202,7 @@ class PrimitiveTree:
         self.rate_hz = rate_hz
         self.groups = tuple(int(group) for group in numbers)
         self.n_seen = 0
+        self.to_form = 0
         self._memory = SegmentMemory(config, numbers)
         self._structure = Structure(config, self._memory)
         self._models = GroupModels(config, self._structure)
@@ -364,7 +371,9 @@ class PrimitiveTree:
 
     # ---- learning
 
-    def insert(self, frames: FloatArray, *, goes_on: bool = False) -> Placement:
+    def insert(
+        self, frames: FloatArray, *, goes_on: bool = False, in_turn: bool = False
+    ) -> Placement:
         """Place a segment, shape (L, D), and let the tree grow.
 
         A segment that is too short or too long for a motion, or lacks a channel for most of the
@@ -373,6 +382,8 @@ class PrimitiveTree:
         Args:
             frames: The segment.
             goes_on: Whether it begins in the frame in which the one before it ended.
+            in_turn: Whether it forms one primitive at most now; `form_next` forms the others, as
+                the next segment does that comes before that.
 
         Raises:
             FrameError: The frames have another width, or hold infinite values.
@@ -382,6 +393,9 @@ class PrimitiveTree:
         reason = refusal(frames, self.shortest_frames, longest)
         if reason:
             return Placement(-1, ROOT, False, np.inf, np.inf, refused=reason)
+        late = Change()
+        while self.to_form:
+            late = late.then(self.form_next())
         structure, bank, number = self._structure, self._memory.bank, self.n_seen
         self.n_seen += 1
         self._memory.remember(number, frames.copy(), follows=goes_on and number > 0)
@@ -395,36 +409,63 @@ class PrimitiveTree:
         waiting = node.matrix[-1, :-1] if node.id == ROOT else np.zeros(0)
         self._memory.meet(np.concatenate([distances, waiting]))
         like = self._waiting_like(node)
+        in_turn = in_turn and not self.config.local and np.isfinite(self.config.max_born)
+        most = 1 if in_turn else self.config.max_born
+        formed = Change()
         if node.id == ROOT or self.config.local:
-            change = form_primitives(structure, node, self.n_seen)
+            change = formed = form_primitives(structure, node, self.n_seen, most)
             recognised = recognised and (node.is_leaf or number in dict(change.moved))
         else:
-            change = shed_outliers(structure, node, self.n_seen)
+            change = formed = shed_outliers(structure, node, self.n_seen, most)
             recognised = recognised and (number, ROOT) not in change.moved
             if not change.moved:
                 change = split_mixed(structure, node, self.n_seen)
             if not change.moved:
                 change = merge_duplicates(structure, matches, self.n_seen)
             if not change.moved and self._bore_lately():
-                change = change.then(form_primitives(structure, structure.root, self.n_seen))
-        change = change.then(forget_chances(structure, self.n_seen))
+                in_turn = in_turn and not change.merges  # who waits knows what is there
+                most = most if in_turn else self.config.max_born
+                formed = form_primitives(structure, structure.root, self.n_seen, most)
+                change = change.then(formed)
+        if in_turn and formed.born:
+            self.to_form = int(self.config.max_born) - 1
+        if not self.to_form:
+            change = change.then(forget_chances(structure, self.n_seen))
+        change = late.then(change)
         self._memory.release(number)
         self._renew()
         structure.tune()
         self._models.forget()
-        home = dict(change.moved).get(number, node.id)
-        home = next((merge.kept for merge in change.merges if merge.absorbed == home), home)
-        others = tuple(move for move in change.moved if move[0] != number)
-        return Placement(
-            number,
-            home,
-            recognised,
-            distance,
-            ratio,
-            **change._replace(moved=others)._asdict(),
-            nearest=matches[0].node if matches else None,
-            like=like,
+        nearest = matches[0].node if matches else None
+        placement = Placement(
+            number, node.id, recognised, distance, ratio, nearest=nearest, like=like
         )
+        return placement.then(change)
+
+    def form_next(self) -> Change:
+        """Form one more of the primitives that the latest segment may form yet, if there is one.
+
+        Once all are formed the tree is as if `insert` had formed them at once.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn.tree import PrimitiveTree, TreeConfig
+            >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+            >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+            >>> sizes = (1.0, -1.0, 1.01, -1.01, 0.99, -0.99)
+            >>> born = [tree.insert(k * lift, in_turn=True).born for k in sizes]
+            >>> while tree.to_form:
+            ...     change = tree.form_next()
+            >>> tree.form_next() == Change()  # nothing is left
+            True
+        """
+        if not self.to_form:
+            return Change()
+        change = form_primitives(self._structure, self._structure.root, self.n_seen, 1)
+        self.to_form = self.to_form - 1 if change.born else 0
+        if not self.to_form:
+            change = change.then(forget_chances(self._structure, self.n_seen))
+        return self._edited(change)
 
     def pass_time(self) -> None:
         """Let a frame pass: what takes long is done a little at a time by those who call this.
@@ -461,7 +502,7 @@ class PrimitiveTree:
                 leaf = structure.nodes[best[0].node]
                 change = change.then(structure.take_in(leaf, [number]))
         while not self.config.local:
-            formed = form_primitives(structure, structure.root, self.n_seen)
+            formed = form_primitives(structure, structure.root, self.n_seen, self.config.max_born)
             change = change.then(formed)
             if not formed.born:
                 break
@@ -590,6 +631,7 @@ class PrimitiveTree:
             renewal=memory.renewal_state(),
             neighbours=memory.neighbours.counts.copy(),
             follows=np.array(self._memory.follows, np.int64),
+            to_form=self.to_form,
         )
 
     def load_state(self, state: TreeState) -> None:
@@ -613,7 +655,7 @@ class PrimitiveTree:
         )
         memory.neighbours.counts = state.neighbours.copy()
         memory.follows = state.follows.tolist()
-        self.n_seen = state.n_seen
+        self.n_seen, self.to_form = state.n_seen, state.to_form
         self._memory = memory
         self._structure = Structure(self.config, memory)
         self._structure.next_id = state.next_id
@@ -632,6 +674,8 @@ class PrimitiveTree:
             floors["renewal.floor"] = state.renewal.floor
         for place, floor in floors.items():
             require(len(floor) == width, place, f"must have shape ({width},)")
+        born = self.config.max_born
+        require(state.to_form < born, "to_form", f"must be below {born}, not {state.to_form}")
         most = self.config.max_exemplars
         for k, node in enumerate(state.nodes[1:], start=1):
             n_members = len(node.members)

@@ -189,6 +189,24 @@ def test_what_was_whole_before_births_were_bounded_goes_on_without_a_bound(life,
     assert PrimitiveLibrary.load(tmp_path / "old.mplearn").version == then.snapshot().version
 
 
+def test_what_was_whole_before_primitives_were_formed_in_turn_has_nothing_to_form(life, tmp_path):
+    state = life.state()
+    part = checkpoint(state).new.__getitem__
+    mark, content = document_of(state)
+    inner = content["learner"]
+    trees = [each["tree"] for each in inner["tree"]["trees"]]
+    assert inner.pop("closing") is None
+    assert [each.pop("to_form") for each in trees] == [0] * len(trees)
+    with pytest.raises(StateError, match=r"to_form: is missing|closing: is missing"):
+        resumed(LifeState, to_bytes({mark: content}), part)
+    assert resumed(LifeState, to_bytes({"$whole 3": content}), part) == state
+    plain = to_plain(state.learner, whole=True)
+    for each in (plain, *(each["tree"] for each in plain["tree"]["trees"])):
+        each.pop("closing", None), each.pop("to_form", None)
+    replace(LEARNER_FILES, schema=5, migrations={}).write(tmp_path / "old.mplearner", plain)
+    assert MotionLearner.load(tmp_path / "old.mplearner").state() == state.learner
+
+
 def fields_below(kind, found):
     """Note the fields of a type, and of all that it can hold."""
     names = [each.name for each in fields(kind)] if is_dataclass(kind) else []
@@ -205,9 +223,9 @@ def fields_below(kind, found):
 @pytest.mark.parametrize(
     ("kind", "version", "known"),
     [
-        (LearnerState, LEARNER_FILES.schema, (5, "3e19161c2923")),
+        (LearnerState, LEARNER_FILES.schema, (6, "a84fea5e177a")),
         (LibraryState, FILES.schema, (4, "86db5f8d9e77")),
-        (LifeState, _WHOLE, ("$whole 3", "25e7eb767869")),
+        (LifeState, _WHOLE, ("$whole 4", "3909b4b7927f")),
     ],
 )
 def test_who_adds_a_field_says_how_what_was_kept_without_it_opens(kind, version, known):
