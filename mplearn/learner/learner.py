@@ -210,7 +210,9 @@ class MotionLearner:
             ...         if isinstance(event, SegmentClosed) and event.segment.cause == "dip":
             ...             print(f"frame {number}: a dip in frame {event.segment.end}")
             frame 56: a dip in frame 50
-            frame 256: a dip in frame 250
+            frame 257: a dip in frame 250
+
+        The second forms a primitive, and is said with the frame after, which may form another.
         """
         if at_once < 1:
             raise InvalidValueError(f"at_once must be positive, not {at_once}")

@@ -182,7 +182,7 @@ def test_a_state_in_which_something_is_wrong_with_what_is_closing_is_refused():
     }
     for name, values in wrong.items():
         for value in values:
-            with pytest.raises(StateError, match="closing|to_form"):
+            with pytest.raises(StateError, match=r"closing|to_form"):
                 MotionLearner.from_state(replace(state, **{name: value}))
     plain = to_plain(state, whole=True)
     assert from_plain(type(state), plain, whole=True) == state
