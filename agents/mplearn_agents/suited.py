@@ -47,6 +47,23 @@ NEEDS_TASK: dict[str, tuple[str, ...]] = {
     for policy in of_task.policies
 }
 
+#: The policies that must know beforehand what is in which slot, or try it on a twin.
+_NOT_ONLINE = ("search", "experienced", "pooled-path")
+
+
+def plays(policy: str, task: str, env: str) -> bool:
+    """Return whether a policy can do a task in a version of the environment, knowing what it may.
+
+    Example:
+        >>> plays("oracle", "goal", "online"), plays("oracle", "goal", "v1")
+        (True, False)
+    """
+    if env == "online" and policy == "oracle":
+        return True
+    if env == "online" and policy in _NOT_ONLINE:
+        return False
+    return task in NEEDS_TASK.get(policy, (task,)) and policy not in suited(task).foresees
+
 
 def suited(task: str) -> Suited:
     """Return what suits a task, by its name."""

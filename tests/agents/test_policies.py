@@ -214,6 +214,32 @@ def test_imitation_draws_from_the_longer_history():
     policy.act(None, make_info([0, 0, 1, 1]) | {"primitive": -1})  # a new episode: by the prior
 
 
+def test_imitation_takes_what_is_known_by_now_where_that_grows():
+    """It knew nothing at first, then that 10 follows 11; then 10 is gone, and 12 does."""
+
+    def known(after):
+        graph = TransitionGraph()
+        for id in (11, after):
+            graph.add_node(id)
+        for _ in range(50):
+            graph.observe(11, after, 1.0)
+        return graph, {11: 1, after: 2}
+
+    now = [(TransitionGraph(), {})]
+    policy = Imitation(*now[0], seed=1, renew=lambda: now[0])
+    even = make_info([0, 1, 1])
+    for after in (10, 12):
+        now[0] = known(after)
+        info = even | {"library_version": str(after)}
+        assert policy.act(None, make_info([0, 1, 0]) | info | {"primitive": -1}) in (1, 2)
+        policy.act(None, make_info([0, 1, 0]) | {"library_version": str(after), "primitive": 11})
+        drawn = []
+        for _ in range(20):
+            policy._history = [10, 11]
+            drawn.append(policy.act(None, info | {"primitive": 11}))
+        assert np.mean(np.array(drawn) == 2) > 0.9
+
+
 def test_a_mirror_does_what_is_recognised_and_waits_where_it_may_not():
     info = {"action_mask": np.array([1, 1, 0, 1])}
 

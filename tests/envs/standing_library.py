@@ -9,6 +9,7 @@ import numpy as np
 from mplearn.graph import TransitionGraph
 from mplearn.hmm import fit
 from mplearn.library import Primitive, PrimitiveLibrary
+from mplearn.recording import Recording
 from mplearn_envs.robot import humanoid
 
 RATE_HZ = 100.0
@@ -35,6 +36,7 @@ MOTIONS = (
     ("wave", {}, WAVE, 0.9),
     ("jump", {}, JUMP, 0.7),
 )
+CYCLE = ("arms up", "arms down", "squat", "rise", "bow down", "bow up")  # of a performance
 NEXT = {0: (1,), 1: (0, 2, 4, 6, 8, 9), 2: (3,), 3: (0, 4, 6), 4: (5,), 5: (0, 2), 6: (7,), 7: (0,)}
 
 
@@ -81,3 +83,19 @@ def standing_library(names: tuple[str, ...] | None = None, seed: int = 0) -> Pri
                 for _ in range(rank + 1):
                     graph.observe(previous + 3, follower + 3, 1.0)
     return PrimitiveLibrary(tuple(primitives), graph, CHANNELS, RATE_HZ, "robot")
+
+
+def recording(rounds: int = 8, seed: int = 0, *, ring: bool = True) -> Recording:
+    """Return a performance in the robot's channels, over and over: in a ring, or pairs as drawn."""
+    rng = np.random.default_rng(seed)
+    motions = {name: (start, end, length) for name, start, end, length in MOTIONS}
+    parts = []
+    pairs = [k if ring else rng.integers(3) for _ in range(rounds) for k in range(3)]
+    for name in (name for k in pairs for name in CYCLE[2 * k : 2 * k + 2]):
+        start, end, length_s = motions[name]
+        motion = sweep(start, end, length_s * rng.uniform(0.9, 1.1))
+        still = np.repeat(motion[-1:], rng.integers(5, 20), axis=0)
+        parts.append(np.vstack((motion, still)))
+    frames = np.concatenate(parts)
+    frames = frames + rng.normal(scale=0.003, size=frames.shape)
+    return Recording(frames=frames, rate_hz=RATE_HZ, channels=CHANNELS)

@@ -23,9 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--env",
-        choices=["v0", "v1"],
+        choices=["v0", "v1", "online"],
         default="v0",
-        help="version of the environment (default: v0)",
+        help="version of the environment; online: a learner watches meanwhile (default: v0)",
     )
     parser.add_argument(
         "--people",

@@ -30,6 +30,11 @@ REGRET = (
     " The regret is what the return misses, in the same episodes, of that of the oracle, who knows "
     "the graph."
 )
+AGENTS = " Agents are trained kinematically, one a seed, for {} macro steps."
+ONLINE = (
+    " That best is of what was known when the episode began; with what is learned later more may "
+    "be possible, which the oracle foresees."
+)
 
 
 def compare(
@@ -113,8 +118,8 @@ def _table(
         f"Mean over seeds and its {100 * CONFIDENCE:.0f} % interval (Student's t), of "
         f"{comparison.episodes} kinematic or {comparison.simulated_episodes} simulated episodes a "
         f"seed (so few of {', '.join(SLOW)}, too). The return is discounted by time; of the best "
-        f"return that is possible, holding is 0 % and all of it 100 %. Agents are "
-        f"trained kinematically, one a seed, for {comparison.steps_of(task)} macro steps."
+        f"return that is possible, holding is 0 % and all of it 100 %."
+        + (ONLINE if comparison.env == "online" else AGENTS.format(comparison.steps_of(task)))
         + (REGRET if regrets else ""),
     )
 

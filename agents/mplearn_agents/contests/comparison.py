@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from typing import get_args
 
 from mplearn.errors import InvalidValueError
-from mplearn_agents.contests.contest import Contest, Game
+from mplearn_agents.contests.contest import Contest, EnvName, Game
 from mplearn_agents.policies import POLICIES
 from mplearn_agents.rl import TrainingConfig
-from mplearn_agents.rl.config import USUAL_SPEED, AlgorithmName, EnvVersion, PriorUse
-from mplearn_agents.suited import NEEDS_TASK, SUITED, suited
+from mplearn_agents.rl.config import USUAL_SPEED, AlgorithmName, PriorUse
+from mplearn_agents.suited import SUITED, plays, suited
 from mplearn_envs.execution.bodies import BodyName
 from mplearn_envs.execution.modes import Dynamics
 from mplearn_envs.tasks import TASKS
@@ -28,7 +28,7 @@ class Comparison:
     """What is compared.
 
     Attributes:
-        tasks: Names of tasks.
+        tasks: Names of tasks; those that the environment has not are left out.
         dynamics: "kinematic", "simulated" or both. Agents are trained kinematically.
         policies: Names of policies; those that do not suit a task are left out there, see `Suited`.
         algorithms: What agents are trained with.
@@ -39,7 +39,8 @@ class Comparison:
         simulated_episodes: Episodes a seed, simulated; and of policies that think long.
         steps: Macro steps of a training; None: what suits the task, see `Suited`.
         library: File of the library; None is the built-in one.
-        env: Version of the environment.
+        env: Version of the environment; "online": a learner watches meanwhile. There no agents are
+            trained: they would need the same primitives in the same slots, and a day of watching.
         people: Of v1: with whom it is played, one game each. Agents are trained with "train".
         speeds: Among which speeds everyone chooses with the primitive, the usual one first.
         changes: Of v1's task ``follow``: levels of what changes meanwhile, one game each; see
@@ -57,7 +58,7 @@ class Comparison:
     simulated_episodes: int = 4
     steps: int | None = None
     library: str | None = None
-    env: EnvVersion = "v0"
+    env: EnvName = "v0"
     people: tuple[str, ...] = ("train", "test")
     bodies: tuple[str, ...] = ("nominal",)
     changes: tuple[str, ...] = ("none",)
@@ -79,6 +80,12 @@ class Comparison:
             raise InvalidValueError("changes are those of people of v1: compare with env='v1'")
         if self.changes != ("none",) and "follow" not in self.tasks:
             raise InvalidValueError("changes are those of the task 'follow': let it be a task")
+        if self.library is not None and self.env != "v0":
+            raise InvalidValueError(f"{self.env} has its own library: give none, or compare on v0")
+        if self.env == "online":  # there the demonstrator to follow would be another one
+            object.__setattr__(self, "tasks", tuple(t for t in self.tasks if t != "follow"))
+            if not self.tasks:
+                raise InvalidValueError("online has every task but 'follow': name another")
         if len(self.seeds) < 2:
             raise InvalidValueError(f"an interval needs at least 2 seeds, not {self.seeds}")
 
@@ -105,11 +112,7 @@ class Comparison:
     def contests(self, task: str) -> dict[str, list[Contest]]:
         """Return the contests of a task: of each contestant, one a seed."""
         trainings = self._trainings(task)
-        policies = [
-            name
-            for name in self.policies
-            if task in NEEDS_TASK.get(name, (task,)) and name not in suited(task).foresees
-        ]
+        policies = [name for name in self.policies if plays(name, task, self.env)]
         out = {}
         for name in [*policies, *trainings]:
             games = self.games(task, name)
@@ -139,6 +142,8 @@ class Comparison:
 
     def _trainings(self, task: str) -> dict[str, TrainingConfig]:
         """Return how each agent is trained for a task, by its name; but for the seed."""
+        if self.env == "online":
+            return {}
         steps = self.steps_of(task)
         uses: list[tuple[AlgorithmName, PriorUse]] = [
             (algorithm, "feature" if algorithm == "dqn" else prior)

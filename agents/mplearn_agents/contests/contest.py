@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import gymnasium
 
@@ -13,10 +13,17 @@ import mplearn_envs  # noqa: F401  (registers the environment)
 from mplearn_agents.episodes import Episode, play
 from mplearn_agents.policies import POLICIES, Policy
 from mplearn_agents.rl import TrainedPolicy, TrainingConfig
-from mplearn_agents.rl.config import USUAL_SPEED, EnvVersion
+from mplearn_agents.rl.config import USUAL_SPEED
 from mplearn_agents.rl.train import train
 from mplearn_agents.rl.trained import CONFIG, POLICY
 from mplearn_envs.tasks import FreeTask
+
+EnvName: TypeAlias = Literal["v0", "v1", "online"]
+ENVS: dict[EnvName, str] = {
+    "v0": "mplearn/PrimitiveHumanoid-v0",
+    "v1": "mplearn/PrimitiveHumanoid-v1",
+    "online": "mplearn/OnlinePrimitiveHumanoid-v0",
+}
 
 
 @dataclass(frozen=True)
@@ -56,7 +63,7 @@ class Contest:
         games: What is played.
         library: File of the library; None is the built-in one.
         training: Of an agent; None for a policy.
-        env: Version of the environment.
+        env: Version of the environment, one of `ENVS`.
         speeds: Among which speeds one chooses with the primitive.
     """
 
@@ -66,7 +73,7 @@ class Contest:
     games: tuple[Game, ...]
     library: str | None
     training: TrainingConfig | None
-    env: EnvVersion = "v0"
+    env: EnvName = "v0"
     speeds: tuple[float, ...] = USUAL_SPEED
 
     def play(self, folder: Path) -> list[list[Episode]]:
@@ -80,16 +87,19 @@ class Contest:
         return [self._played(game, folder) for game in self.games]
 
     def _played(self, game: Game, folder: Path) -> list[Episode]:
-        task = FreeTask(ceiling=True) if self.task == "free" else self.task
-        options: dict[str, Any] = {"task": task, "dynamics": game.dynamics, "body": game.body}
-        options |= (
-            {"library": self.library}
-            if self.env == "v0"
-            else {"people": game.people, "changes": game.changes}
-        )
-        options["actions"] = {"speeds": self.speeds}
-        name = f"mplearn/PrimitiveHumanoid-{self.env}"
-        env = gymnasium.make(name, disable_env_checker=True, **options)
+        options: dict[str, Any] = {
+            "task": self.task,
+            "dynamics": game.dynamics,
+            "body": game.body,
+            "actions": {"speeds": self.speeds},
+        }
+        if self.task == "free" and self.env != "online":  # there no graph is known to the end
+            options["task"] = FreeTask(ceiling=True)
+        if self.env == "v0":
+            options["library"] = self.library
+        if self.env == "v1":
+            options |= {"people": game.people, "changes": game.changes}
+        env = gymnasium.make(ENVS[self.env], disable_env_checker=True, **options)
         asked: dict[str, Any] = {
             "episodes": game.episodes,
             "library": env.unwrapped.library.version,  # type: ignore[attr-defined]
@@ -99,6 +109,7 @@ class Contest:
             asked["speeds"] = self.speeds
         asked = json.loads(json.dumps(asked))  # as it is kept: with lists for tuples
         what = f"{self.task}-{game.name}-{self.name}-{self.seed}".replace(", ", "-")
+        what = what if self.env != "online" else f"online-{what}"
         what += _suffix(self.speeds)
         file = folder / "episodes" / f"{what.replace(' ', '-')}.json"
         episodes = _kept(file, asked)

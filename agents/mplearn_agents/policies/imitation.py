@@ -35,7 +35,7 @@ class Imitation(Policy):
         forecast: Probabilities of the next primitive.
         slots: Action of each primitive.
         seed: Seed of the walk; None draws one.
-        renew: Returns the forecast of now, where the library may change from episode to episode.
+        renew: Returns forecast and slots of now, where the library may change.
 
     Example:
         >>> import gymnasium as gym
@@ -53,24 +53,23 @@ class Imitation(Policy):
         forecast: Forecast,
         slots: Mapping[int, int],
         seed: int | None = None,
-        renew: Callable[[], Forecast] | None = None,
+        renew: Callable[[], tuple[Forecast, Mapping[int, int]]] | None = None,
     ) -> None:
-        self.forecast = forecast
-        self.slots = slots
+        self._learn(forecast, slots)
         self._renew, self._version = renew, ""
         self.seed = seed
         self._rng = np.random.default_rng(seed)
         self._history: list[int] = []
-        self._primitives = {slot: id for id, slot in slots.items()}
-        self._known = [k for k, id in enumerate(forecast.ids) if id in slots]
-        self._actions = [slots[forecast.ids[k]] for k in self._known]
 
     @classmethod
     def for_env(cls, env: gymnasium.Env[Any, Any]) -> Imitation:
         """Return the policy that imitates whoever an environment's library was learned from."""
         actor: Any = env.unwrapped
-        repertoire = actor.repertoire
-        return cls(repertoire.library.graph, repertoire.slots, None, lambda: actor.library.graph)
+
+        def now() -> tuple[Forecast, Mapping[int, int]]:
+            return actor.library.graph, actor.repertoire.slots
+
+        return cls(*now(), None, now)
 
     def reset(self, seed: int | None = None) -> None:
         """Forget the history; with a seed, start anew."""
@@ -84,10 +83,13 @@ class Imitation(Policy):
             self._history = []
         version = info.get("library_version", "")
         if self._renew is not None and version != self._version:
-            self.forecast, self._version = self._renew(), version
+            self._learn(*self._renew())
+            self._version = version
         weights = np.zeros(legal_actions(info).size)
         if self._history:
-            weights[self._actions] = self.forecast.probabilities(self._history)[self._known]
+            known = set(self.forecast.ids)
+            history = [id if id in known else None for id in self._history]
+            weights[self._actions] = self.forecast.probabilities(history)[self._known]
             weights *= legal_actions(info)
         if not weights.any():
             weights = transition_prior(info)
@@ -95,3 +97,10 @@ class Imitation(Policy):
         if action in self._primitives:
             self._history.append(self._primitives[action])
         return action
+
+    def _learn(self, forecast: Forecast, slots: Mapping[int, int]) -> None:
+        """Take what is known by now, and where."""
+        self.forecast, self.slots = forecast, dict(slots)
+        self._primitives = {slot: id for id, slot in slots.items()}
+        self._known = [k for k, id in enumerate(forecast.ids) if id in slots]
+        self._actions = [slots[forecast.ids[k]] for k in self._known]

@@ -178,7 +178,7 @@ class KnowsFromExperience(_Corrected):
         super().__init__(ways, usual_s, lasts_s, times_s)
 
 
-def oracle(env: gymnasium.Env[Any, Any]) -> Hindsight:
+def oracle_follower(env: gymnasium.Env[Any, Any]) -> Hindsight:
     """Return who follows with all knowledge of the graph: what others miss of it is their regret.
 
     Raises:
@@ -187,8 +187,9 @@ def oracle(env: gymnasium.Env[Any, Any]) -> Hindsight:
     Example:
         >>> import gymnasium as gym
         >>> import mplearn_envs
+        >>> from mplearn_agents.policies import oracle_follower
         >>> env = gym.make("mplearn/PrimitiveHumanoid-v0", task="follow", dynamics="kinematic")
-        >>> policy = oracle(env)
+        >>> policy = oracle_follower(env)
         >>> observation, info = env.reset(seed=1)
         >>> bool(info["action_mask"][policy.act(observation, info)])
         True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping
+from functools import partial
 from typing import Any, Literal, TypeAlias, get_args
 
 import gymnasium
@@ -130,6 +131,8 @@ class PathToTask(Policy):
         renew: Returns the graph of now, where the library may change from episode to episode.
         correcting: Whether the graph may be another person's: where the prior shows other ways than
             the graph has, it is mended, for the rest of the episode.
+        growing: Whether ways may become known meanwhile: where none leads to what the task wants,
+            it does what the demonstrator does most often. Else that is an error.
 
     Example:
         >>> import gymnasium as gym
@@ -153,7 +156,9 @@ class PathToTask(Policy):
         prefer: Prefer = "quick",
         renew: Callable[[], nx.DiGraph[int]] | None = None,
         correcting: bool = False,
+        growing: bool = False,
     ) -> None:
+        self._growing = growing
         self._correcting, self._given, self._here = correcting, graph, 0
         self.graph, self.in_order, self.prefer = graph, in_order, prefer
         self._renew, self._version = renew, ""
@@ -177,13 +182,17 @@ class PathToTask(Policy):
         if pooled and hasattr(env.unwrapped, "people"):
             pool = graph_of_actions(env, varied_library().graph)
             return cls(pool, in_order, prefer, correcting=True)
-        return cls(graph_of_actions(env), in_order, prefer, lambda: graph_of_actions(env))
+        growing: bool = env.unwrapped.repertoire.growing  # type: ignore[attr-defined]
+        renew = partial(graph_of_actions, env)
+        return cls(renew(), in_order, prefer, renew, growing=growing)
 
     def act(self, observation: Any, info: Mapping[str, Any]) -> int:
         """Return the first action of the best path to what the task wants next.
 
         Raises:
             InvalidValueError: The task names no slots.
+            NoPathError: No way leads there, nor will one become known.
+            UnknownPrimitiveError: What it wants cannot be performed, nor will it become known.
         """
         named = info.get("task", {}).get("slots", ())
         slots = tuple(int(slot) for slot in named if slot >= 0)
@@ -198,9 +207,14 @@ class PathToTask(Policy):
         if self._correcting:
             self._correct(transition_prior(info))
         goals = slots[:1] if self.in_order else slots
-        if goals not in self._ways:
-            self._ways[goals] = PathToGoal(self.graph, goals, self.prefer)
-        self._here = self._ways[goals].act(observation, info)
+        try:
+            if goals not in self._ways:
+                self._ways[goals] = PathToGoal(self.graph, goals, self.prefer)
+            self._here = self._ways[goals].act(observation, info)
+        except (NoPathError, UnknownPrimitiveError):
+            if not self._growing:
+                raise
+            self._here = int(np.argmax(transition_prior(info)))
         return self._here
 
     def reset(self, seed: int | None = None) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import copy
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from itertools import count
 from typing import Any, Literal
 
 import numpy as np
@@ -25,6 +27,7 @@ from mplearn_envs.data.library_source import LibrarySource
 from mplearn_envs.execution.bodies import Body
 from mplearn_envs.execution.modes import Dynamics
 from mplearn_envs.robot import Robot
+from mplearn_envs.skills.repertoire import Repertoire
 from mplearn_envs.tasks import FollowTask, Task
 
 from .episode import EpisodeState
@@ -143,6 +146,47 @@ class OnlinePrimitiveHumanoidEnv(MacroStepEnv):
                 "the task 'follow' draws a demonstrator of its own from a library that is known: "
                 "choose another task in an online environment"
             )
+
+    def ahead(self, period_s: float = 0.1) -> Iterator[tuple[float, Repertoire]]:
+        """Yield what will be known when, whatever the robot does: for oracles.
+
+        A copy of demonstrator and learner goes on for as long as it is asked to, at the usual cost
+        of learning; the environment itself does not.
+
+        Args:
+            period_s: Between the moments at which it is looked at [s].
+
+        Yields:
+            Time from now [s] and the repertoire then: first that of now, then after each change.
+            It is the same object every time.
+
+        Raises:
+            InvalidValueError: ``period_s`` is not positive; or the episode has not begun.
+
+        Example:
+            >>> import gymnasium as gym
+            >>> import mplearn_envs
+            >>> options = {"dynamics": "kinematic", "warm_up_s": 5.0}
+            >>> env = gym.make("mplearn/OnlinePrimitiveHumanoid-v0", **options)
+            >>> observation, info = env.reset(seed=1)
+            >>> coming = env.unwrapped.ahead()
+            >>> now_s, repertoire = next(coming)
+            >>> now_s, repertoire.ids == env.unwrapped.repertoire.ids
+            (0.0, True)
+            >>> next(coming)[0] > 0.0
+            True
+        """
+        require_number("period_s", period_s, 1e-3, 1e6, "in [1e-3, 1e6] s")
+        self._begun()
+        twin = copy.copy(self)
+        alone = copy.deepcopy((self.demonstrator, self.learner, self.repertoire))
+        twin.demonstrator, twin.learner, twin.repertoire = alone
+        yield 0.0, twin.repertoire
+        for k in count(1):
+            known = twin.library
+            twin._meanwhile(period_s)
+            if twin.library is not known:
+                yield k * period_s, twin.repertoire
 
     def _begin(self, options: Mapping[str, Any]) -> None:
         known = self.carry_over and self.learner.n_frames > 0

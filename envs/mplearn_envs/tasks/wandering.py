@@ -79,11 +79,11 @@ def wandering(task: Task, memory: int, scene: Scene) -> Wandering:
     for id in firsts:
         plan = repertoire.skills.plan(scene.reference, id)
         choice = Choice(id, True, float(scene.choices.prior[repertoire.slots[id]]), ())
-        paid = sum(task.bonuses(choice).values()) + _earned(task, plan, clock)
+        paid = sum(task.bonuses(choice).values()) + earned_as_planned(task, plan, clock)
         rest = float(graph.values[graph.place[(id,)]])
         best = max(best, paid + clock.worth(plan.duration_s) * rest)
     hold = repertoire.skills.hold(scene.reference, scene.hold_s)
-    idle = _earned(task, hold, clock) / (1.0 - clock.worth(hold.duration_s))
+    idle = earned_as_planned(task, hold, clock) / (1.0 - clock.worth(hold.duration_s))
     return Wandering(Scale(best, idle), graph.rate)
 
 
@@ -100,7 +100,7 @@ def _solved(
         for id in (None, *after):
             skills = repertoire.skills
             plan = skills.hold(here, hold_s) if id is None else skills.plan(here, id)
-            earned = _earned(task, plan, clock), _earned(task, plan, steady)
+            earned = earned_as_planned(task, plan, clock), earned_as_planned(task, plan, steady)
             meanwhile[before, id] = *earned, plan.duration_s
     likely = {
         (before, id): float(repertoire.after(before).prior[repertoire.slots[id]])
@@ -153,8 +153,14 @@ def _affordable(following: dict[int, list[int]], memory: int) -> int:
     return depth
 
 
-def _earned(task: Task, plan: Plan, clock: Clock) -> float:
-    """Return what the moments of a plan earn."""
+def earned_as_planned(task: Task, plan: Plan, clock: Clock) -> float:
+    """Return what a plan's moments earn, discounted to its start, where it is taken at its word.
+
+    Args:
+        task: One whose rates depend on the moment alone.
+        plan: The plan.
+        clock: How time is counted.
+    """
     report = TrackingReport.as_planned(plan)
     weight = weights(report.time_s, clock.discount)
     return sum(float(rate @ weight) for rate in task.rates(report).values())

@@ -7,7 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from standing_library import MOTIONS, RATE_HZ, standing_library, sweep
+from standing_library import RATE_HZ, recording, standing_library
 
 import mplearn_envs  # noqa: F401  (registers the environments)
 from mplearn import LearnerConfig, MotionLearner, Recording
@@ -20,22 +20,6 @@ from mplearn_envs.tasks import FreeTask
 
 ID = "mplearn/OnlinePrimitiveHumanoid-v0"
 GIVEN = "mplearn/PrimitiveHumanoid-v0"
-CYCLE = ("arms up", "arms down", "squat", "rise", "bow down", "bow up")
-
-
-def recording(rounds=8, seed=0):
-    """Return a performance in the robot's channels, over and over."""
-    rng = np.random.default_rng(seed)
-    motions = {name: (start, end, length) for name, start, end, length in MOTIONS}
-    parts = []
-    for name in CYCLE * rounds:
-        start, end, length_s = motions[name]
-        motion = sweep(start, end, length_s * rng.uniform(0.9, 1.1))
-        still = np.repeat(motion[-1:], rng.integers(5, 20), axis=0)
-        parts.append(np.vstack((motion, still)))
-    frames = np.concatenate(parts)
-    frames = frames + rng.normal(scale=0.003, size=frames.shape)
-    return Recording(frames=frames, rate_hz=RATE_HZ, channels=humanoid().channels)
 
 
 def make(**options):
@@ -139,6 +123,32 @@ def test_too_many_primitives_have_no_slot():
     assert env.unwrapped.repertoire.ids == tuple(sorted(env.unwrapped.library.ids)[:2])
     for _ in range(5):
         *_, info = env.step(env.action_space.sample(probability=info["transition_prior"]))
+
+
+def test_what_will_be_known_is_what_is_known_then():
+    env = make(warm_up_s=0.0).unwrapped
+    env.reset(seed=0)
+    coming, foreseen = env.ahead(), []
+    for time_s, repertoire in coming:
+        if time_s > 45.0:
+            break
+        ways = {id: repertoire.after(id).prior.tolist() for id in repertoire.ids}
+        foreseen.append((time_s, repertoire.library.version, ways))
+    assert len(foreseen) > 10 and env.learner.n_frames == 0  # it has not gone on itself
+    time_s, kept = 0.0, set()
+    while time_s < 44.0:
+        time_s += env.step(0)[4]["duration_s"]
+        version, ways = [each[1:] for each in foreseen if each[0] <= time_s + 1e-9][-1]
+        kept.add(version)
+        assert env.library.version == version
+        mine = {id: env.repertoire.after(id).prior.tolist() for id in env.repertoire.ids}
+        assert mine == ways
+    assert len(kept) > 10
+    for period_s in (0.0, -1.0, np.nan):
+        with pytest.raises(InvalidValueError, match="period_s"):
+            next(env.ahead(period_s))
+    with pytest.raises(InvalidValueError, match="call reset first"):
+        next(make().unwrapped.ahead())
 
 
 def test_it_complies():
