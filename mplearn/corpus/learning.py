@@ -34,6 +34,7 @@ from ..merging import merged_learner, merged_state
 from ..mocap import TakeFiles, find_takes
 from ..state import from_plain, to_plain
 from ..store import learner_of
+from ..threads import one_thread
 from .dealing import SHARD_TAKES, Shard, deal
 from .executors import Executor, room, workers
 from .progress import Progress
@@ -158,9 +159,10 @@ def learn_corpus(
         raise StoreError(f"there cannot be a folder {into}: {error.strerror}") from error
     unreadable = {name: str(error) for name, error in found.unreadable.items()}
     try:
-        plan = _planned(into, takes, reading, rate_hz, configure, shard_takes, own)
-        run = _Run(into, takes, reading, plan, own, unreadable, show, stop or threading.Event())
-        return run.result()
+        with one_thread():
+            plan = _planned(into, takes, reading, rate_hz, configure, shard_takes, own)
+            run = _Run(into, takes, reading, plan, own, unreadable, show, stop or threading.Event())
+            return run.result()
     finally:
         if executor is None:
             own.close()

@@ -16,6 +16,7 @@ from ..library import PrimitiveLibrary
 from ..mocap import TakeFiles, find_takes
 from ..recording import are_markers
 from ..tables import RecognisedSegment, SegmentTable, recognise_recording
+from ..threads import one_thread
 from .executors import Executor, room, workers
 from .reading import Reading
 from .shard import DEATHS
@@ -98,7 +99,8 @@ def recognise_corpus(
     reading = Reading(observe, asked.hints, asked.names)  # type: ignore[arg-type]
     found = find_takes(folder)
     try:
-        done = _all(library, found.takes, reading, own, show)
+        with one_thread():
+            done = _all(library, found.takes, reading, own, show)
     finally:
         if executor is None:
             own.close()

@@ -22,6 +22,7 @@ from frail_workers import Frail
 from hypothesis import given
 from hypothesis import strategies as st
 from little_room import little_room
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from mplearn.corpus import (
     Corpus,
@@ -47,6 +48,30 @@ from mplearn.mocap import Hints, TakeFiles, readers, register_reader, registry
 from mplearn.mocap.markers.csv_table import CSVReader
 from mplearn.recording import Recording
 from mplearn.store import StoreReader
+
+
+def n_threads() -> set[int]:
+    """How many threads linear algebra has in this process."""
+    pools = threadpool_info()
+    return {pool["num_threads"] for pool in pools if pool["user_api"] == "blas"}
+
+
+def test_what_learns_and_recognises_here_has_one_thread_of_linear_algebra(tmp_path: Path) -> None:
+    for seed, name in enumerate(("one", "two")):
+        write_take(tmp_path / "takes" / "anna" / f"{name}.csv", 20.0, seed)
+    seen: list[set[int]] = []
+
+    def show(*_: object) -> None:
+        seen.append(n_threads())
+
+    with threadpool_limits(2, user_api="blas"):
+        corpus = learn_corpus(tmp_path / "takes", tmp_path / "learned", jobs=0, show=show)
+        assert corpus.learner is not None and n_threads() == {2}
+        path = corpus.learner.snapshot().save(tmp_path / "a.mplearn")
+        n = len(seen)
+        recognise_corpus(path, tmp_path / "takes", jobs=0, show=show)
+        assert n_threads() == {2} and n > 0 and len(seen) > n
+    assert seen == [{1}] * len(seen)
 
 
 def saved(corpus: Corpus, folder: Path) -> bytes:

@@ -55,6 +55,26 @@ def backward_joint(motion: RobotMotion, model: RobotModel) -> RobotMotion:
     return replace(motion, joint_pos=sign * motion.joint_pos)
 
 
+def liveliest(motion: RobotMotion) -> int:
+    return int(np.ptp(motion.joint_pos, axis=0).argmax())
+
+
+def one_joint_in_degrees(motion: RobotMotion, model: RobotModel) -> RobotMotion:
+    factor = np.ones(len(model.joint_names))
+    factor[liveliest(motion)] = np.degrees(1.0)
+    return replace(motion, joint_pos=factor * motion.joint_pos)
+
+
+def other_zero(motion: RobotMotion, model: RobotModel) -> RobotMotion:
+    off = np.zeros(len(model.joint_names))
+    off[liveliest(motion)] = 0.3
+    return replace(motion, joint_pos=motion.joint_pos + off)
+
+
+def exchanged(motion: RobotMotion, model: RobotModel) -> RobotMotion:
+    return replace(motion, root_pos=motion.root_pos[:, [1, 0, 2]])
+
+
 def inches(motion: RobotMotion, model: RobotModel) -> RobotMotion:
     return replace(motion, root_pos=motion.root_pos / 0.0254)
 
@@ -105,6 +125,9 @@ OF_MOTIONS: dict[str, tuple[Corrupt, str]] = {
     "one joint backward": (backward_joint, "mirrored"),
     "inches": (inches, "unit"),
     "turned": (turned, "axes"),
+    "one joint in degrees": (one_joint_in_degrees, "degrees"),
+    "zero of one joint": (other_zero, "zero"),
+    "x and y exchanged": (exchanged, "axes"),
 }
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,7 +31,8 @@ _LENGTHS = {
 }
 _RATES = (5.0, 1000.0)  # that motions are played at
 _FARTHEST_M = 3.0  # that places are off
-_BACKWARD = 0.5  # of how far a hinge's angles are off, if they are those of the other way
+_OTHERWISE = 0.5  # of how far a hinge's angles are off, if they are to be read otherwise
+_ZERO_RAD = 1e-3  # that the zero of a hinge is off, at least
 _TURNED_RAD = 0.02  # that all is turned by, at least
 _FEW = 12
 
@@ -41,7 +42,7 @@ class Fault(NamedTuple):
 
     Attributes:
         kind: What kind of fault it is: "quaternion order", "degrees", "unit", "bodies permuted",
-            "joints permuted", "mirrored", "rate", "place", "axes", "velocities".
+            "joints permuted", "mirrored", "zero", "rate", "frames", "place", "axes", "velocities".
         problem: What is wrong with the file then, in a few words.
         reading: What the file says, with that taken back.
     """
@@ -166,16 +167,38 @@ def _joints(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
     found = _assigned(apart)
     if said := _permuted("joints", found, model.joint_names):
         yield Fault("joints permuted", said, _joint_order(reading, found))
-    backward = np.abs(angles + reading.joint_pos[frames]).mean(axis=0)
-    flipped = np.flatnonzero(backward < _BACKWARD * np.diagonal(apart))
-    if len(flipped):
-        names = [model.joint_names[k] for k in flipped.tolist()]
-        sign = np.where(np.isin(np.arange(len(model.joint_names)), flipped), -1.0, 1.0)
-        yield Fault(
-            "mirrored",
-            f"{_listed(names)} turn{'s' * (len(names) == 1)} the other way",
-            _hinges(reading, lambda values: values * sign),
+    yield from _single_joints(reading, model, reading.joint_pos[frames], angles)
+
+
+def _single_joints(
+    reading: Reading, model: RobotModel, said: FloatArray, true: FloatArray
+) -> Iterator[Fault]:
+    """Yield what may be wrong with some hinges only, given some angles and what they should be."""
+    off = np.abs(said - true).mean(axis=0)
+    zero = np.median(said - true, axis=0)
+    one = np.ones(len(off))
+    for kind, problem, factor, shift in (
+        ("mirrored", "{} turn{s} the other way", -one, 0.0 * zero),
+        ("degrees", "{} {is} in degrees, not radians", np.radians(one), 0.0 * zero),
+        ("zero", "the zero of {} is off by {by} degrees", one, zero),
+    ):
+        wrong = np.abs(factor * said - shift - true).mean(axis=0) < _OTHERWISE * off
+        if kind == "zero":
+            wrong &= np.abs(zero) > _ZERO_RAD
+        if not wrong.any():
+            continue
+        factor, shift = np.where(wrong, factor, 1.0), np.where(wrong, shift, 0.0)
+        joint_pos, speed = reading.joint_pos, reading.joint_vel
+        assert joint_pos is not None
+        other = replace(
+            reading,
+            joint_pos=factor * joint_pos - shift,
+            joint_vel=None if speed is None else factor * speed,
         )
+        names = [model.joint_names[k] for k in np.flatnonzero(wrong).tolist()]
+        by = [f"{np.degrees(angle):.3g}" for angle in zero[wrong].tolist()]
+        words = {"s": "s", "is": "is"} if len(names) == 1 else {"s": "", "is": "are"}
+        yield Fault(kind, problem.format(_listed(names), by=_listed(by), **words), other)
 
 
 def _mirrored(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
@@ -221,6 +244,88 @@ def _rate(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
             yield Fault("rate", problem, replace(other, times_s=times))
 
 
+def _frames(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
+    """Yield where frames may be missing: what came after them is too early."""
+    gaps = set()
+    if reading.times_s is not None:
+        steps = np.diff(reading.times_s) * reading.rate_hz
+        gaps.add((int(steps.argmax()) + 1, round(float(steps.max())) - 1))
+    meant = evidence.meant
+    if meant is not None and abs(meant.rate_hz / reading.rate_hz - 1.0) < 1e-3:
+        missing = meant.n_frames - len(reading)
+        if 0 < missing < len(reading):
+            gaps.add((_gap(reading, evidence.model, meant, missing), missing))
+    for after, missing in sorted(gaps):
+        if missing > 0:
+            are = "frames are" if missing > 1 else "frame is"
+            problem = (
+                f"{missing} {are} missing after frame {after - 1}, "
+                f"{(after - 1) / reading.rate_hz:.4g} s"
+            )
+            yield Fault("frames", problem, _filled(reading, after, missing))
+
+
+def _gap(reading: Reading, model: RobotModel, meant: Meant, missing: int) -> int:
+    """Return how many frames come before those that are missing.
+
+    Of all places at which what was meant fits best before and after, the one where most moves.
+    """
+    at = np.round(meant.times_s * reading.rate_hz).astype(np.int64)
+    n = len(reading)
+
+    def off(frames: IntArray) -> FloatArray:
+        inside = np.clip(frames, 0, n - 1)
+        posture = postures(reading, model, inside)
+        there = model.forward(reading.root_pos[inside], reading.root_quat[inside], posture)
+        return np.asarray(np.linalg.norm(there.pos - meant.pos, axis=-1).mean(axis=-1))
+
+    places = np.arange(1, n)
+    before = at[None] < places[:, None]
+    after = at[None] >= places[:, None] + missing
+    costs = np.where(before, off(at), 0.0) + np.where(after, off(at - missing), 0.0)
+    means = costs.sum(axis=1) / np.maximum((before | after).sum(axis=1), 1)
+    steps = np.abs(np.diff(postures(reading, model, slice(None)), axis=0)).sum(axis=1)
+    steps += np.linalg.norm(np.diff(reading.root_pos, axis=0), axis=1)
+    best = means <= means.min() + 1e-9
+    return int(places[best][steps[best].argmax()])
+
+
+def _filled(reading: Reading, after: int, missing: int) -> Reading:
+    """Return a reading with frames put in that lie between those beside them."""
+    n = len(reading)
+    between = np.linspace(after - 1, after, missing + 2)[1:-1]
+    rows = np.concatenate([np.arange(after), between, np.arange(after, n)])
+    low = np.floor(rows).astype(np.int64)
+    share, high = rows - low, np.minimum(low + 1, n - 1)
+
+    def filled(values: FloatArray | None, *, turns: bool = False) -> FloatArray | None:
+        if values is None:
+            return None
+        one, other = values[low], values[high]
+        if turns:  # the nearer of the two quaternions of a rotation
+            other = np.where((one * other).sum(axis=-1, keepdims=True) < 0, -other, other)
+        weight = share.reshape(-1, *(1,) * (values.ndim - 1))
+        return np.asarray((1 - weight) * one + weight * other)
+
+    parts: dict[str, Any] = {
+        name: filled(getattr(reading, name), turns=name.endswith("quat"))
+        for name in (
+            "root_pos",
+            "root_quat",
+            "joint_pos",
+            "body_pos",
+            "body_quat",
+            "joint_vel",
+            "body_lin_vel",
+            "body_ang_vel",
+        )
+    }
+    times = reading.times_s
+    if times is not None:
+        times = times[0] + np.arange(len(rows)) / reading.rate_hz
+    return replace(reading, **parts, times_s=times)
+
+
 def _place(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
     meant, model = evidence.meant, evidence.model
     frames = some(len(reading), _FEW)
@@ -253,6 +358,10 @@ def _axes(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
         (np.array([0.5, 0.5, 0.5, 0.5]), "y points up and z ahead, not z up and x ahead"),
     ):
         yield Fault("axes", problem, _all_turned(reading, quat))
+    for order in ((1, 0, 2), (2, 1, 0), (0, 2, 1)):
+        one, other = ("xyz"[k] for k in range(3) if order[k] != k)
+        exchanged = _placed(reading, partial(np.take, indices=order, axis=-1))
+        yield Fault("axes", f"{one} and {other} of places are exchanged", exchanged)
     meant = evidence.meant
     if meant is None:
         return
@@ -314,6 +423,7 @@ _FINDERS: tuple[Callable[[Reading, Evidence], Iterator[Fault]], ...] = (
     _joints,
     _mirrored,
     _rate,
+    _frames,
     _place,
     _axes,
     _velocities,
