@@ -128,7 +128,7 @@ def test_shoulders_drawn_aside_one_by_one_from_a_trunk_that_begins_between_them(
     poses, labels = theia_poses(limbs), list(THEIA_PARTS)
     torso, *shoulders = (labels.index(name) for name in ("torso", "l_uarm", "r_uarm"))
     aside = poses[:, shoulders[0], :3, 3] - poses[:, torso, :3, 3]
-    swing = 0.5 * np.sin(np.arange(100) / 8.0)[:, None]
+    swing = 1.5 * np.sin(np.arange(100) / 8.0)[:, None]
     for side, sign in zip(shoulders, (1.0, -1.0), strict=True):
         poses[:, side, :3, 3] += aside * sign * np.maximum(sign * swing, 0.0)
     poses[:, torso, :3, 3] = sum(poses[:, side, :3, 3] for side in shoulders) / 2
