@@ -68,10 +68,10 @@ def recognise_skeleton(recording: Recording, names: Mapping[str, str] | None = N
     if plan is None and half is None:
         if names:
             return recognise_markers(recording, names)
-        some_names = ", ".join(skeleton.names[:6])
+        some_names = ", ".join([*body.names[:6], *(["..."] if len(body) > 6 else [])])
         raise BodyError(
-            f"no body in the skeleton of {recording.name!r} ({len(body)} joints: {some_names}, "
-            "...): two legs and two arms were not found among its branches, and none that are "
+            f"no body in the skeleton of {recording.name!r} ({len(body)} joints: {some_names}"
+            "): two legs and two arms were not found among its branches, and none that are "
             f"named so; {option('names')} says which joint is which"
         )
     report = recording.report

@@ -63,3 +63,17 @@ def test_names_do_not_steer_the_terminal_nor_the_picture(take, tmp_path, capsys)
     wild.write_text("\x1b[31mHIERARCHY\nMOTION\n")
     assert main(["inspect", str(wild), "--no-picture"]) == 2
     assert "\x1b" not in capsys.readouterr().err
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_take_of_nobody_is_drawn_with_the_reason_in_its_picture(tmp_path, capsys):
+    bone = "OFFSET 0 0 9\nCHANNELS 3 Xrotation Yrotation Zrotation\nEnd Site\n{ OFFSET 0 0 90 }\n"
+    motion = "MOTION\nFrames: 2\nFrame Time: 0.01\n0 0 0\n0 0 9\n"
+    (tmp_path / "rod.bvh").write_text(f"HIERARCHY\nROOT Rod\n{{\n{bone}}}\n{motion}")
+    picture = tmp_path / "rod.png"
+    assert main(["inspect", str(tmp_path / "rod.bvh"), "--picture", str(picture)]) == 0
+    assert "(2 joints: Rod, Rod_end): two legs" in capsys.readouterr().out
+    from matplotlib.pyplot import imread
+
+    dark = imread(picture)[..., :3].max(axis=2) < 0.3
+    assert dark.any(axis=1).sum() > 20  # lines of text, not the name alone

@@ -48,7 +48,8 @@ def draw(inspections: Sequence[Inspection], path: Path) -> None:
         if found.problem:
             text = printable(found.problem[:160])
             at = row[1 if columns > 1 else 0]
-            at.text(0, 0.5, text, fontsize=5, wrap=True, parse_math=False)
+            where = {"transform": at.transAxes, "in_layout": False}  # it may be wider than the rest
+            at.text(0, 0.4, text, fontsize=5, wrap=True, parse_math=False, **where)
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
