@@ -23,7 +23,7 @@ from mplearn_envs.robot import make_robot
 _TESTS = Path(__file__).parents[1] / "tests" / "envs" / "export"
 _HINGES = (  # what formats that hold bodies alone, and no hinges' angles, cannot have
     "degrees", "centimetres", "quaternion order", "joints breadth first", "two joints swapped",
-    "one joint backward", "inches",
+    "one joint backward", "inches", "one joint in degrees",
 )  # fmt: skip
 
 
