@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 from ..body import View
 from ..graph import TransitionGraph
@@ -12,7 +14,8 @@ from ..library import Primitive, PrimitiveLibrary, TreeNode
 from ..people import PeopleTree
 from ..recording import FloatArray
 from ..state import SharedState
-from ..tree import Node
+from ..tree import ROOT, Node
+from ..tree.nodes.node_table import Mark
 
 _LOOKED_AT = 256  # primitives that `prepare` looks at in one part
 
@@ -60,6 +63,11 @@ class Snapshots:
         self._body = body
         self._made: dict[int, _Made] = {}
         self._nodes: dict[int, TreeNode] = {}
+        self._primitives: dict[int, Primitive] = {}
+        self._by_key: dict[int | str, Primitive] = {}
+        self._mark: Mark | None = None  # when `take` looked at the nodes
+        self._basis: FloatArray | None = None
+        self._frozen: dict[int, FrozenState] = {}  # those that it took
         self._left: list[int] | None = None  # what `prepare` has still to look at
         self.frozen: dict[int, FrozenState] = {}
 
@@ -106,18 +114,17 @@ class Snapshots:
             tree: Its leaves become primitives.
             graph: Their transitions.
         """
+        mark, basis, graph = tree.mark(), tree.model_basis, graph.snapshot()
+        changed = tree.changed_since(self._mark)
+        same_rules = basis is self._basis is not None and self._frozen == self.frozen
         with tree.still():
-            nodes, basis = {node.id: node for node in tree.nodes}, tree.model_basis
-            self._made = {id: self._primitive(tree, nodes[id], basis) for id in tree.leaves}
-        self._nodes = {id: self._node(node) for id, node in nodes.items()}
-        primitives = [
-            replace(self.frozen[id].primitive, parent=made.primitive.parent)
-            if id in self.frozen
-            else made.primitive
-            for id, made in self._made.items()
-        ]
-        return PrimitiveLibrary(
-            primitives=tuple(primitives),
+            known = same_rules and changed is not None and self._follow(tree, changed, graph)
+            if not known:
+                self._go_through(tree, basis)
+        self._mark, self._basis, self._frozen = mark, basis, dict(self.frozen)
+        make = partial(PrimitiveLibrary.of_known, dict(self._by_key)) if known else PrimitiveLibrary
+        return make(
+            primitives=tuple(self._primitives.values()),
             graph=graph,
             channels=self._channels,
             rate_hz=self._rate_hz,
@@ -125,6 +132,47 @@ class Snapshots:
             tree=tuple(self._nodes.values()),
             recogniser=tree.recogniser(),
         )
+
+    def _go_through(self, tree: PeopleTree, basis: FloatArray | None) -> None:
+        """Look at all nodes."""
+        nodes = {node.id: node for node in tree.nodes}
+        self._made = {id: self._primitive(tree, nodes[id], basis) for id in tree.leaves}
+        self._nodes = {id: self._node(node) for id, node in nodes.items()}
+        self._primitives = {id: self._chosen(id) for id in self._made}
+        self._by_key = {each.name: each for each in self._primitives.values()}
+        self._by_key |= self._primitives
+
+    def _follow(
+        self, tree: PeopleTree, changed: Mapping[int, Node | None], graph: TransitionGraph
+    ) -> bool:
+        """Look at nodes that have changed; return False if all have to be looked at."""
+        for id in sorted(changed):
+            node, old = changed[id], self._primitives.get(id)
+            if old is not None:
+                del self._by_key[old.name], self._by_key[id]
+            if node is None:
+                self._nodes.pop(id, None)
+            elif not _comes_last(id, self._nodes):
+                return False
+            else:
+                self._nodes[id] = self._node(node)
+            if node is None or not node.is_leaf or id == ROOT:
+                self._made.pop(id, None)
+                self._primitives.pop(id, None)
+                if id in graph:
+                    return False
+                continue
+            self._made[id] = self._primitive(tree, node, self._basis)
+            now = self._chosen(id)
+            if now.name in self._by_key or not (_comes_last(id, self._primitives) and id in graph):
+                return False
+            self._primitives[id] = self._by_key[id] = self._by_key[now.name] = now
+        return len(graph) == len(self._primitives)
+
+    def _chosen(self, id: int) -> Primitive:
+        """Return what a primitive is in a library: as it was when it was frozen, if it is."""
+        made, frozen = self._made[id].primitive, self.frozen.get(id)
+        return made if frozen is None else replace(frozen.primitive, parent=made.parent)
 
     def _node(self, node: Node) -> TreeNode:
         """Return a node; the same object as in the library before, if it has not changed."""
@@ -154,6 +202,11 @@ class Snapshots:
             parent=node.parent,
         )
         return _Made(node.revision, basis, seen, made)
+
+
+def _comes_last(id: int, known: dict[int, Any]) -> bool:
+    """Whether an id is known, or comes after all that are."""
+    return id in known or not known or id > next(reversed(known))
 
 
 def read_model(view: View, seen: LeftRightHMM) -> LeftRightHMM:

@@ -114,6 +114,18 @@ class PrimitiveLibrary:
                 graph.add_node(id)
         object.__setattr__(self, "graph", graph.snapshot())
 
+    @classmethod
+    def of_known(cls, by_key: dict[Key, Primitive], **parts: Any) -> PrimitiveLibrary:
+        """Return a library of parts that were found to fit each other: none is looked at again.
+
+        Args:
+            by_key: The primitives, by id and by name.
+            **parts: All attributes.
+        """
+        library = object.__new__(cls)
+        library.__dict__.update(parts, _by_key=by_key)
+        return library
+
     def __repr__(self) -> str:
         """Return how many primitives there are, and the names of the first."""
         names = ", ".join(self.names[:8]) + (", ..." if len(self) > 8 else "")

@@ -24,6 +24,7 @@ from ..tree import (
     Repetition,
     TreeConfig,
 )
+from ..tree.nodes.node_table import Mark
 from .config import PeopleConfig
 from .editing import prune
 from .people_state import PeopleState, PersonState
@@ -117,6 +118,14 @@ class PeopleTree:
     def still(self) -> AbstractContextManager[None]:
         """While this lasts nothing changes: much can be asked of many primitives at little cost."""
         return self._primitives.still()
+
+    def mark(self) -> Mark | None:
+        """Return this moment, for `changed_since`; None where changes are not noticed."""
+        return self._primitives.mark()
+
+    def changed_since(self, mark: Mark | None) -> dict[int, Node | None] | None:
+        """Return the nodes that came, changed or went by id; None where that is not known."""
+        return self._primitives.changed_since(mark)
 
     def node(self, id: int) -> Node:
         """Return a node.

@@ -13,6 +13,7 @@ from ..errors import UnknownPrimitiveError
 from ..hmm import LeftRightHMM
 from ..recording import FloatArray, IntArray
 from ..tree import Change, Exchange, Node, Placement, PrimitiveTree, Recogniser
+from ..tree.nodes.node_table import Mark
 from . import editing
 from .common import CommonRecogniser, common_model
 from .constraints import Key
@@ -46,6 +47,12 @@ class Primitives(Protocol):
 
     def still(self) -> AbstractContextManager[None]:
         """While this lasts nothing changes: what is asked of many primitives is looked up once."""
+
+    def mark(self) -> Mark | None:
+        """Return this moment, for `changed_since`; None where changes are not noticed."""
+
+    def changed_since(self, mark: Mark | None) -> dict[int, Node | None] | None:
+        """Return the nodes that came, changed or went by id; None where that is not known."""
 
     def node(self, id: int) -> Node:
         """Return a node."""
@@ -143,6 +150,14 @@ class OnePersonsPrimitives:
     def still(self) -> AbstractContextManager[None]:
         """Return nothing to be done: the tree knows its nodes by id."""
         return nullcontext()
+
+    def mark(self) -> Mark:
+        """Return this moment in the life of the tree."""
+        return self.tree.mark()
+
+    def changed_since(self, mark: Mark | None) -> dict[int, Node | None] | None:
+        """Return the nodes of the tree that came, changed or went."""
+        return self.tree.changed_since(mark)
 
     def node(self, id: int) -> Node:
         """Return a node of the tree."""
@@ -282,6 +297,12 @@ class SharedPrimitives:
             yield
         finally:
             self._still = before
+
+    def mark(self) -> None:
+        """Return nothing: nodes are put together whenever they are asked for."""
+
+    def changed_since(self, mark: Mark | None) -> None:
+        """Return nothing: any of them may be another one."""
 
     def node(self, id: int) -> Node:
         """Return a node.

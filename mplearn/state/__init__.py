@@ -8,6 +8,8 @@ from .checkpoint import key_of as key_of
 from .checkpoint import resumed as resumed
 from .checkpoint import to_bytes as to_bytes
 from .declared import Blob as Blob
+from .declared import Block as Block
+from .declared import Row as Row
 from .declared import SharedState as SharedState
 from .declared import State as State
 from .declared import fields_of as fields_of
@@ -25,6 +27,7 @@ from .fields import saved_as as saved_as
 from .files import SQLITE as SQLITE
 from .files import FileFormat as FileFormat
 from .files import is_database as is_database
+from .kept import Kept as Kept
 from .settings import from_settings as from_settings
 from .settings import to_settings as to_settings
 from .structure import from_plain as from_plain

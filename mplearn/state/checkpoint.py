@@ -4,20 +4,23 @@ A `Blob` or `SharedState` is packed into one string of bytes, whose hash is its 
 it refers to it by that. As long as the part stays the same object, neither is worked out again: a
 checkpoint costs what has changed since the last one.
 
-A long row of parts is itself kept in parts, of about `_ROW` each. Where one ends is said by the key
-of its last, not by its place, so that one that changes, comes or goes changes those near it alone.
+A long row of parts is itself kept in parts: the blocks of a `Row`, which its owner keeps as long as
+nothing in them changes. What comes without is cut into some of about `_ROW` each: where one ends is
+said by the key of its last, so that one that changes, comes or goes changes those near it alone.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from itertools import chain
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
 from ..errors import StateError
-from .declared import Blob, SharedState, fields_of, to_plain
+from .declared import Blob, Block, Row, SharedState, fields_of, to_plain
+from .kept import Kept
 from .packing import as_json, from_json, packed, unpacked
 from .structure import from_plain
 
@@ -33,7 +36,7 @@ class Checkpoint(NamedTuple):
 
     Attributes:
         document: All that is no shared part, with the keys of those that are.
-        parts: Keys of the shared parts that the state is made of, without repeats.
+        held: What it names: the keys of all parts that each is made of, itself last, by its key.
         new: The bytes of those that were not known before, by key; none refers to a later one.
 
     Example:
@@ -46,11 +49,16 @@ class Checkpoint(NamedTuple):
     """
 
     document: bytes
-    parts: tuple[str, ...]
+    held: Mapping[str, tuple[str, ...]]
     new: Mapping[str, bytes]
 
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Keys of the shared parts that the state is made of, without repeats."""
+        return tuple(dict.fromkeys(chain.from_iterable(self.held.values())))
 
-Part: TypeAlias = Blob | SharedState
+
+Part: TypeAlias = Blob | SharedState | Block[SharedState]
 
 
 class _Content(NamedTuple):
@@ -59,12 +67,12 @@ class _Content(NamedTuple):
     Attributes:
         key: Hash of its bytes.
         inner: The parts that it refers to itself.
-        below: Keys of all parts that it is made of, each after those that it refers to itself.
+        made_of: Keys of all parts that it is made of, each after those that it refers to itself.
     """
 
     key: str
     inner: tuple[Part, ...]
-    below: tuple[str, ...]
+    made_of: tuple[str, ...]
 
 
 def checkpoint(state: Any, known: Container[str] = ()) -> Checkpoint:
@@ -72,7 +80,8 @@ def checkpoint(state: Any, known: Container[str] = ()) -> Checkpoint:
 
     Args:
         state: The state.
-        known: Keys of the parts that are kept.
+        known: Keys of the parts that are kept. Of a `Kept`, what it holds is whole; of any other,
+            it is looked up whether all is there that a part is made of.
 
     Example:
         >>> import numpy as np
@@ -80,38 +89,39 @@ def checkpoint(state: Any, known: Container[str] = ()) -> Checkpoint:
         >>> len(first.new), len(checkpoint(Blob(np.arange(3.0)), first.parts).new)
         (1, 0)
     """
-    found: dict[str, None] = {}
+    held: dict[str, tuple[str, ...]] = {}
+    done: set[str] = set()
     new: dict[str, bytes] = {}
 
     def note(part: Part) -> str:
         content, data = _content(part), b""
         if content is None:
             content, data = _packed(part)
-        if content.key in known and all(map(known.__contains__, content.below)):
-            found.update(dict.fromkeys((*content.below, content.key)))
-        elif content.key not in found:
-            for each in content.inner:
-                note(each)
-            found[content.key] = None
-            if content.key not in known:
-                new[content.key] = data or _packed(part)[1]
+        if content.key not in held:
+            held[content.key] = content.made_of
+            write(part, content, data)
         return content.key
 
-    def note_row(keys: Sequence[str]) -> str:
-        data = to_bytes({_ROWS: " ".join(keys)})
-        key = hash_of(data)
-        found[key] = None
-        if key not in known:
-            new[key] = data
-        return key
+    def write(part: Part, content: _Content, data: bytes) -> None:
+        if content.key in done:
+            return
+        done.add(content.key)
+        there = content.key in known
+        if there and (isinstance(known, Kept) or all(map(known.__contains__, content.made_of))):
+            return
+        for each in content.inner:
+            write(each, _made_of(each), b"")
+        if not there:
+            new[content.key] = data or _packed(part)[1]
 
-    def share(each: Part | Sequence[SharedState]) -> dict[str, str]:
+    def share(each: Blob | SharedState | Sequence[SharedState]) -> dict[str, str]:
         if isinstance(each, (Blob, SharedState)):
             return {_KEY: note(each)}
-        return {_ROWS: " ".join(map(note_row, _rows(map(note, each))))}
+        blocks = each.blocks if isinstance(each, Row) else _blocks(each)
+        return {_ROWS: " ".join(map(note, blocks))}
 
     document = to_bytes({_WHOLE: to_plain(state, share, whole=True)})
-    return Checkpoint(document, tuple(found), new)
+    return Checkpoint(document, held, new)
 
 
 def resumed(kind: type[T], document: bytes, part: Callable[[str], bytes]) -> T:
@@ -195,16 +205,13 @@ def _below(place: str, value: Any, part: Callable[[str], bytes], seen: dict[str,
         raise error.below(place) from None
 
 
-def _rows(keys: Iterator[str]) -> Iterator[list[str]]:
-    """Cut a row of keys behind each whose last digits are 0."""
-    row: list[str] = []
-    for key in keys:
-        row.append(key)
-        if int(key[-2:], 16) % _ROW == 0:
-            yield row
-            row = []
-    if row:
-        yield row
+def _blocks(row: Sequence[SharedState]) -> Iterator[Block[SharedState]]:
+    """Cut a row of parts behind each whose key has 0 for its last digits."""
+    start = 0
+    for end, each in enumerate(row, start=1):
+        if int(key_of(each)[-2:], 16) % _ROW == 0 or end == len(row):
+            yield Block(row[start:end])
+            start = end
 
 
 def key_of(part: Part) -> str:
@@ -233,16 +240,20 @@ def _packed(part: Part) -> tuple[_Content, bytes]:
     """Pack a part: return what refers to it, and its bytes."""
     inner: list[Part] = []
 
-    def note(each: Part | Sequence[SharedState]) -> Any:
+    def note(each: Blob | SharedState | Sequence[SharedState]) -> Any:
         if not isinstance(each, (Blob, SharedState)):
             return [note(item) for item in each]
         inner.append(each)
         return {_KEY: key_of(each)}
 
-    data = to_bytes(part.array if isinstance(part, Blob) else fields_of(part, note, whole=True))
+    if isinstance(part, Block):
+        inner += part
+        data = to_bytes({_ROWS: " ".join(map(key_of, part))})
+    else:
+        data = to_bytes(part.array if isinstance(part, Blob) else fields_of(part, note, whole=True))
     key = hash_of(data)
-    below = {name: None for each in inner for name in (*_made_of(each).below, key_of(each))}
-    content = _Content(key, tuple(inner), tuple(below))
+    made_of = dict.fromkeys(name for each in inner for name in _made_of(each).made_of)
+    content = _Content(key, tuple(inner), (*made_of, key))
     object.__setattr__(part, "content", content)
     return content, data
 

@@ -8,16 +8,19 @@ walk over dataclass fields, which is the smaller part of `structure`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
-from typing import Any, TypeAlias, TypeGuard, cast
+from itertools import chain
+from typing import Any, TypeAlias, TypeGuard, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .fields import absent_fields, saved_names
 from .packing import packed
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +102,34 @@ class Blob:
         return f"Blob{self.array.shape}"
 
 
+class Block(tuple[T, ...]):
+    """Some states of a `Row` that are kept together, once by their content."""
+
+    content: Any = None  # as that of a `Blob`
+
+
+class Row(tuple[T, ...]):
+    """A long row of states in blocks, each the same object as long as nothing in it changes.
+
+    Example:
+        >>> from mplearn.graph import TransitionGraph
+        >>> empty = TransitionGraph().state()
+        >>> row = Row.of([Block([empty, empty]), Block([empty])])
+        >>> len(row), list(map(len, row.blocks))
+        (3, [2, 1])
+    """
+
+    blocks: tuple[Block[T], ...] = ()
+
+    @classmethod
+    def of(cls, blocks: Iterable[Block[T]]) -> Row[T]:
+        """Return blocks as a row."""
+        parts = tuple(blocks)
+        row = cls(chain.from_iterable(parts))
+        row.blocks = parts
+        return row
+
+
 Share: TypeAlias = Callable[[Blob | SharedState | tuple[SharedState, ...]], Any]
 MANY = 32  # parts in a row that are kept in parts of them
 
@@ -128,7 +159,7 @@ def to_plain(value: Any, share: Share | None = None, *, whole: bool = False) -> 
     if isinstance(value, Blob):
         return value.array
     if isinstance(value, (tuple, list)):
-        if share is not None and len(value) > MANY and _is_row(value):
+        if share is not None and len(value) > MANY and (isinstance(value, Row) or _is_row(value)):
             return share(value)
         return [to_plain(item, share, whole=whole) for item in value]
     if isinstance(value, dict):

@@ -26,7 +26,7 @@ from typing import (
 import numpy as np
 
 from ..errors import MPLearnError, StateError
-from .declared import Blob, State
+from .declared import Blob, Row, State
 from .fields import (
     LARGEST,
     WHOLE,
@@ -228,7 +228,7 @@ def _row(kinds: tuple[Any, ...], names: tuple[str, ...] = ()) -> Reader:
 
 def _kept(value: Any, found: list[Any]) -> tuple[Any, ...]:
     """Return what was found; the same tuple, where it was found in one that needs no change."""
-    if type(value) is tuple and all(map(operator.is_, value, found)):
+    if type(value) in (tuple, Row) and all(map(operator.is_, value, found)):
         return value
     return tuple(found)
 

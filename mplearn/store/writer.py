@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..errors import StoreError
-from ..state import checkpoint
+from ..state import Kept, checkpoint
 from .database import named
 from .life_state import LifeState
 from .records import Record
@@ -66,7 +66,11 @@ class Writer:
         self.figures = Figures()
         self._connection = connection
         self._path = path
-        self._parts, self._checkpoints = parts, dict(kept)
+        self._kept, self._loose = Kept(), parts  # what no checkpoint holds, and yet is there
+        for seq, keys in kept.items():
+            self._kept.add(seq, {f"checkpoint {seq}": tuple(keys)})
+            self._loose -= keys
+        self._begun: set[str] = set()  # parts of a checkpoint that is not written yet
         self._rows: deque[tuple[int, Record]] = deque()
         self._next: tuple[int, LifeState] | None = None
         self._wake = threading.Condition()
@@ -172,14 +176,14 @@ class Writer:
                 return
             seq, state = self._next
         start = time.perf_counter()
-        made = checkpoint(state, self._parts)
-        for batch in _batches(made.new):
+        made = checkpoint(state, self._kept)
+        for batch in _batches({k: data for k, data in made.new.items() if k not in self._begun}):
             with _transaction(self._connection):
                 self._connection.executemany("INSERT OR REPLACE INTO part VALUES (?, ?)", batch)
-            self._parts.update(key for key, _ in batch)
+            self._begun.update(key for key, _ in batch)
             self._write_rows()
-        self._checkpoints[seq] = frozenset(made.parts)
-        kept = sorted(self._checkpoints)[-_KEPT:]
+        before = list(self._kept)
+        kept = sorted({*before, seq})[-_KEPT:]
         with _transaction(self._connection):
             write_checkpoint(self._connection, seq, time.time(), made)
             self._connection.execute("DELETE FROM log WHERE seq <= ?", (kept[0],))
@@ -188,22 +192,27 @@ class Writer:
         with self._wake:
             if self._next is not None and self._next[0] == seq:
                 self._next = None
-        self._checkpoints = {each: self._checkpoints[each] for each in kept}
+        self._loose |= self._begun
+        self._begun = set()
+        for old in before:
+            if old == seq or old not in kept:
+                self._loose.update(self._kept.drop(old))
+        self._kept.add(seq, made.held)
         self._drop_parts()
         self.figures.checkpoints_s.append(time.perf_counter() - start)
         self.figures.written.append(sum(map(len, made.new.values())) + len(made.document))
 
     def _drop_parts(self) -> None:
         """Delete the parts that no checkpoint holds any more, and give room back."""
-        held = frozenset().union(*self._checkpoints.values())
-        gone = sorted(self._parts - held)
+        gone = sorted(key for key in self._loose if key not in self._kept)
+        self._loose = set(gone)
         for at in range(0, len(gone), _DROPPED):
             keys = gone[at : at + _DROPPED]
             with _transaction(self._connection):
                 self._connection.executemany(
                     "DELETE FROM part WHERE key = ?", [(key,) for key in keys]
                 )
-            self._parts.difference_update(keys)
+            self._loose.difference_update(keys)
             self._write_rows()
         self._connection.execute(f"PRAGMA incremental_vacuum({_FREE_PAGES})").fetchall()
 

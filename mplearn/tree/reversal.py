@@ -17,6 +17,7 @@ import numpy as np
 from ..recording import FloatArray, IntArray
 from ..state import Array, State
 from .nodes.node import Node, NodeState, without_one
+from .nodes.node_table import NodeTable
 from .nodes.search import mean_nearest
 from .nodes.structure import Structure
 from .placement import ROOT
@@ -319,7 +320,7 @@ class _Reversal:
         mine = {n for id in self.leaves for n in nodes[id].members}
         self._take_from_others(mine)
         memory.release(*(n for group in stale for n in group))
-        self.structure.nodes = dict(sorted(nodes.items()))
+        self.structure.nodes = NodeTable(nodes[id] for id in sorted(nodes))
         return [
             (n, id)
             for id in self.leaves

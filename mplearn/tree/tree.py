@@ -31,6 +31,7 @@ from .exemplars.renewal import RenewalState
 from .exemplars.spread import SampleState, SpreadState
 from .models import GroupModels, Model
 from .nodes.node import Node, NodeState
+from .nodes.node_table import Mark, NodeTable
 from .nodes.structure import Structure
 from .placement import ROOT, Change, Placement
 from .recogniser import Recogniser, refusal
@@ -235,6 +236,14 @@ class PrimitiveTree:
     def nodes(self) -> tuple[Node, ...]:
         """All nodes, the root first, in the order of their birth."""
         return tuple(self._structure.nodes.values())
+
+    def mark(self) -> Mark:
+        """Return this moment, for `changed_since`."""
+        return self._structure.nodes.mark()
+
+    def changed_since(self, mark: Mark | None) -> dict[int, Node | None] | None:
+        """Return the nodes that came, changed or went by id; None where that is not known."""
+        return self._structure.nodes.changed_since(mark)
 
     def node(self, id: int) -> Node:
         """Return a node.
@@ -627,7 +636,7 @@ class PrimitiveTree:
             floor=memory.bank.floor.copy(),
             spread=memory.spread(),
             sample=memory.sample(),
-            nodes=tuple(node.state(memory.blob) for node in self.nodes),
+            nodes=self._structure.nodes.states(memory.blob),
             renewal=memory.renewal_state(),
             neighbours=memory.neighbours.counts.copy(),
             follows=np.array(self._memory.follows, np.int64),
@@ -659,7 +668,8 @@ class PrimitiveTree:
         self._memory = memory
         self._structure = Structure(self.config, memory)
         self._structure.next_id = state.next_id
-        self._structure.nodes = {node.id: Node.from_state(node) for node in state.nodes}
+        nodes = sorted(state.nodes, key=lambda node: node.id)
+        self._structure.nodes = NodeTable(map(Node.from_state, nodes))
         self._structure.reindex()
         self._structure.tune()
         if state.renewal is not None:

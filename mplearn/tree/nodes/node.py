@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
@@ -14,6 +14,13 @@ from ..exemplars.spread import without
 from .clustering import most_redundant
 
 Happening: TypeAlias = Literal["born", "split", "merged", "moved", "undone"]
+
+
+class Table(Protocol):
+    """What notices changes of the nodes in it."""
+
+    def notice(self, id: int) -> None:
+        """Take note that a node has changed."""
 
 
 class StoodFor(NamedTuple):
@@ -124,10 +131,17 @@ class Node:
     stood_for: Mapping[int, tuple[int, int]] = field(default_factory=dict)
     revision: object = field(init=False, repr=False)
     _kept: tuple[object, NodeState] | None = field(init=False, repr=False, default=None)
+    _table: ClassVar[Table | None] = None  # in each node that is in one, that one
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Set an attribute, and let its state be looked at anew."""
         self.__dict__.update({name: value, "revision": object()})
+        if self._table is not None:
+            self._table.notice(self.id)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return its attributes: not the table that it is in."""
+        return {name: value for name, value in self.__dict__.items() if name != "_table"}
 
     def __eq__(self, other: object) -> bool:
         """Whether it is a node of the same content, frames apart."""

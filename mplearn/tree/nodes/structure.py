@@ -11,6 +11,7 @@ from ..config import TreeConfig
 from ..exemplars.memory import SegmentMemory
 from ..placement import ROOT, Change, Merge, Reparent, Split
 from .node import Node, without_one
+from .node_table import NodeTable
 from .search import NodeIndex
 
 
@@ -31,7 +32,7 @@ class Structure:
     def __init__(self, config: TreeConfig, memory: SegmentMemory) -> None:
         self.config = config
         self.memory = memory
-        self.nodes = {ROOT: Node(ROOT, None, 0)}
+        self.nodes = NodeTable([Node(ROOT, None, 0)])
         self.next_id = ROOT + 1
         self.least = config.min_exemplars
         self.index = NodeIndex(config, memory.bank)
