@@ -56,7 +56,7 @@ def _stages(teacher: Teacher, learner: MotionLearner) -> list[tuple[str, str, st
             (title + "slowest frame between", _ms(max(frames)), "", _FRAME_MS),
         ]
         table += _kept(learner, title)
-        more = one_more(learner, teacher, stage, set(checkpoint(learner.state()).parts))
+        more = one_more(learner, teacher, stage)
         table += [(f"{title}one more, {what}", took, "", "") for what, took in more.items()]
     return table
 

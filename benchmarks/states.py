@@ -11,7 +11,7 @@ import numpy as np
 
 from mplearn import LearnerConfig, MotionLearner
 from mplearn.recording import Segment
-from mplearn.state import checkpoint
+from mplearn.state import Kept, checkpoint
 
 T = TypeVar("T")
 _CHANNELS, _RATE_HZ, _KEYS = 20, 100.0, 4
@@ -56,10 +56,10 @@ def rows() -> list[tuple[str, str, str, str]]:
                 teach(learner, teacher.perform(motion))
         title = f"{len(learner.tree.leaves)} primitives: "
         first_s, state = _timed(learner.state)
-        packed_s, kept = _timed(partial(checkpoint, state))
+        packed_s, made = _timed(partial(checkpoint, state))
         first_library_s, _ = _timed(learner.snapshot)
-        size = len(kept.document) + sum(map(len, kept.new.values()))
-        more = one_more(learner, teacher, n, set(kept.parts))
+        size = len(made.document) + sum(map(len, made.new.values()))
+        more = one_more(learner, teacher, n)
         first = _ms([first_s]), _ms([packed_s]), _kb([size]), _ms([first_library_s])
         table += [
             (title + what, took, at_first, "the first one")
@@ -68,24 +68,26 @@ def rows() -> list[tuple[str, str, str, str]]:
     return table
 
 
-def one_more(learner: MotionLearner, teacher: Teacher, n: int, known: set[str]) -> dict[str, str]:
+def one_more(learner: MotionLearner, teacher: Teacher, n: int) -> dict[str, str]:
     """Return what a state, a checkpoint and a snapshot cost after one segment more, the median.
 
     Args:
         learner: Who has learned ``n`` motions.
         teacher: Who performs them.
         n: Number of motions.
-        known: Parts that are kept already.
     """
     state_s, packing_s, library_s, sizes = [], [], [], []
-    for _ in range(9):
+    kept = Kept()
+    kept.add(0, checkpoint(learner.state()).held)
+    for k in range(1, 10):
         teach(learner, teacher.perform(int(teacher.rng.integers(n))))
         took_s, state = _timed(learner.state)
         state_s.append(took_s)
-        took_s, kept = _timed(partial(checkpoint, state, known))
+        took_s, made = _timed(partial(checkpoint, state, kept))
         packing_s.append(took_s)
-        sizes.append(len(kept.document) + sum(map(len, kept.new.values())))
-        known.update(kept.new)
+        sizes.append(len(made.document) + sum(map(len, made.new.values())))
+        kept.add(k, made.held)
+        kept.drop(k - 1)
         library_s.append(_timed(learner.snapshot)[0])
     return {
         "state": _ms(state_s),

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import InvalidValueError
 from ..recording import BoolArray, FloatArray, IntArray
+from ..state import IntTable, KeptBlocks
 
 _SOURCE, _TARGET, _COUNT, _TOTAL_MS, _SQUARES_MS2 = range(5)
 _LONGEST_S = 86_400.0
@@ -24,6 +25,7 @@ class EdgeTable:
         self._into: dict[int, int] = {}  # counts by target
         self._from: dict[int, tuple[int, int]] = {}  # counts, and targets, by source
         self._n_taken = 0
+        self._blocks = KeptBlocks()
 
     def __len__(self) -> int:
         """Number of edges."""
@@ -37,6 +39,10 @@ class EdgeTable:
     def rows(self) -> IntArray:
         """A copy of the rows, shape (E, 5), in the order in which the edges were first seen."""
         return self._rows[: len(self)].copy()
+
+    def table(self) -> IntTable:
+        """Return the rows in blocks, those of before as long as nothing in them changes."""
+        return self._blocks.table(self._rows[: len(self)])
 
     @property
     def sources(self) -> IntArray:
@@ -123,6 +129,7 @@ class EdgeTable:
         twin._rows, twin._row_of = self._rows.copy(), dict(self._row_of)
         twin._into, twin._from = dict(self._into), dict(self._from)
         twin._n_taken = self._n_taken
+        twin._blocks = self._blocks.copy()
         return twin
 
     def without(self, gone: BoolArray) -> EdgeTable:
@@ -153,3 +160,4 @@ class EdgeTable:
             self._rows[row, : _TARGET + 1] = edge
             self._row_of[edge] = row
         self._rows[row, _COUNT:] += amounts
+        self._blocks.touch(row)

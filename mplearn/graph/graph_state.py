@@ -7,8 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from ..recording import IntArray
-from ..state import WHOLE, Array, Range, SharedState, require
+from ..state import WHOLE, Array, IntTable, Range, SharedState, require
 
 _LONGEST_MS = 86_400_000
 
@@ -30,20 +29,21 @@ class GraphState(SharedState):
         >>> graph = TransitionGraph()
         >>> graph.add_node(1), graph.add_node(2), graph.observe(1, 2, 0.5)
         (None, None, None)
-        >>> graph.state().ids.tolist(), graph.state().edges[0, :3].tolist()
+        >>> graph.state().ids.array.tolist(), graph.state().edges.array[0, :3].tolist()
         ([1, 2], [1, 2, 1])
     """
 
     order: Annotated[int, Range(1, 8)]
     concentration: Annotated[float, Range(1e-12)]
     history_capacity: Annotated[int, Range(4, 10_000_000)]
-    ids: Annotated[IntArray, Array("n")]
-    edges: Annotated[IntArray, Array(None, 5, high=2.0**62)]
-    histories: Annotated[IntArray, Array(None, None)]
+    ids: Annotated[IntTable, Array("n")]
+    edges: Annotated[IntTable, Array(None, 5, high=2.0**62)]
+    histories: Annotated[IntTable, Array(None, None)]
 
     def check(self) -> None:
         """Check that transitions name only nodes, and that counts and durations can be."""
-        ids, edges, histories, order = self.ids, self.edges, self.histories, self.order
+        ids, edges, histories = self.ids.array, self.edges.array, self.histories.array
+        order = self.order
         require(histories.shape[1] == order + 3, "histories", f"must have shape (H, {order + 3})")
         require(len(histories) <= self.history_capacity, "histories", "must not exceed capacity")
         require(len(set(ids.tolist())) == len(ids), "ids", "must differ")

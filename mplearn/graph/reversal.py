@@ -9,7 +9,7 @@ from typing import Annotated, TypeAlias
 import numpy as np
 
 from ..recording import IntArray
-from ..state import Array, Count, State
+from ..state import Array, Count, KeptBlocks, State
 from .graph_state import GraphState
 
 Key: TypeAlias = tuple[int, ...]
@@ -53,8 +53,8 @@ class GraphEdit(State):
     def between(cls, before: GraphState, after: GraphState) -> GraphEdit:
         """Return what differs between a graph of one moment and another."""
         n_context = 1 + before.order
-        edges = _changed(before.edges, after.edges, 2)
-        histories = _changed(before.histories, after.histories, n_context)
+        edges = _changed(before.edges.array, after.edges.array, 2)
+        histories = _changed(before.histories.array, after.histories.array, n_context)
         old, new = (CountsState(edges[side], histories[side]) for side in (0, 1))
         return cls(old, new, before.order)
 
@@ -76,9 +76,9 @@ def exchanged(
         ids: The nodes that there are now.
     """
     known = set(ids)
-    edges = _put(now.edges, edit.before.edges, edit.after.edges, 2, heirs)
+    edges = _put(now.edges.array, edit.before.edges, edit.after.edges, 2, heirs)
     edges = {key: _sound(values) for key, values in edges.items() if known.issuperset(key)}
-    histories = _put(now.histories, edit.before.histories, edit.after.histories, -1, heirs)
+    histories = _put(now.histories.array, edit.before.histories, edit.after.histories, -1, heirs)
     rows = []
     for key, (n,) in histories.items():
         length, context, after = key[0], key[1 : 1 + key[0]], key[-1]
@@ -87,9 +87,9 @@ def exchanged(
             rows.append((length, *key[1:], min(n, most)))
     return replace(
         now,
-        ids=np.array(sorted(known), np.int64),
-        edges=_array([(*key, *values) for key, values in edges.items()], 5),
-        histories=_array(rows, edit.order + 3),
+        ids=KeptBlocks().table(sorted(known)),
+        edges=KeptBlocks().table(_array([(*key, *values) for key, values in edges.items()], 5)),
+        histories=KeptBlocks().table(_array(rows, edit.order + 3)),
     )
 
 

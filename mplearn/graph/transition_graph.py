@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InvalidValueError, NoPathError, UnknownPrimitiveError
 from ..recording import FloatArray, IntArray
-from ..state import validated
+from ..state import KeptBlocks, validated
 from .chains import find_chains, merged_edges
 from .constraints import Asked, Constraints, constrained_walks
 from .edges import EdgeTable
@@ -79,6 +79,7 @@ class TransitionGraph:
         self.concentration = concentration
         self.history_capacity = history_capacity
         self._index: dict[int, int] = {}
+        self._ids = KeptBlocks()
         self._edges = EdgeTable()
         self._histories = HistoryTable(order, history_capacity)
         self._frozen = False
@@ -121,7 +122,7 @@ class TransitionGraph:
         gone = (self._edges.sources == id) | (self._edges.targets == id)
         self._edges = self._edges.without(gone)
         self._histories = self._histories.without(id)
-        self._index = {i: k for k, i in enumerate(i for i in self._index if i != id)}
+        self._index_anew(i for i in self._index if i != id)
 
     def merge_nodes(self, keep: int, merged: int) -> None:
         """Make two nodes one: what was counted for ``merged`` is added to ``keep``.
@@ -176,7 +177,8 @@ class TransitionGraph:
         """
         self._before_change()
         twin = TransitionGraph.from_state(exchanged(self.state(), edit, heirs, ids))
-        self._index, self._edges, self._histories = twin._index, twin._edges, twin._histories
+        self._index, self._ids = twin._index, twin._ids
+        self._edges, self._histories = twin._edges, twin._histories
         self._forget()
 
     # ---- looking
@@ -601,9 +603,9 @@ class TransitionGraph:
                 order=self.order,
                 concentration=self.concentration,
                 history_capacity=self.history_capacity,
-                ids=np.array(self.ids, dtype=np.int64),
-                edges=self._edges.rows,
-                histories=self._histories.to_array(),
+                ids=self._ids.table(self.ids),
+                edges=self._edges.table(),
+                histories=self._histories.table(),
             )
         return self._state
 
@@ -620,9 +622,9 @@ class TransitionGraph:
             concentration=state.concentration,
             history_capacity=state.history_capacity,
         )
-        graph._index = {id: k for k, id in enumerate(state.ids.tolist())}
-        graph._edges.add(state.edges)
-        graph._histories = HistoryTable.from_array(
+        graph._index = {id: k for k, id in enumerate(state.ids.array.tolist())}
+        graph._edges.add(state.edges.array)
+        graph._histories = HistoryTable.from_table(
             graph.order, graph.history_capacity, state.histories
         )
         return graph
@@ -643,7 +645,7 @@ class TransitionGraph:
             concentration=self.concentration,
             history_capacity=self.history_capacity,
         )
-        twin._index = dict(self._index)
+        twin._index, twin._ids = dict(self._index), self._ids.copy()
         twin._edges = self._edges.copy()
         twin._histories = self._histories.copy()
         return twin
@@ -695,8 +697,10 @@ class TransitionGraph:
         self._before_change()
         self._edges = self._edges.renamed(new_id)
         self._histories = self._histories.renamed(new_id)
-        ids = dict.fromkeys(new_id.get(id, id) for id in self._index)
-        self._index = {id: k for k, id in enumerate(ids)}
+        self._index_anew(dict.fromkeys(new_id.get(id, id) for id in self._index))
+
+    def _index_anew(self, ids: Iterable[int]) -> None:
+        self._index, self._ids = {id: k for k, id in enumerate(ids)}, KeptBlocks()
 
     def _surprises_after(self, length: int) -> FloatArray:
         if length not in self._usual:

@@ -109,14 +109,14 @@ class LearnerState(State):
         for k, frozen in enumerate(self.frozen):
             there = frozen.primitive.id in primitives
             require(there, f"frozen[{k}]", f"must be one of {sorted(primitives)}")
-        ids = set(self.graph.ids.tolist())
+        nodes = self.graph.ids.array
+        ids = set(nodes.tolist())
         require(ids <= primitives, "graph.ids", f"must be primitives, {sorted(primitives)}")
         for k, block in enumerate(self.chain.segments):
             place = f"chain.segments[{k}]"
             known = block.primitive[block.primitive >= 0]
-            require(
-                bool(np.isin(known, self.graph.ids).all()), f"{place}.primitive", "must be known"
-            )
+            there = bool(np.isin(known, nodes).all())
+            require(there, f"{place}.primitive", "must be known")
             require(
                 bool((block.nearest < self.tree.free_id).all()),
                 f"{place}.nearest",

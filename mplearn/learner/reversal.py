@@ -22,7 +22,7 @@ class Known(NamedTuple):
         >>> from mplearn import LearnerConfig, MotionLearner
         >>> learner = MotionLearner(LearnerConfig(("elbow",)))
         >>> known = learner.known()
-        >>> len(known.people.trees), known.graph.ids.tolist()
+        >>> len(known.people.trees), known.graph.ids.array.tolist()
         (1, [])
     """
 

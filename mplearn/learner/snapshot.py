@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, NamedTuple
 
 from ..body import View
@@ -64,7 +63,7 @@ class Snapshots:
         self._made: dict[int, _Made] = {}
         self._nodes: dict[int, TreeNode] = {}
         self._primitives: dict[int, Primitive] = {}
-        self._by_key: dict[int | str, Primitive] = {}
+        self._names: set[str] = set()
         self._mark: Mark | None = None  # when `take` looked at the nodes
         self._basis: FloatArray | None = None
         self._frozen: dict[int, FrozenState] = {}  # those that it took
@@ -120,10 +119,10 @@ class Snapshots:
         with tree.still():
             known = same_rules and changed is not None and self._follow(tree, changed, graph)
             if not known:
+                self._mark = None
                 self._go_through(tree, basis)
-        self._mark, self._basis, self._frozen = mark, basis, dict(self.frozen)
-        make = partial(PrimitiveLibrary.of_known, dict(self._by_key)) if known else PrimitiveLibrary
-        return make(
+        make = PrimitiveLibrary.of_fitting if known else PrimitiveLibrary
+        library = make(
             primitives=tuple(self._primitives.values()),
             graph=graph,
             channels=self._channels,
@@ -132,6 +131,8 @@ class Snapshots:
             tree=tuple(self._nodes.values()),
             recogniser=tree.recogniser(),
         )
+        self._mark, self._basis, self._frozen = mark, basis, dict(self.frozen)
+        return library
 
     def _go_through(self, tree: PeopleTree, basis: FloatArray | None) -> None:
         """Look at all nodes."""
@@ -139,8 +140,7 @@ class Snapshots:
         self._made = {id: self._primitive(tree, nodes[id], basis) for id in tree.leaves}
         self._nodes = {id: self._node(node) for id, node in nodes.items()}
         self._primitives = {id: self._chosen(id) for id in self._made}
-        self._by_key = {each.name: each for each in self._primitives.values()}
-        self._by_key |= self._primitives
+        self._names = {each.name for each in self._primitives.values()}
 
     def _follow(
         self, tree: PeopleTree, changed: Mapping[int, Node | None], graph: TransitionGraph
@@ -149,7 +149,7 @@ class Snapshots:
         for id in sorted(changed):
             node, old = changed[id], self._primitives.get(id)
             if old is not None:
-                del self._by_key[old.name], self._by_key[id]
+                self._names.discard(old.name)
             if node is None:
                 self._nodes.pop(id, None)
             elif not _comes_last(id, self._nodes):
@@ -164,9 +164,10 @@ class Snapshots:
                 continue
             self._made[id] = self._primitive(tree, node, self._basis)
             now = self._chosen(id)
-            if now.name in self._by_key or not (_comes_last(id, self._primitives) and id in graph):
+            if now.name in self._names or not (_comes_last(id, self._primitives) and id in graph):
                 return False
-            self._primitives[id] = self._by_key[id] = self._by_key[now.name] = now
+            self._primitives[id] = now
+            self._names.add(now.name)
         return len(graph) == len(self._primitives)
 
     def _chosen(self, id: int) -> Primitive:

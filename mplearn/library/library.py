@@ -115,15 +115,10 @@ class PrimitiveLibrary:
         object.__setattr__(self, "graph", graph.snapshot())
 
     @classmethod
-    def of_known(cls, by_key: dict[Key, Primitive], **parts: Any) -> PrimitiveLibrary:
-        """Return a library of parts that were found to fit each other: none is looked at again.
-
-        Args:
-            by_key: The primitives, by id and by name.
-            **parts: All attributes.
-        """
+    def of_fitting(cls, **parts: Any) -> PrimitiveLibrary:
+        """Return a library of parts, all attributes, that fit each other: none is looked at."""
         library = object.__new__(cls)
-        library.__dict__.update(parts, _by_key=by_key)
+        library.__dict__.update(parts)
         return library
 
     def __repr__(self) -> str:

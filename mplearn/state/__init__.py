@@ -7,8 +7,11 @@ from .checkpoint import hash_of as hash_of
 from .checkpoint import key_of as key_of
 from .checkpoint import resumed as resumed
 from .checkpoint import to_bytes as to_bytes
+from .declared import ROWS as ROWS
 from .declared import Blob as Blob
 from .declared import Block as Block
+from .declared import IntTable as IntTable
+from .declared import KeptBlocks as KeptBlocks
 from .declared import Row as Row
 from .declared import SharedState as SharedState
 from .declared import State as State

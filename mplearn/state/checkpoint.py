@@ -19,7 +19,7 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar
 import numpy as np
 
 from ..errors import StateError
-from .declared import Blob, Block, Row, SharedState, fields_of, to_plain
+from .declared import Blob, Block, IntTable, Row, SharedState, fields_of, to_plain
 from .kept import Kept
 from .packing import as_json, from_json, packed, unpacked
 from .structure import from_plain
@@ -114,10 +114,10 @@ def checkpoint(state: Any, known: Container[str] = ()) -> Checkpoint:
         if not there:
             new[content.key] = data or _packed(part)[1]
 
-    def share(each: Blob | SharedState | Sequence[SharedState]) -> dict[str, str]:
+    def share(each: Blob | SharedState | IntTable | Sequence[SharedState]) -> dict[str, str]:
         if isinstance(each, (Blob, SharedState)):
             return {_KEY: note(each)}
-        blocks = each.blocks if isinstance(each, Row) else _blocks(each)
+        blocks = each.blocks if isinstance(each, (Row, IntTable)) else _blocks(each)
         return {_ROWS: " ".join(map(note, blocks))}
 
     document = to_bytes({_WHOLE: to_plain(state, share, whole=True)})
@@ -240,7 +240,10 @@ def _packed(part: Part) -> tuple[_Content, bytes]:
     """Pack a part: return what refers to it, and its bytes."""
     inner: list[Part] = []
 
-    def note(each: Blob | SharedState | Sequence[SharedState]) -> Any:
+    def note(each: Blob | SharedState | IntTable | Sequence[SharedState]) -> Any:
+        if isinstance(each, IntTable):
+            inner.extend(each.blocks)
+            return {_ROWS: " ".join(map(key_of, each.blocks))}
         if not isinstance(each, (Blob, SharedState)):
             return [note(item) for item in each]
         inner.append(each)

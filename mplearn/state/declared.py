@@ -8,7 +8,7 @@ walk over dataclass fields, which is the smaller part of `structure`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from itertools import chain
@@ -130,7 +130,83 @@ class Row(tuple[T, ...]):
         return row
 
 
-Share: TypeAlias = Callable[[Blob | SharedState | tuple[SharedState, ...]], Any]
+class IntTable:
+    """A long table of whole numbers in blocks of rows, each kept once by its content.
+
+    Args:
+        blocks: Some rows each, at least one block; nobody writes to them from now on.
+
+    Example:
+        >>> import numpy as np
+        >>> table = IntTable([Blob(np.array([[1, 2], [2, 3]])), Blob(np.array([[3, 1]]))])
+        >>> len(table), table.array[:, 0].tolist()
+        (3, [1, 2, 3])
+    """
+
+    __slots__ = ("_array", "blocks")
+
+    def __init__(self, blocks: Iterable[Blob]) -> None:
+        self.blocks = tuple(blocks)
+        self._array: NDArray[np.int64] | None = None
+
+    @property
+    def array(self) -> NDArray[np.int64]:
+        """All rows, put together once; nobody writes to them."""
+        if self._array is None:
+            parts = [block.array for block in self.blocks]
+            self._array = parts[0] if len(parts) == 1 else np.concatenate(parts)
+        return self._array
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return sum(map(len, self.blocks))
+
+    def __repr__(self) -> str:
+        """Return the numbers of rows and blocks."""
+        return f"IntTable({len(self)} rows in {len(self.blocks)} blocks)"
+
+
+class KeptBlocks:
+    """The blocks of a table that grows: those in which nothing has changed stay the same objects.
+
+    Example:
+        >>> import numpy as np
+        >>> kept, rows = KeptBlocks(), np.arange(600).reshape(-1, 1)
+        >>> first = kept.table(rows)
+        >>> rows[3] += 1
+        >>> kept.touch(3)
+        >>> [a is b for a, b in zip(first.blocks, kept.table(rows).blocks, strict=True)]
+        [False, True, True]
+    """
+
+    def __init__(self) -> None:
+        self._blocks: list[Blob] = []
+        self._touched: set[int] = set()
+
+    def touch(self, row: int) -> None:
+        """Take note that a row has changed. That rows have come behind the last is noticed."""
+        self._touched.add(row // ROWS)
+
+    def table(self, rows: NDArray[np.int64] | Sequence[int]) -> IntTable:
+        """Return all rows, copied where something in their block has changed."""
+        blocks, n_blocks = self._blocks, max(-(-len(rows) // ROWS), 1)
+        del blocks[n_blocks:]
+        for at in range(n_blocks):
+            start, end = at * ROWS, min((at + 1) * ROWS, len(rows))
+            if at == len(blocks) or at in self._touched or len(blocks[at]) != end - start:
+                blocks[at:] = [Blob(np.array(rows[start:end], np.int64)), *blocks[at + 1 :]]
+        self._touched.clear()
+        return IntTable(blocks)
+
+    def copy(self) -> KeptBlocks:
+        """Return the blocks of a copy of the table."""
+        twin = KeptBlocks()
+        twin._blocks, twin._touched = list(self._blocks), set(self._touched)
+        return twin
+
+
+Share: TypeAlias = Callable[[Blob | SharedState | IntTable | tuple[SharedState, ...]], Any]
+ROWS = 256  # of a table that are kept together
 MANY = 32  # parts in a row that are kept in parts of them
 
 
@@ -154,12 +230,12 @@ def to_plain(value: Any, share: Share | None = None, *, whole: bool = False) -> 
     """
     if isinstance(value, (np.ndarray, str, int, float)) or value is None:
         return value.item() if isinstance(value, np.generic) else value
-    if share is not None and isinstance(value, (Blob, SharedState)):
+    if share is not None and isinstance(value, (Blob, SharedState, IntTable)):
         return share(value)
-    if isinstance(value, Blob):
+    if isinstance(value, (Blob, IntTable)):
         return value.array
     if isinstance(value, (tuple, list)):
-        if share is not None and len(value) > MANY and (isinstance(value, Row) or _is_row(value)):
+        if share is not None and len(value) > MANY and _is_row(value):
             return share(value)
         return [to_plain(item, share, whole=whole) for item in value]
     if isinstance(value, dict):
@@ -172,7 +248,7 @@ def to_plain(value: Any, share: Share | None = None, *, whole: bool = False) -> 
 
 
 def _is_row(value: Any) -> TypeGuard[tuple[SharedState, ...]]:
-    return all(isinstance(item, SharedState) for item in value)
+    return isinstance(value, Row) or all(isinstance(item, SharedState) for item in value)
 
 
 def fields_of(value: Any, share: Share | None = None, *, whole: bool = False) -> dict[str, Any]:

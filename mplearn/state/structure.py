@@ -26,7 +26,7 @@ from typing import (
 import numpy as np
 
 from ..errors import MPLearnError, StateError
-from .declared import Blob, Row, State
+from .declared import Blob, IntTable, KeptBlocks, Row, State
 from .fields import (
     LARGEST,
     WHOLE,
@@ -168,6 +168,8 @@ def _marked(kind: Any, marker: Any) -> Reader:
     if isinstance(marker, Array):
         if kind is Blob:
             return _blob(marker)
+        if kind is IntTable:
+            return _int_table(marker)
         return _array(kind, marker)
     return _reader(kind)
 
@@ -228,9 +230,8 @@ def _row(kinds: tuple[Any, ...], names: tuple[str, ...] = ()) -> Reader:
 
 def _kept(value: Any, found: list[Any]) -> tuple[Any, ...]:
     """Return what was found; the same tuple, where it was found in one that needs no change."""
-    if type(value) in (tuple, Row) and all(map(operator.is_, value, found)):
-        return value
-    return tuple(found)
+    kept: tuple[Any, ...] = value if type(value) in (tuple, Row) else ()
+    return kept if value is kept and all(map(operator.is_, kept, found)) else tuple(found)
 
 
 def _set(read: Reader) -> Reader:
@@ -320,6 +321,25 @@ def _blob(marker: Array) -> Reader:
     def read(value: Any, scope: Scope) -> Blob:
         check(value.array if isinstance(value, Blob) else value, scope)
         return value if isinstance(value, Blob) else Blob(value)
+
+    return read
+
+
+def _int_table(marker: Array) -> Reader:
+    check = _array_check(np.dtype(np.int64), marker)
+
+    def read(value: Any, scope: Scope) -> IntTable:
+        if isinstance(value, np.ndarray):
+            check(value, scope)
+            return KeptBlocks().table(value)
+        table: IntTable = value if isinstance(value, IntTable) else IntTable(_items(value))
+        if table is not value:
+            whole = all(isinstance(each, Blob) and each.array.ndim for each in table.blocks)
+            alike = whole and {(each.array.dtype, each.array.shape[1:]) for each in table.blocks}
+            if not alike or len(alike) > 1:
+                raise StateError("must be an array, or blocks of one")
+        check(table.array, scope)
+        return table
 
     return read
 

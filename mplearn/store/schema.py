@@ -49,7 +49,16 @@ def _rows_of_parts(_: sqlite3.Connection) -> None:
     """
 
 
-MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (_tables, _digests, _rows_of_parts)
+def _tables_in_blocks(_: sqlite3.Connection) -> None:
+    """Parts may name the blocks of a table from here on; what is there stays as it is."""
+
+
+MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (
+    _tables,
+    _digests,
+    _rows_of_parts,
+    _tables_in_blocks,
+)
 """Step k turns version k into k + 1."""
 
 VERSION = len(MIGRATIONS)

@@ -72,5 +72,5 @@ def test_histories_are_bounded_and_keep_what_is_frequent():
         graph.observe(1, 2, 1.0, before=[0])
         graph.observe(c, d, 1.0, before=[a, b])
     assert len(graph.state().histories) <= 200
-    frequent = [row for row in graph.state().histories.tolist() if row[1:3] == [0, 1]]
+    frequent = [row for row in graph.state().histories.array.tolist() if row[1:3] == [0, 1]]
     assert frequent[0][-2:] == [2, 300]

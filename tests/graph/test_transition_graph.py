@@ -53,13 +53,13 @@ def test_counts_do_not_depend_on_order_nor_on_who_counted(first, second, random)
             graph.observe(i, j, s)
         graphs.append(graph)
     a, b = (graph.state() for graph in graphs)
-    assert sorted(a.edges.tolist()) == sorted(b.edges.tolist())
+    assert sorted(a.edges.array.tolist()) == sorted(b.edges.array.tolist())
     ab, ba = learned(first), learned(second)
     ab.add(learned(second))
     ba.add(learned(first))
     for key in ("edges", "histories"):
-        assert sorted(getattr(ab.state(), key).tolist()) == sorted(
-            getattr(ba.state(), key).tolist()
+        assert sorted(getattr(ab.state(), key).array.tolist()) == sorted(
+            getattr(ba.state(), key).array.tolist()
         )
     assert ab.n_transitions == len(pairs)
 
@@ -71,8 +71,8 @@ def test_merging_nodes_is_as_if_they_had_been_one(sequence, keep, merged):
     graph.merge_nodes(keep, merged)
     expected = learned([keep if id == merged else id for id in whole])
     for key in ("edges", "histories"):
-        assert sorted(getattr(graph.state(), key).tolist()) == sorted(
-            getattr(expected.state(), key).tolist()
+        assert sorted(getattr(graph.state(), key).array.tolist()) == sorted(
+            getattr(expected.state(), key).array.tolist()
         )
     assert set(graph.ids) == set(expected.ids)
 
@@ -85,7 +85,7 @@ def test_removing_a_node_removes_all_that_names_it(sequence, gone):
     pairs = [pair for pair in pairwise(whole) if gone not in pair]
     assert graph.n_transitions == len(pairs)
     assert gone not in graph
-    assert gone not in graph.state().histories[:, 1:-1][:, [-1]]
+    assert gone not in graph.state().histories.array[:, 1:-1][:, [-1]]
     assert graph.probabilities().sum() == pytest.approx(1.0)
 
 
@@ -131,7 +131,7 @@ def test_bad_durations_change_nothing(duration_s):
     before = graph.state()
     with pytest.raises(InvalidValueError, match="duration_s"):
         graph.observe(0, 1, duration_s)
-    np.testing.assert_array_equal(graph.state().edges, before.edges)
+    np.testing.assert_array_equal(graph.state().edges.array, before.edges.array)
 
 
 def test_bad_input_is_named():
@@ -149,9 +149,9 @@ def test_bad_input_is_named():
         with pytest.raises(InvalidValueError, match=next(iter(wrong))):
             TransitionGraph(**wrong)
     state = graph.state()
-    edges = state.edges.copy()
+    edges = state.edges.array.copy()
     edges[0, 0] = 44
-    for damage in ({"edges": edges}, {"ids": state.ids[:2]}, {"edges": edges[:, :3]}):
+    for damage in ({"edges": edges}, {"ids": state.ids.array[:2]}, {"edges": edges[:, :3]}):
         with pytest.raises(InvalidValueError):
             TransitionGraph.from_state(replace(state, **damage))
 
@@ -168,7 +168,11 @@ def test_an_empty_graph_answers():
 def test_absorbing_is_associative_and_a_seam_is_all_that_one_stream_has_more(a, b, c):
     def parts(graph):
         state = graph.state()
-        return sorted(state.edges.tolist()), sorted(state.histories.tolist()), set(graph.ids)
+        return (
+            sorted(state.edges.array.tolist()),
+            sorted(state.histories.array.tolist()),
+            set(graph.ids),
+        )
 
     left, right, inner = learned(a), learned(a), learned(b)
     left.add(learned(b))
