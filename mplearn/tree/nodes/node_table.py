@@ -17,11 +17,11 @@ class Mark(NamedTuple):
     """A moment in the life of a table.
 
     Attributes:
-        table: The table.
+        life: That of the table; a copy of it, or a pickle, has another one.
         at: How many changes it had seen.
     """
 
-    table: NodeTable
+    life: object
     at: int
 
 
@@ -36,6 +36,7 @@ class NodeTable(dict[int, Node]):
 
     def __init__(self, nodes: Iterable[Node] = ()) -> None:
         super().__init__()
+        self._life = object()
         self._n_changes = 0
         self._changed: dict[int, int] = {}  # the latest change of each id, the latest of all last
         self._known_from = 0
@@ -68,11 +69,11 @@ class NodeTable(dict[int, Node]):
 
     def mark(self) -> Mark:
         """Return this moment, for `changed_since`."""
-        return Mark(self, self._n_changes)
+        return Mark(self._life, self._n_changes)
 
     def changed_since(self, mark: Mark | None) -> dict[int, Node | None] | None:
         """Return the nodes that came, changed or went by id; None where that is not known."""
-        if mark is None or mark.table is not self or mark.at < self._known_from:
+        if mark is None or mark.life is not self._life or mark.at < self._known_from:
             return None
         latest = reversed(self._changed.items())
         return {id: self.get(id) for id, _ in takewhile(lambda each: each[1] > mark.at, latest)}
