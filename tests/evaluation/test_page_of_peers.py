@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mplearn.demonstrator import demonstrate
+from mplearn.errors import InvalidValueError
 from mplearn.evaluation.experiments import page_of_peers
 from mplearn.evaluation.experiments.page_of_peers import (
     METHODS,
@@ -87,3 +88,8 @@ def test_boundaries_of_each_are_scored_alike(monkeypatch: pytest.MonkeyPatch) ->
     again = boundary_peers_table([take])
     assert again.rows[0][0] == "ours" and len(again.rows) == len(table.rows)
     assert "theirs (AttributeError: no trapz)" in again.note
+
+
+def test_boundaries_of_nothing_are_refused():
+    with pytest.raises(InvalidValueError, match="repeated movements"):
+        boundary_peers_table([])

@@ -16,6 +16,7 @@ from scipy.cluster.hierarchy import fcluster, linkage
 
 from ...activities import find_activities, postures_of
 from ...body import view_of
+from ...errors import InvalidValueError
 from ...mocap import resample
 from ...recording import FloatArray, IntArray, Recording, Segment
 from ..boundaries import BoundaryScore, score_boundaries
@@ -147,11 +148,17 @@ def _activity_row(name: str, recording: Recording, seen: Recording) -> tuple[str
 
 
 def boundary_peers_table(takes: Iterable[Recording]) -> Table:
-    """Cut takes of repeated movements by each library that is installed."""
+    """Cut takes of repeated movements by each library that is installed.
+
+    Raises:
+        InvalidValueError: There is no take of repeated movements.
+    """
     seen = [
         (each, (own := observe(resample(each, BOUNDARY_HZ))), view_of(own.channels).see(own.frames))
         for each in split_repetitions(list(takes))
     ]
+    if not seen:
+        raise InvalidValueError("there is no take of repeated movements: at least one is needed")
     rows, left_out = [], []
     for name, (library, _, _) in PEERS.items():
         if library and find_spec(library) is None:
