@@ -257,6 +257,5 @@ def test_a_stream_needs_a_name_to_be_sent() -> None:
 
 def test_a_source_that_finds_nothing_closes() -> None:
     source = open_source("lsl:nothing-of-this-name")
-    begin = time.monotonic()
     source.close()
-    assert time.monotonic() - begin < 3.0
+    assert source.ended
