@@ -103,7 +103,13 @@ class Blob:
 
 
 class Block(tuple[T, ...]):
-    """Some states of a `Row` that are kept together, once by their content."""
+    """Some states of a `Row` that are kept together, once by their content.
+
+    Example:
+        >>> from mplearn.graph import TransitionGraph
+        >>> len(Block([TransitionGraph().state()] * 3))
+        3
+    """
 
     content: Any = None  # as that of a `Blob`
 
