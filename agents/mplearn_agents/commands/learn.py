@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import InvalidValueError, MPLearnError, RecordingError, StateError
+from mplearn.threads import one_thread
 from mplearn_agents.learning.keeping import keep, say_unkept
 from mplearn_agents.learning.live import add_live_arguments, learn_from_source
 from mplearn_agents.recordings.reading import (
@@ -107,9 +108,10 @@ def run(args: argparse.Namespace) -> int:
         return learn_in_shards(args, partial(_configured, args))
     if args.out is None and args.store is None:
         raise InvalidValueError("give a library to write, --out, or a store, --store, or both")
-    if args.live is not None:
-        return learn_from_source(args, partial(_configured, args))
-    return _learn_from_files(args)
+    with one_thread():
+        if args.live is not None:
+            return learn_from_source(args, partial(_configured, args))
+        return _learn_from_files(args)
 
 
 def _learn_from_files(args: argparse.Namespace) -> int:

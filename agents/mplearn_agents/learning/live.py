@@ -15,7 +15,6 @@ from threading import Event as Flag
 from typing import TYPE_CHECKING, Any
 
 from mplearn.errors import RecordingError
-from mplearn.threads import one_thread
 from mplearn_agents.learning.keeping import keep, say_unkept
 from mplearn_agents.learning.pauses import short_pauses
 from mplearn_agents.recordings.reading import hints_of
@@ -126,7 +125,7 @@ def learn_from_source(
             )
             log = LiveLog()
             try:
-                with short_pauses(), one_thread():
+                with short_pauses():
                     learn_live(
                         read,
                         stop,
