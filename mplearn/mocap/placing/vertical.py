@@ -167,7 +167,7 @@ class _Ground:
         rests = flat & (high - least < _STEADY_M)
         lain_on = at_zero & wide & (least <= _JUST_M) & (high <= least + _RESTLESS_M)
         middle = np.nanmedian(np.where(seen[..., None], along, np.nan), axis=(0, 1))
-        over = at_zero & (middle >= _LYING_M[0]) & (middle <= _LYING_M[1])
+        over = at_zero & (least >= 0.0) & (middle >= _LYING_M[0]) & (middle <= _LYING_M[1])
         rises_m = high - least
         farthest = rises_m.reshape(3, 2).max(axis=1)
         level = low_lifts | (np.repeat(farthest, 2) < farthest.max())
