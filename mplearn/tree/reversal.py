@@ -296,11 +296,13 @@ class _Reversal:
         for id in (*self.back, *self.both):
             new, node = self.new[id], nodes.get(id)
             if node is not None and (id == ROOT or not self._is_other(id)):
-                node.whole, node.frozen = new.whole, new.frozen
-                said = set(self.old[id].apart)
+                old = self.old[id]
+                node.whole = node.whole if old.whole == new.whole else new.whole
+                node.frozen = node.frozen if old.frozen == new.frozen else new.frozen
+                said = set(old.apart)
                 if id == ROOT:
-                    node.n_placed += new.n_placed - self.old[id].n_placed
-                    node.n_frames += new.n_frames - self.old[id].n_frames
+                    node.n_placed += new.n_placed - old.n_placed
+                    node.n_frames += new.n_frames - old.n_frames
                 node.apart = (node.apart - (said - set(new.apart))) | (set(new.apart) - said)
                 continue
             own = [n for group in gained.values() for n in group if homes.get(n) == id]
