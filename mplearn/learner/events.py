@@ -111,11 +111,12 @@ class PrimitiveConfirmed:
 
 @dataclass(frozen=True)
 class PrimitiveForgotten:
-    """A provisional primitive was never confirmed, and is gone.
+    """A primitive is gone: a provisional one that nothing confirmed, or one of parts of a motion.
 
     Attributes:
-        segment: The segment whose arrival made it too old.
+        segment: The segment whose arrival made it too old, or after which it was looked at.
         primitive: Id that it had.
+        part: Whether it was born of parts of a motion.
 
     Example:
         >>> names = {1: "wave", 2: "stumble"}
@@ -126,6 +127,7 @@ class PrimitiveForgotten:
 
     segment: Segment
     primitive: int
+    part: bool = False
 
 
 @dataclass(frozen=True)

@@ -352,6 +352,14 @@ class MotionLearner:
         self._before_hand()
         return self._edited(self.tree.remove(id, forget=forget))
 
+    def keep(self, id: int) -> Change:
+        """Let the rules neither forget nor drop a primitive; see `PrimitiveTree.keep`.
+
+        Raises:
+            UnknownPrimitiveError: There is no such primitive.
+        """
+        return self.tree.keep(id)
+
     def freeze(self, id: int) -> Change:
         """Let a primitive stay as it is, whatever comes, in every `snapshot`.
 
@@ -870,7 +878,7 @@ class MotionLearner:
             if shown - came[id] < self.config.tree.confirmed <= shown:
                 events.append(PrimitiveConfirmed(segment, id, shown))
         gone = [id for id in placement.removed if id in self.graph]  # inner nodes are not
-        return events + [PrimitiveForgotten(segment, id) for id in gone]
+        return events + [PrimitiveForgotten(segment, id, id in placement.parts) for id in gone]
 
     def _unlike(self, segment: Segment, placement: Placement) -> list[Event]:
         """Return the anomaly of a segment that was not recognised, if it is one."""

@@ -166,7 +166,7 @@ FILES = FileFormat(
     "mplearn-learner",
     "learner",
     StateError,
-    6,
-    migrations={1: _one_watch, 2: _whole, 3: _whole, 4: _whole, 5: _whole},
+    7,
+    migrations={1: _one_watch, 2: _whole, 3: _whole, 4: _whole, 5: _whole, 6: _whole},
     compression=1,
 )

@@ -76,5 +76,9 @@ def _whole(content: Any) -> Any:
 
 
 FILES = FileFormat(
-    "mplearn-library", "library", LibraryError, 4, migrations={1: _whole, 2: _whole, 3: _whole}
+    "mplearn-library",
+    "library",
+    LibraryError,
+    5,
+    migrations={1: _whole, 2: _whole, 3: _whole, 4: _whole},
 )

@@ -162,6 +162,17 @@ def prune(sharing: Sharing) -> Change:
     return change
 
 
+def keep(sharing: Sharing, id: int) -> Change:
+    """Let the rules neither forget nor drop any leaf of a primitive.
+
+    Raises:
+        UnknownPrimitiveError: There is no such primitive.
+    """
+    for leaf in _known(sharing, id):
+        sharing.trees[leaf.person].keep(leaf.local)
+    return Change()
+
+
 def freeze(sharing: Sharing, id: int, frozen: bool) -> Change:
     """Let all leaves of a primitive stay as they are, or change again.
 

@@ -308,6 +308,14 @@ class PeopleTree:
         """
         return self._primitives.remove(id, forget=forget)
 
+    def keep(self, id: int) -> Change:
+        """Let the rules neither forget nor drop a primitive; see `PrimitiveTree.keep`.
+
+        Raises:
+            UnknownPrimitiveError: There is no such primitive.
+        """
+        return self._primitives.keep(id)
+
     def freeze(self, id: int, frozen: bool = True) -> Change:
         """Let a primitive stay as it is, whatever comes; see `PrimitiveTree.freeze`.
 

@@ -105,6 +105,9 @@ class Primitives(Protocol):
     def remove(self, id: int, *, forget: bool) -> Change:
         """Take a primitive out."""
 
+    def keep(self, id: int) -> Change:
+        """Let the rules neither forget nor drop a primitive."""
+
     def freeze(self, id: int, frozen: bool) -> Change:
         """Let a primitive stay as it is, or change again."""
 
@@ -226,6 +229,10 @@ class OnePersonsPrimitives:
     def remove(self, id: int, *, forget: bool) -> Change:
         """Take a leaf out of the tree."""
         return self._edited(self.tree.remove(id, forget=forget))
+
+    def keep(self, id: int) -> Change:
+        """Keep a leaf of the tree."""
+        return self.tree.keep(id)
 
     def freeze(self, id: int, frozen: bool) -> Change:
         """Freeze a leaf of the tree."""
@@ -396,6 +403,10 @@ class SharedPrimitives:
     def remove(self, id: int, *, forget: bool) -> Change:
         """Take a primitive out, or a person's leaf of it."""
         return editing.remove(self.sharing, id, forget=forget)
+
+    def keep(self, id: int) -> Change:
+        """Keep all leaves of a primitive."""
+        return editing.keep(self.sharing, id)
 
     def freeze(self, id: int, frozen: bool) -> Change:
         """Freeze all leaves of a primitive."""

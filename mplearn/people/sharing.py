@@ -347,8 +347,14 @@ class Sharing:
         homes = [ids.get(group, ROOT) for group in of_provisional]
         moved += self.provisional.move(homes, absorbed, self.own())
         self.name_leaves()
+        of_parts = {before.get((person, local)) for local in placement.parts}
         change = Change(
-            tuple(born), tuple(splits), tuple(merges), tuple(moved), removed=tuple(removed)
+            tuple(born),
+            tuple(splits),
+            tuple(merges),
+            tuple(moved),
+            removed=tuple(removed),
+            parts=tuple(id for id in removed if id in of_parts),
         )
         return change.then(tidied(self.above, self.parents, self.primitives))
 

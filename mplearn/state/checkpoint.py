@@ -27,8 +27,13 @@ from .structure import from_plain
 T = TypeVar("T")
 _KEY, _ROWS = "$key", "$rows"
 _ROW = 64  # a power of two, to 256
-_WHOLE = "$whole 4"  # what a document names that, with its parts, leaves out no field of now
-_WHOLE_THEN = ("$whole", "$whole 2", "$whole 3")  # or none of those that there were then
+_WHOLE = "$whole 5"  # what a document names that, with its parts, leaves out no field of now
+_WHOLE_THEN = (
+    "$whole",
+    "$whole 2",
+    "$whole 3",
+    "$whole 4",
+)  # or none of those that there were then
 
 
 class Checkpoint(NamedTuple):

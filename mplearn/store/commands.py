@@ -140,7 +140,7 @@ def from_record(record: dict[str, Any]) -> Command:
 @register_command("rename")
 @dataclass(frozen=True)
 class Rename(Operation):
-    """Give a primitive a name.
+    """Give a primitive a name: it is a motion, and the rules neither forget nor drop it.
 
     Example:
         >>> Rename(7, "bow down").name
@@ -154,6 +154,7 @@ class Rename(Operation):
         """Give the name."""
         _require(hands, self.primitive)
         hands.labels.rename(self.primitive, self.name, hands.learner.tree.leaves)
+        hands.learner.keep(self.primitive)
 
     @property
     def about(self) -> tuple[int, ...]:

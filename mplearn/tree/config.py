@@ -112,6 +112,11 @@ class TreeConfig:
             right before or after it, an execution of a primitive that is sure by then, or nearer by
             far to the only other one that it is like: a motion that is cut in two where someone
             hesitated is not two motions.
+        drop_fragments: Whether a primitive is dropped again, if no person had a hand in it, that
+            was born of parts of a motion: all of whose exemplars are, each together with the
+            segment right before or after it, executions of one other that is sure by then and came
+            as often. Where one of the two that it was born of is a part of what came to it later,
+            the others form a primitive anew. With each segment one is looked at, in turn.
         max_born: Clusters that become nodes with a segment, at most, so that no frame takes long:
             others become nodes with the next segments, one after another; inf for no such bound. A
             learner forms one a frame, so what a segment forms is there some frames later.
@@ -180,6 +185,7 @@ class TreeConfig:
     sequence_share: float = newer(1.2, absent=0.0)
     sequence_extent: float = newer(0.74, absent=0.74)
     ignore_fragments: bool = newer(True, absent=False)
+    drop_fragments: bool = newer(True, absent=False)
     max_born: float = newer(2.0, absent=math.inf)
     confirmed: int = newer(3, absent=1)
     patience: int = newer(64, absent=64)
@@ -219,6 +225,7 @@ class TreeConfig:
             pair_extent=math.inf,
             sequence_share=0.0,
             ignore_fragments=False,
+            drop_fragments=False,
             max_born=math.inf,
             confirmed=1,
             reach=1.5,

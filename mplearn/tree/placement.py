@@ -85,6 +85,7 @@ class Change(NamedTuple):
         moved: Earlier segments that were moved: number and new node.
         reparented: Nodes that were hung below another.
         removed: Ids of the nodes that are gone, but for absorbed ones.
+        parts: Those of them that were born of parts of a motion.
 
     Example:
         >>> import numpy as np
@@ -103,6 +104,7 @@ class Change(NamedTuple):
     moved: tuple[tuple[int, int], ...] = ()
     reparented: tuple[Reparent, ...] = ()
     removed: tuple[int, ...] = ()
+    parts: tuple[int, ...] = ()
 
     def then(self, later: Change) -> Change:
         """Return this change and a later one as one."""
@@ -113,6 +115,7 @@ class Change(NamedTuple):
             self.moved + later.moved,
             self.reparented + later.reparented,
             self.removed + later.removed,
+            self.parts + later.parts,
         )
 
 
@@ -131,12 +134,13 @@ class Placement(NamedTuple):
         moved: Earlier segments that its arrival moved: number and new node.
         refused: Why it was not taken up at all; empty where it was.
         reparented: Nodes that its arrival hung below another.
-        removed: Nodes that are gone: provisional primitives that nothing confirmed, and inner nodes
-            that held nothing else.
+        removed: Nodes that are gone: provisional primitives that nothing confirmed, those that
+            were born of parts of a motion, and inner nodes that held nothing else.
         nearest: The primitive that it was nearest to when it came, within its radius or not; None
             where there was none.
         like: Number of the segment that it is most like among those that wait to become a
             primitive, where the two may show one motion; None where there is none.
+        parts: Those of the nodes that are gone that were born of parts of a motion.
 
     Example:
         >>> import numpy as np
@@ -163,6 +167,7 @@ class Placement(NamedTuple):
     removed: tuple[int, ...] = ()
     nearest: int | None = None
     like: int | None = None
+    parts: tuple[int, ...] = ()
 
     def then(self, later: Change) -> Placement:
         """Return where the segment is, and what came of it, after a later change, too.

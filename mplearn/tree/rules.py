@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import permutations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,6 +39,7 @@ _IN_SEQUENCE = 0.8  # of what tells two motions apart, for those that come besid
 _SURELY = 1 - 1e-9  # whatever a mean is rounded to
 _NEARER = 0.8  # of how far a part is from a whole: what it is a part of, at the most
 _WELL_INSIDE = 0.8  # of its radius
+_OFTEN = 5  # exemplars from which on a part is a motion of its own
 _UNKNOWN = 3.0  # leaves that the scale of all motion counts for beside that of those
 
 
@@ -194,7 +196,7 @@ def settle_fragments(structure: Structure, number: int, longest: int) -> None:
         return
     if sum(map(structure.length_of, pair)) > longest:
         return
-    if _is_of_sure(structure, _joined(structure, [number - 1])[0], 1.0):
+    if _sure_of(structure, _joined(structure, [number - 1])[0], 1.0) is not None:
         root.settled |= pair.intersection(root.members)
 
 
@@ -230,19 +232,19 @@ def _fragments(structure: Structure, node: Node, members: Sequence[int]) -> set[
     for (number, other, first), whole in zip(parts, wholes, strict=True):
         alone, together = (bank.distances(one, [other])[0] for one in (bank[number], whole))
         if together < _NEARER * alone or (
-            memory.goes_on(first) and _is_of_sure(structure, whole, _WELL_INSIDE)
+            memory.goes_on(first) and _sure_of(structure, whole, _WELL_INSIDE) is not None
         ):
             found |= {first, first + 1}.intersection(node.members)
     return found
 
 
-def _is_of_sure(structure: Structure, whole: Exemplar, most: float) -> bool:
-    """Return whether a segment lies in a sure primitive, at most so far out, 1 being its radius."""
+def _sure_of(structure: Structure, whole: Exemplar, most: float) -> int | None:
+    """Return the sure primitive that a segment lies in, at most so far out, 1 being its radius."""
     best = next(iter(structure.index.search(whole, structure.memory.bank)), None)
     if best is None or best.ratio > most:
-        return False
+        return None
     home = structure.nodes[best.node]
-    return home.is_leaf and home.n_placed >= structure.config.confirmed
+    return home.id if home.is_leaf and home.n_placed >= structure.config.confirmed else None
 
 
 def _joined(structure: Structure, firsts: Sequence[int]) -> list[Exemplar]:
@@ -292,6 +294,85 @@ def forget_chances(structure: Structure, when: int) -> Change:
         if when - leaf.born_at > patience and not leaf.by_hand:
             change = change.then(structure.remove(leaf, when, forget=True))
     return change
+
+
+def drop_fragments(
+    structure: Structure, number: int, longest: int, when: int, most: float
+) -> Change:
+    """Drop a primitive that was born of parts of a motion, once that is known whole.
+
+    Who hesitates at the same place again makes a primitive of a part. It goes if each of its few
+    exemplars is an execution of another, sure primitive that came as often, together with the one
+    right before or after it, without a rest; but not where it is played back. Where one of the two
+    that it was born of is so a part of what came to it later, all wait again and become what
+    they are: a primitive of the others. With each segment one primitive is looked at, in turn.
+
+    Args:
+        structure: The tree.
+        number: The segment that came now; what it went to is left for another turn.
+        longest: Most frames of a motion.
+        when: Segments seen.
+        most: Leaves that are formed at most.
+    """
+    few = structure.index.leaves_below(_OFTEN)
+    if not few:
+        return Change()
+    leaf = structure.nodes[few[when % len(few)]]
+    if leaf.by_hand or number in leaf.members:
+        return Change()
+    first, later = leaf.members[:2], leaf.members[2:]
+    wholes: dict[int, list[_Whole]] = {}
+    for member in first:
+        wholes[member] = _wholes(structure, member, longest)
+        if not wholes[member] and len(later) < 2:
+            return Change()
+    of_all = set.intersection(*({each.home for each in found} for found in wholes.values()))
+    of_all -= {leaf.id}
+    for member in later:
+        if of_all:
+            of_all &= {each.home for each in _wholes(structure, member, longest)}
+    if of_all and structure.nodes[min(of_all)].n_placed >= leaf.n_placed:
+        if leaf.diameter <= _PLAYED_BACK * cutoff(structure, structure.root):
+            return Change()
+        return structure.remove(leaf, when, forget=True)._replace(parts=(leaf.id,))
+    if len(later) < 2:
+        return Change()
+    own = ((part, each) for part in first for each in wholes[part] if each.home == leaf.id)
+    parts = {part for part, whole in own if _is_rather(structure, whole, part, later)}
+    if not parts:
+        return Change()
+    change = structure.remove(leaf, when, forget=False)._replace(parts=(leaf.id,))
+    structure.root.settled |= parts
+    return change.then(form_primitives(structure, structure.root, when, most))
+
+
+class _Whole(NamedTuple):
+    """A segment and the next as one: the sure primitive that it lies in, and its frames."""
+
+    home: int
+    model: Exemplar
+    length: int
+
+
+def _wholes(structure: Structure, number: int, longest: int) -> list[_Whole]:
+    """Return what a segment is a part of, with the one before it or after it, of what is sure."""
+    memory, found = structure.memory, []
+    firsts = [first for first in (number - 1, number) if memory.goes_on(first)]
+    lengths = [structure.length_of(first) + structure.length_of(first + 1) for first in firsts]
+    for model, length in zip(_joined(structure, firsts), lengths, strict=True):
+        home = _sure_of(structure, model, 1.0) if length <= longest else None
+        if home is not None:
+            found.append(_Whole(home, model, length))
+    return found
+
+
+def _is_rather(structure: Structure, whole: _Whole, part: int, others: Sequence[int]) -> bool:
+    """Return whether a whole is more like others than its part is, in motion and in length."""
+    bank, length = structure.memory.bank, structure.length_of
+    nearer = bank.distances(whole.model, others).mean() < bank.distances(bank[part], others).mean()
+    usual = float(np.mean([length(other) for other in others]))
+    off, alone = abs(np.log(whole.length / usual)), abs(np.log(length(part) / usual))
+    return bool(nearer and off < alone)
 
 
 def cutoff(structure: Structure, node: Node) -> float:

@@ -38,6 +38,7 @@ from .recogniser import Recogniser, refusal
 from .repetitions import Repetition, most_repeated
 from .reversal import Exchange, NodesEdit, exchange
 from .rules import (
+    drop_fragments,
     forget_chances,
     form_primitives,
     merge_duplicates,
@@ -436,6 +437,8 @@ class PrimitiveTree:
                 most = most if in_turn else self.config.max_born
                 formed = form_primitives(structure, structure.root, self.n_seen, most)
                 change = change.then(formed)
+        if self.config.drop_fragments and change == Change():
+            change = formed = drop_fragments(structure, number, longest, self.n_seen, most)
         if in_turn and formed.born:
             self.to_form = int(self.config.max_born) - 1
         if not self.to_form:
@@ -588,6 +591,29 @@ class PrimitiveTree:
         """
         leaf = leaf_of(self._structure, id)
         return self._edited(self._structure.remove(leaf, self.n_seen, forget=forget))
+
+    def keep(self, id: int) -> Change:
+        """Let the rules neither forget nor drop a primitive: a person says that it is a motion.
+
+        It goes on learning, and is split or merged as before.
+
+        Raises:
+            UnknownPrimitiveError: There is no such primitive.
+
+        Example:
+            >>> import numpy as np
+            >>> from mplearn.tree import PrimitiveTree, TreeConfig
+            >>> tree = PrimitiveTree(TreeConfig(), n_channels=2, rate_hz=100.0)
+            >>> lift = np.outer(np.sin(np.linspace(0, np.pi, 60)), [1.0, 0.5])
+            >>> placed = [tree.insert(k * lift) for k in (1.0, -1.0, 1.01, -1.01)]
+            >>> change = tree.keep(tree.leaves[0])
+            >>> tree.node(tree.leaves[0]).by_hand
+            True
+        """
+        leaf = primitive_of(self._structure, id)
+        if not leaf.by_hand:
+            leaf.history += (("kept", self.n_seen),)
+        return Change()
 
     def freeze(self, id: int, frozen: bool = True) -> Change:
         """Let a primitive stay as it is, whatever comes, or let it change again.

@@ -3,7 +3,9 @@
 from itertools import pairwise
 
 import numpy as np
+import pytest
 
+from mplearn.errors import UnknownPrimitiveError
 from mplearn.learner import (
     LearnerConfig,
     MotionLearner,
@@ -72,6 +74,46 @@ def test_what_nothing_confirms_is_forgotten_with_its_transitions():
     assert seen & gone
     assert set(mine.graph.ids) == set(mine.tree.leaves)
     assert set(mine.snapshot().graph.ids) == set(mine.tree.leaves)
+
+
+def test_what_a_person_keeps_is_not_forgotten():
+    frames = walk(POSTURES, [6, 7, 8, 6, 7, 8])
+    mine, kept = learner(patience=12), learner(patience=12)
+    for each in (mine, kept):
+        each.learn_many(frames)
+    first, *_ = mine.tree.leaves
+    assert mine.tree.is_provisional(first)
+    kept.keep(first)
+    later = walk(POSTURES, [0, 1, 2] * 10)
+    for each in (mine, kept):
+        each.learn_many(later)
+    assert set(kept.tree.leaves) - set(mine.tree.leaves) == {first}
+    with pytest.raises(UnknownPrimitiveError, match=r"no primitive 999; known are \["):
+        kept.keep(999)
+
+
+def arc(stops, rng):
+    """A way from the first posture to the second by a third, with stops on it, shape (T, D)."""
+    s = np.concatenate([p + BELL * (q - p) for p, q in pairwise([0.0, *stops, 1.0])])[:, None]
+    ends = (1 - s) * POSTURES[0] + s * POSTURES[1] + rng.normal(0, 0.01, 4)
+    return ends + 4 * s * (1 - s) * POSTURES[9]
+
+
+BELL = (x := np.linspace(0, 1, 50)) ** 3 * (10 - 15 * x + 6 * x**2)
+
+
+def test_a_primitive_of_parts_is_forgotten_as_such_and_its_transitions_with_it():
+    rng = np.random.default_rng(0)
+    frames, n_cut = [], 3  # by then no primitive is provisional
+    for k in range(14):
+        frames += [arc([0.3] if k < n_cut else [], rng), walk(POSTURES, [1, *range(2, 9), 0], k)]
+    mine, unaided = learner(), learner(drop_fragments=False)
+    events = [each.learn_many(np.concatenate(frames)) for each in (mine, unaided)]
+    gone = [event for event in events[0] if isinstance(event, PrimitiveForgotten)]
+    assert gone and all(event.part for event in gone)
+    assert not [event for event in events[1] if isinstance(event, PrimitiveForgotten)]
+    assert len(unaided.tree.leaves) == len(mine.tree.leaves) + len(gone)
+    assert set(mine.graph.ids) == set(mine.tree.leaves)
 
 
 def test_what_came_nearest_to_a_primitive_is_told():

@@ -55,8 +55,8 @@ def test_what_is_read_is_written_again(path, tmp_path):
 @pytest.mark.parametrize(
     ("path", "version", "lacking"),
     [
-        (YOUNG, "2037f0f68582a0de", {"sequence_extent", "max_born"}),
-        (GROWN, "b0e36102be391f0e", {"max_born"}),
+        (YOUNG, "2037f0f68582a0de", {"sequence_extent", "max_born", "drop_fragments"}),
+        (GROWN, "b0e36102be391f0e", {"max_born", "drop_fragments"}),
     ],
 )
 def test_a_whole_file_opens_whether_or_not_it_has_the_newest_setting(path, version, lacking):

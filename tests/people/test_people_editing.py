@@ -196,3 +196,21 @@ def test_what_cannot_be_asked_changes_nothing(tree):
         with pytest.raises(error):
             ask()
     assert tree.state() == before
+
+
+def test_what_a_person_keeps_is_kept_in_everybodys_tree_and_over_a_save(tree):
+    id = shared(tree)
+    others = [each for each in tree.leaves if each != id]
+    leaves = tree.sharing().leaves_of
+    tree.keep(id)
+    again = PeopleTree(QUICK, D, 100.0, people=RULES)
+    again.load_state(tree.state())
+    for each in (tree, again):
+        of = each.sharing().trees
+        assert all(of[leaf.person].node(leaf.local).by_hand for leaf in leaves(id))
+        assert not any(of[x.person].node(x.local).by_hand for one in others for x in leaves(one))
+    state = tree.state()
+    tree.keep(id)  # once is enough
+    assert tree.state() == state
+    with pytest.raises(UnknownPrimitiveError, match="no primitive 999"):
+        tree.keep(999)

@@ -207,6 +207,28 @@ def test_what_was_whole_before_primitives_were_formed_in_turn_has_nothing_to_for
     assert MotionLearner.load(tmp_path / "old.mplearner").state() == state.learner
 
 
+def test_what_was_whole_before_parts_were_dropped_drops_none(life, learner, tmp_path):
+    state = life.state()
+    part = checkpoint(state).new.__getitem__
+    mark, content = document_of(state)
+    assert content["learner"]["config"]["tree"].pop("drop_fragments")
+    with pytest.raises(StateError, match=r"tree\.drop_fragments: is missing"):
+        resumed(LifeState, to_bytes({mark: content}), part)
+    opened = resumed(LifeState, to_bytes({"$whole 4": content}), part)
+    assert not opened.learner.config.tree.drop_fragments
+    plain = to_plain(learner.state(), whole=True)
+    assert plain["config"]["tree"].pop("drop_fragments")
+    replace(LEARNER_FILES, schema=6, migrations={}).write(tmp_path / "old.mplearner", plain)
+    assert not MotionLearner.load(tmp_path / "old.mplearner").config.tree.drop_fragments
+    rules = replace(TreeConfig(), drop_fragments=False)
+    then = MotionLearner(LearnerConfig(("elbow",), tree=rules))
+    then.learn_many(np.sin(np.arange(1200) / 30.0)[:, None])
+    plain = to_plain(then.snapshot().state(), whole=True)
+    assert plain["recogniser"]["config"].pop("drop_fragments") is False
+    replace(FILES, schema=4, migrations={}).write(tmp_path / "old.mplearn", plain)
+    assert PrimitiveLibrary.load(tmp_path / "old.mplearn").version == then.snapshot().version
+
+
 def fields_below(kind, found):
     """Note the fields of a type, and of all that it can hold."""
     names = [each.name for each in fields(kind)] if is_dataclass(kind) else []
@@ -223,9 +245,9 @@ def fields_below(kind, found):
 @pytest.mark.parametrize(
     ("kind", "version", "known"),
     [
-        (LearnerState, LEARNER_FILES.schema, (6, "a84fea5e177a")),
-        (LibraryState, FILES.schema, (4, "86db5f8d9e77")),
-        (LifeState, _WHOLE, ("$whole 4", "3909b4b7927f")),
+        (LearnerState, LEARNER_FILES.schema, (7, "c4d643836ebc")),
+        (LibraryState, FILES.schema, (5, "7714125999c2")),
+        (LifeState, _WHOLE, ("$whole 5", "cf6f380cd585")),
     ],
 )
 def test_who_adds_a_field_says_how_what_was_kept_without_it_opens(kind, version, known):

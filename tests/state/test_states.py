@@ -152,7 +152,7 @@ def test_equal_content_has_one_key_whoever_made_it():
 
 @pytest.mark.parametrize("named", [3, None, ["a"], {"a": 1}, "none", "none none"])
 def test_a_row_that_names_no_parts_is_named(named):
-    document = to_bytes({"$whole 4": to_plain(whole(), whole=True) | {"parts": {"$rows": named}}})
+    document = to_bytes({"$whole 5": to_plain(whole(), whole=True) | {"parts": {"$rows": named}}})
     with pytest.raises(StateError, match=r"^parts: "):
         resumed(Whole, document, {}.__getitem__)
 

@@ -365,6 +365,18 @@ def test_names_follow_what_becomes_of_primitives(taught: MotionLearner) -> None:
         life.execute(Rename(9, "x"))
 
 
+def test_a_primitive_that_has_a_name_is_no_chance(taught: MotionLearner) -> None:
+    life = life_of(taught)
+    nodes = life.learner.tree.node
+    assert not nodes(2).by_hand
+    life.execute(Rename(2, "raise"))
+    assert nodes(2).by_hand and not nodes(1).by_hand
+    life.execute(Freeze(2))
+    life.undo(number=1)  # who is about the name only is undone whenever
+    assert life.snapshot()[2].name == "P2" and nodes(2).frozen
+    resumed(life)
+
+
 def test_the_history_of_a_primitive(taught: MotionLearner, motions: Recording) -> None:
     life = LifelongLearner(MotionLearner(LearnerConfig(motions.channels, motions.rate_hz)))
     life.learn_many(motions.frames, 1e9 + np.arange(len(motions.frames)) / motions.rate_hz)

@@ -7,7 +7,7 @@ import pytest
 
 from mplearn.merging import merge_trees
 from mplearn.recording import FloatArray
-from mplearn.tree import PrimitiveTree, TreeConfig
+from mplearn.tree import Change, Placement, PrimitiveTree, TreeConfig
 
 D, RATE_HZ, T = 6, 50.0, 60
 TIME = np.sin(np.outer(np.linspace(0, np.pi, T), [1, 2, 3]))
@@ -165,3 +165,144 @@ def test_a_first_segment_follows_none_whatever_is_said_of_it() -> None:
     assert tree.state().follows.tolist() == [1, 2, 3]
     again.load_state(tree.state())
     assert again.state() == tree.state()
+
+
+def unsure(tree: PrimitiveTree) -> list[int]:
+    """The primitives that may be parts: of fewer than five exemplars."""
+    return [id for id in tree.leaves if len(tree.node(id).members) < 5]
+
+
+def parts_of_one(
+    tree: PrimitiveTree, id: int, shown: list[FloatArray], goes_on: list[bool]
+) -> bool:
+    """Whether each exemplar of a primitive, with the one beside it, is another that came as often.
+
+    As anybody finds out who has all that was shown, and asks what it is recognised as.
+    """
+    recogniser, wholes = tree.recogniser(), set(tree.leaves) - {id}
+    for number in tree.node(id).members:
+        beside = [first for first in (number - 1, number) if goes_on[first + 1]]
+        seen = [np.concatenate([shown[first], shown[first + 1]]) for first in beside]
+        wholes &= {recogniser.recognise(each).primitive for each in seen}
+    often = max(3, tree.node(id).n_placed)
+    return any(tree.node(each).n_placed >= often for each in wholes)
+
+
+@pytest.mark.parametrize("at", [14, 24, 40])
+@pytest.mark.parametrize("kind", range(6))
+def test_a_primitive_of_parts_goes_once_the_motion_is_known_whole(kind: int, at: int) -> None:
+    trees = [PrimitiveTree(replace(TreeConfig(), drop_fragments=on), D, RATE_HZ) for on in (1, 0)]
+    for tree in trees:
+        rng = np.random.default_rng((kind, at))
+        for _ in range(2):
+            for other in range(1, 6):
+                tree.insert(motion((kind + other) % 6, rng))
+            hesitate(tree, kind, at, rng)
+        for k in range(36):
+            tree.insert(motion((kind + k) % 6, rng))
+    assert len(trees[0].leaves) == 6
+    assert len(trees[1].leaves) == 8
+
+
+DROPPING = TreeConfig()
+NOT = replace(TreeConfig(), drop_fragments=False)
+
+
+@pytest.mark.parametrize("at", range(10, 22, 2))
+def test_a_primitive_born_of_parts_of_its_own_motion_is_born_anew(at: int) -> None:
+    rng = np.random.default_rng(at)
+    tree = PrimitiveTree(DROPPING, D, RATE_HZ)
+    shown: list[FloatArray] = []
+    parts = []
+
+    def show(frames: FloatArray, goes_on: bool = False) -> Placement:
+        shown.append(frames)
+        return tree.insert(frames, goes_on=goes_on)
+
+    for _ in range(2):
+        for kind in range(1, 6):
+            show(motion(kind, rng))
+        whole = ramp(rng)
+        show(whole[:at])
+        parts.append(show(whole[at:], goes_on=True).number)
+    (false,) = (id for id in tree.leaves if parts[0] in tree.node(id).members)
+    wholes, gone = [], None
+    for k in range(20):
+        before, recogniser = tree.node(false), tree.recogniser()
+        placed = show(ramp(rng)) if k % 6 == 0 else show(motion(k % 6, rng))
+        wholes += [placed.number] * (k % 6 == 0)
+        if false in placed.removed:
+            gone = placed
+            break
+    assert gone is not None and gone.parts == (false,)
+    joined = [np.concatenate([shown[part - 1], shown[part]]) for part in parts]
+    assert {recogniser.recognise(each).primitive for each in joined} == {false}
+    assert set(before.members) == {*parts, *wholes}
+    (true,) = gone.born
+    assert dict(gone.moved).items() >= dict.fromkeys(wholes, true).items()
+    assert tree.node(true).members[: len(wholes)] == tuple(wholes)
+    assert tree.insert(ramp(rng)).node_id == true
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_is_dropped_is_what_anybody_recognises_as_parts_of_one_motion(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    tree, shown, goes_on, dropped = PrimitiveTree(DROPPING, D, RATE_HZ), [], [False], 0
+    for _ in range(70):
+        kind, at = int(rng.integers(0, 4)), (14, 24, 40)[int(rng.integers(0, 3))]
+        whole = motion(kind, rng)
+        cut = rng.random() < 0.3
+        for frames in (whole[:at], whole[at:]) if cut else (whole,):
+            goes_on[-1] &= bool(rng.random() < 0.9)
+            plain = PrimitiveTree(NOT, D, RATE_HZ)
+            plain.load_state(tree.state())
+            begins = bool(goes_on[-1])
+            shown.append(frames)
+            expected, placed = (each.insert(frames, goes_on=begins) for each in (plain, tree))
+            goes_on.append(True)
+            few = unsure(plain)
+            turn = few[tree.n_seen % len(few)] if few else None
+            gone = (
+                turn is not None
+                and expected == expected._replace(**Change()._asdict())
+                and placed.number not in plain.node(turn).members
+                and parts_of_one(plain, turn, shown, goes_on)
+            )
+            assert placed == (
+                expected._replace(removed=(turn,), parts=(turn,)) if gone else expected
+            )
+            dropped += gone
+    assert dropped
+
+
+@pytest.mark.parametrize("asked", ["keep", "freeze"])
+def test_what_a_person_had_a_hand_in_is_not_dropped(asked: str) -> None:
+    trees = [PrimitiveTree(DROPPING, D, RATE_HZ) for _ in range(2)]
+    for tree in trees:
+        rng = np.random.default_rng(5)
+        for _ in range(2):
+            for other in range(1, 6):
+                tree.insert(motion(other, rng))
+            first, _ = hesitate(tree, 0, 24, rng)
+        (part,) = (id for id in tree.leaves if first in tree.node(id).members)
+        if tree is trees[0]:
+            getattr(tree, asked)(part)
+        for k in range(36):
+            tree.insert(motion(k % 6, rng))
+    assert set(trees[0].leaves) - set(trees[1].leaves) == {part}
+
+
+def test_parts_that_are_shown_more_often_than_the_whole_are_motions() -> None:
+    rng = np.random.default_rng(2)
+    tree = PrimitiveTree(DROPPING, D, RATE_HZ)
+    for _ in range(4):
+        hesitate(tree, 0, 24, rng)
+        for other in range(1, 6):
+            tree.insert(motion(other, rng))
+    known = set(tree.leaves)
+    assert len(known) == 7
+    for _ in range(3):
+        tree.insert(motion(0, rng))
+        for k in range(10):
+            tree.insert(motion(1 + k % 5, rng))
+    assert known < set(tree.leaves)

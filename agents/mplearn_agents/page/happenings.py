@@ -110,8 +110,9 @@ def _said(event: Event, rate_hz: float) -> tuple[str, str, int | None] | None:
             return "born", f"new: {mention(id)}, from {n} demonstrations{sure}", id
         case PrimitiveConfirmed(_, id, n):
             return "learned", f"learned: {mention(id)}, shown {n} times", id
-        case PrimitiveForgotten(_, id):
-            return "gone", f"forgotten: {mention(id)} never came again", id
+        case PrimitiveForgotten(_, id, part):
+            why = "was a part of a motion" if part else "never came again"
+            return "gone", f"forgotten: {mention(id)} {why}", id
         case PrimitiveMerged(_, id, absorbed):
             return "merged", f"{mention(absorbed)} turned out to be {mention(id)}", id
         case PrimitiveSplit(_, id, into):

@@ -48,8 +48,9 @@ def event_text(event: Event, rate_hz: float) -> str | None:
         case PrimitiveConfirmed(segment, primitive, exemplars):
             text = f"confirmed primitive {primitive} ({exemplars} demonstrations)"
             return _line(segment.end, rate_hz, text)
-        case PrimitiveForgotten(segment, primitive):
-            return _line(segment.end, rate_hz, f"forgot primitive {primitive}: never confirmed")
+        case PrimitiveForgotten(segment, primitive, part):
+            why = "a part of a motion" if part else "never confirmed"
+            return _line(segment.end, rate_hz, f"forgot primitive {primitive}: {why}")
         case PrimitiveMerged(segment, primitive, absorbed):
             return _line(segment.end, rate_hz, f"primitive {absorbed} is {primitive}: merged")
         case PrimitiveSplit(segment, primitive, into):

@@ -31,7 +31,13 @@ def build_default() -> PrimitiveLibrary:
     demonstration = demonstrate(script, SEED)
     recording = demonstration.recording
     # The rules of version 0, here and in the next lines.
-    rules = replace(TreeConfig(), sequence_share=0.0, ignore_fragments=False, max_born=math.inf)
+    rules = replace(
+        TreeConfig(),
+        sequence_share=0.0,
+        ignore_fragments=False,
+        drop_fragments=False,
+        max_born=math.inf,
+    )
     config = LearnerConfig(recording.channels, recording.rate_hz, scaffolding=False, tree=rules)
     learner = MotionLearner(config)
     votes: defaultdict[int, Counter[str]] = defaultdict(Counter)

@@ -91,7 +91,13 @@ def taught(people: Collection[int], n_motions: int = N_SHOWN) -> MotionLearner:
     for person in people:
         recording = shown_by(person, n_motions).recording
         # The rules of version 1, here and in the next lines.
-        rules = replace(TreeConfig(), sequence_share=0.0, ignore_fragments=False, max_born=math.inf)
+        rules = replace(
+            TreeConfig(),
+            sequence_share=0.0,
+            ignore_fragments=False,
+            drop_fragments=False,
+            max_born=math.inf,
+        )
         config = LearnerConfig(recording.channels, RATE_HZ, scaffolding=False, tree=rules)
         learner = learner or MotionLearner(config)
         for _ in learner.learn_recording(recording, at_once=len(recording.frames)):

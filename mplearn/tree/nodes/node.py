@@ -13,7 +13,7 @@ from ...state import Array, Blob, Count, SharedState, newer, require
 from ..exemplars.spread import without
 from .clustering import most_redundant
 
-Happening: TypeAlias = Literal["born", "split", "merged", "moved", "undone"]
+Happening: TypeAlias = Literal["born", "split", "merged", "moved", "undone", "kept"]
 
 
 class Table(Protocol):
@@ -97,7 +97,7 @@ class Node:
         settled: Those of its exemplars that went to one of them; in the root, that are fragments of
             executions of one.
         history: Kind and time of what happened to it: ("born", n), ("split", n), ("merged", n),
-            ("moved", n), ("undone", n).
+            ("moved", n), ("undone", n), ("kept", n).
         whole: Whether a person said that it is one motion: the rules never split it.
         apart: Ids of leaves that a person said are other motions: the rules never merge them.
         frozen: Whether a person said that it is to stay as it is: nothing changes its exemplars.
