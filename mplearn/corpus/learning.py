@@ -260,8 +260,6 @@ class _Run:
             for k, shard in enumerate(plan.shards)
         ]
         self._journals = [ShardJournal(task.store) for task in self._tasks]
-        for journal in self._journals:
-            journal.abandoned()
         self._reports = [journal.report() for journal in self._journals]
         self._n_takes = len(takes) + len(unreadable)
         done = [*here.keys() & {n for r in self._reports for n in (*r.learned, *r.refused)}]
@@ -288,7 +286,6 @@ class _Run:
             self._done.add(k)
 
         def died(k: int) -> int:
-            self._journals[k].abandoned()
             path = self._journals[k].path
             return path.stat().st_size if path.exists() else 0
 

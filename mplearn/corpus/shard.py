@@ -94,8 +94,8 @@ class ShardJournal:
     """What was done of a shard, a line for each take, beside its store: others read it meanwhile.
 
     A take stands in it once its motion is in the store, so a take that stands here needs not be
-    read again. The last that was begun is in a worker's hands, until it is known to be dead
-    (`abandoned`); of every other that was begun and not ended, one died.
+    read again. The last that was begun is in a worker's hands, and is until another is begun, for
+    that one had to wait for the store; of every other that was begun and not ended, one died.
 
     Args:
         store: The store that it lies beside.
@@ -136,11 +136,6 @@ class ShardJournal:
             else:
                 self._done[entry["take"]] = entry
                 self._begun[entry["take"]] -= entry["what"] != "left out"
-
-    def abandoned(self) -> None:
-        """Take note that no worker has the shard in hand: whoever began a take last is dead."""
-        self.refresh()
-        self._in_hand = False
 
     def is_done(self, take: str) -> bool:
         """Whether a take was learned, or refused."""
@@ -216,11 +211,12 @@ def learn_shard(task: ShardTask) -> ShardReport:
     if not left:
         return journal.report()
     life = _opened(task)
+    journal.refresh()  # an earlier worker may have ended its take since
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StoreWarning)  # what cannot be written is an error here
             for take in left:
-                if not _learn_take(life, take, task, journal):
+                if not journal.is_done(take.name) and not _learn_take(life, take, task, journal):
                     break
     except BaseException:  # what is known may be half of something: the log alone is kept
         if isinstance(life.store, Store):

@@ -10,7 +10,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -35,7 +35,7 @@ from mplearn.corpus import (
 )
 from mplearn.corpus.cluster import RayTasks, _pass_on
 from mplearn.corpus.executors import Here
-from mplearn.corpus.shard import ShardJournal, learn_shard
+from mplearn.corpus.shard import ShardJournal, ShardTask, learn_shard
 from mplearn.errors import (
     CorpusError,
     InvalidValueError,
@@ -44,10 +44,10 @@ from mplearn.errors import (
     StoreWriteError,
 )
 from mplearn.merging import merge_learners
-from mplearn.mocap import Hints, TakeFiles, readers, register_reader, registry
+from mplearn.mocap import Hints, TakeFiles, find_takes, readers, register_reader, registry
 from mplearn.mocap.markers.csv_table import CSVReader
 from mplearn.recording import Recording
-from mplearn.store import StoreReader
+from mplearn.store import Store, StoreReader
 
 
 def n_threads() -> set[int]:
@@ -357,8 +357,8 @@ def _runs(process: int) -> bool:
 _LIVES = st.lists(st.sampled_from(["learned", "died", "stopped"]), max_size=8)
 
 
-@given(_LIVES, st.booleans())
-def test_a_death_counts_once_the_worker_is_known_to_be_dead(lives: list[str], now: bool) -> None:
+@given(_LIVES)
+def test_a_death_counts_once_another_worker_begins(lives: list[str]) -> None:
     with tempfile.TemporaryDirectory() as folder:
         writer, reader = (ShardJournal(Path(folder) / "0000.db") for _ in range(2))
         died = 0
@@ -368,17 +368,62 @@ def test_a_death_counts_once_the_worker_is_known_to_be_dead(lives: list[str], no
             assert reader.report().deaths == died
             if end == "died":
                 died += 1
-                if now:
-                    reader.abandoned()
-                    assert reader.report().deaths == died
             else:
                 rest = {"keys": [], "watched_s": 1.0, "took_s": 1.0, "primitives": 1, "memory": 1}
                 writer.write(end, f"{k}", **(rest if end == "learned" else {}))
+        reader.refresh()
         again = ShardJournal(writer.path.with_suffix(".db"))
-        again.abandoned()
-        assert again.report().deaths == died
-        reader.abandoned()
-        assert reader.report() == again.report()
+        assert again.report() == reader.report()
+        assert again.report().deaths == died - (lives[-1:] == ["died"])
+
+
+def test_who_ends_a_take_after_its_pool_is_seen_to_be_broken_died_of_nothing(
+    folder: Path, alone: bytes, tmp_path: Path
+) -> None:
+    class Late(Here):
+        """The first worker's work is lost while it still has its take in hand, which it ends."""
+
+        journal: ShardJournal | None = None
+
+        def submit(self, work: Callable[..., Any], *args: Any) -> Future[Any]:
+            if work is learn_shard and self.journal is None:
+                self.journal, self.take = ShardJournal(args[0].store), args[0].takes[0].name
+                self.journal.write("begun", self.take)
+                future: Future[Any] = Future()
+                future.set_exception(RuntimeError("ended abruptly"))
+                return future
+            if self.journal is not None and not ended:
+                ended.append(self.take)
+                self.journal.take_back(self.take)
+            return super().submit(work, *args)
+
+    ended, deaths = [], []
+    corpus = learn_corpus(
+        folder, tmp_path / "s", executor=Late(), show=lambda now: deaths.append(now.deaths)
+    )
+    assert ended
+    assert not any(deaths)
+    assert saved(corpus, tmp_path) == alone
+
+
+def test_what_an_earlier_worker_still_writes_is_read_before_anything_is_begun(
+    folder: Path, tmp_path: Path
+) -> None:
+    takes = tuple(take for take in find_takes(folder).takes if take.person == "anna")
+    learner = learn_corpus(folder, tmp_path / "s", jobs=0, people=["anna"]).learner
+    assert learner is not None
+    task = ShardTask(tmp_path / "0000.db", takes, Reading(), learner.config, tmp_path / "stop")
+    journal = ShardJournal(task.store)
+    with ThreadPoolExecutor(1) as pool:
+        with contextlib.closing(Store(task.store)):
+            for _ in range(2):
+                journal.write("begun", takes[0].name)
+            later = pool.submit(learn_shard, task)
+            time.sleep(0.1)  # the later worker has read the journal, and waits for the store
+            journal.take_back(takes[0].name)
+        report = later.result()
+    assert report.learned == tuple(take.name for take in takes)
+    assert report.deaths == 1
 
 
 def test_what_came_since_is_learned_in_shards_of_its_own(tmp_path: Path) -> None:
@@ -572,7 +617,6 @@ def test_a_take_that_was_begun_without_room_to_say_how_it_ended_is_not_held_a_de
                 journal.write("learned", "kick", took_s=1.0)
             journal.take_back("kick")
     read = ShardJournal(tmp_path / "a.db")
-    read.abandoned()
     assert read.deaths("kick") == 0
     assert read.is_done("bow")
     assert not read.is_done("kick")
