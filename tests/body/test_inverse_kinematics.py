@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
+from threadpoolctl import threadpool_limits
 
 from mplearn.body import IKConfig, InverseKinematics, human_body, marker_set, robot_body
 from mplearn.body.inverse_kinematics.calibration import Calibration
@@ -305,6 +306,18 @@ def test_the_same_frames_give_the_same_postures_and_the_state_resumes():
     third.load_state(second.state())
     for frame, q in zip(frames[30:], expected[30:], strict=True):
         np.testing.assert_array_equal(third.update(frame), q)
+
+
+def test_a_body_is_fitted_alike_by_any_number_of_threads():
+    frames = markers_of(human_body(), smooth_motion(human_body(), 40, 100.0, seed=5))
+    fitted = []
+    for threads in (1, 2, 4):
+        with threadpool_limits(threads, user_api="blas"):
+            ik = InverseKinematics(human_body(), NAMES)
+            fitted.append(ik.calibrate(frames))
+    for other in fitted[1:]:
+        np.testing.assert_array_equal(other.factors, fitted[0].factors)
+        np.testing.assert_array_equal(other.offsets, fitted[0].offsets)
 
 
 def test_bad_frames():

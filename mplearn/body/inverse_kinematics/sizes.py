@@ -9,6 +9,7 @@ import numpy as np
 from mplearn.recording import FloatArray, IntArray
 
 from ...maths.compiling import njit
+from ...maths.solvers import cholesky, cholesky_solve
 from ..kinematics.tree import KinematicTree
 from ..models.human import PROPORTIONS
 
@@ -85,7 +86,9 @@ def fit_sizes(
     mats = np.array([tree.forward(q)[1] for q in postures])
     links = _Links(tree.linkage.parent, tree.linkage.offset, groups)
     _add_markers(mats, links, expected, frames, _Equations(normal, gradient))
-    solution = first + np.linalg.solve(normal, gradient)
+    cholesky(normal)  # LAPACK's depends on the number of threads, which spin afterwards
+    cholesky_solve(normal, gradient)
+    solution = first + gradient
     factors = expected.size * np.clip(solution[:n_groups], NARROWEST, WIDEST)[groups]
     shifts = solution[n_groups : n_groups + 3 * n_markers].reshape(n_markers, 3)
     return factors, expected.template * factors[expected.bodies] + shifts
