@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mplearn.recording import IntArray
 from mplearn_envs.export import RobotModel, RobotMotion, export, format_of
 from mplearn_envs.export.checking.faults import Mirror, breadth_first, joints_breadth_first
 from mplearn_envs.export.format import Reading
@@ -111,6 +112,23 @@ def y_up(motion: RobotMotion, model: RobotModel) -> RobotMotion:
     )
 
 
+def kept(motion: RobotMotion, frames: slice | IntArray) -> RobotMotion:
+    return replace(
+        motion,
+        root_pos=motion.root_pos[frames],
+        root_quat=motion.root_quat[frames],
+        joint_pos=motion.joint_pos[frames],
+    )
+
+
+def end_cut_off(motion: RobotMotion, model: RobotModel) -> RobotMotion:
+    return kept(motion, slice(None, len(motion) * 2 // 3))
+
+
+def begun_late(motion: RobotMotion, model: RobotModel) -> RobotMotion:
+    return kept(motion, slice(len(motion) // 4, None))
+
+
 #: Faults of the motion itself, which any format can hold: what is done, and what must be found.
 OF_MOTIONS: dict[str, tuple[Corrupt, str]] = {
     "degrees": (degrees, "degrees"),
@@ -128,6 +146,8 @@ OF_MOTIONS: dict[str, tuple[Corrupt, str]] = {
     "one joint in degrees": (one_joint_in_degrees, "degrees"),
     "zero of one joint": (other_zero, "zero"),
     "x and y exchanged": (exchanged, "axes"),
+    "end cut off": (end_cut_off, "frames"),
+    "begun late": (begun_late, "frames"),
 }
 
 

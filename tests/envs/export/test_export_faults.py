@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from export_world import OF_MOTIONS, alone, change_arrays, of_arrays, written
+from export_world import OF_MOTIONS, alone, change_arrays, kept, of_arrays, written
 
 from mplearn.errors import RecordingError
 from mplearn_envs.export import RobotModel, RobotMotion, check, formats
@@ -18,7 +18,12 @@ OF_HINGES = {  # of which these hold no angles
     "degrees", "centimetres", "quaternion order", "joints breadth first", "two joints swapped",
     "one joint backward", "inches", "one joint in degrees",
 }  # fmt: skip
-OF_ONE = {"one joint in degrees", "zero of one joint", "x and y exchanged"}  # in three formats
+OF_ONE = {
+    "one joint in degrees",
+    "zero of one joint",
+    "x and y exchanged",
+    "begun late",
+}  # in three formats
 ALONE = {"degrees", "centimetres", "quaternion order", "too high", "y up"}  # by the file alone
 FORMATS = list(formats())
 OF_ARRAYS = list(of_arrays(RobotModel.of(humanoid())))
@@ -82,18 +87,36 @@ def test_frames_that_are_missing_are_counted_and_placed(
     model: RobotModel, motion: RobotMotion, tmp_path: Path
 ) -> None:
     def shorter(motion: RobotMotion, model: RobotModel) -> RobotMotion:
-        kept = np.delete(np.arange(len(motion)), slice(10, 13))
-        return replace(
-            motion,
-            root_pos=motion.root_pos[kept],
-            root_quat=motion.root_quat[kept],
-            joint_pos=motion.joint_pos[kept],
-        )
+        return kept(motion, np.delete(np.arange(len(motion)), slice(10, 13)))
 
     (verdict,) = check(written(tmp_path, motion, model, "unitree", shorter), model)
     assert [fault.kind for fault in verdict.faults] == ["frames"]
     assert verdict.faults[0].problem.startswith("3 frames are missing after frame 9, ")
     assert verdict.left.position_m < verdict.misfit.position_m / 5
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_a_frame_or_two_that_are_missing_at_the_end_or_too_many_are_told(
+    model: RobotModel, motion: RobotMotion, tmp_path: Path, n: int
+) -> None:
+    def shorter(motion: RobotMotion, model: RobotModel) -> RobotMotion:
+        return kept(motion, slice(None, -n))
+
+    def longer(motion: RobotMotion, model: RobotModel) -> RobotMotion:
+        ends = {
+            name: np.concatenate([values := getattr(motion, name), values[-1:].repeat(n, axis=0)])
+            for name in ("root_pos", "root_quat", "joint_pos")
+        }
+        return replace(motion, **ends)
+
+    (verdict,) = check(written(tmp_path, motion, model, "unitree", shorter), model)
+    frames = f"{n} frames are" if n > 1 else "1 frame is"
+    assert [fault.problem for fault in verdict.faults] == [
+        f"{frames} missing at the end, {n / 30:.4g} s"
+    ]
+    (verdict,) = check(written(tmp_path, motion, model, "unitree", longer), model)
+    assert not verdict.faults
+    assert verdict.problems == (f"there are {n} frames more than were meant",)
 
 
 def test_two_faults_at_once_are_both_found(

@@ -176,8 +176,15 @@ class _Trail:
     """A reading, and the faults that were taken back on the way to it."""
 
     reading: Reading
+    evidence: Evidence
     misfit: Misfit
     faults: tuple[Fault, ...] = ()
+
+    def without(self, fault: Fault) -> _Trail:
+        """Return the trail with one more fault taken back."""
+        evidence = self.evidence._replace(meant=fault.meant or self.evidence.meant)
+        misfit = measure(fault.reading, *evidence)
+        return _Trail(fault.reading, evidence, misfit, (*self.faults, fault))
 
 
 def _verdict(
@@ -189,22 +196,22 @@ def _verdict(
     tolerance_m: float,
     tolerance_rad: float,
 ) -> Verdict:
-    first = _Trail(reading, measure(reading, *evidence))
+    first = _Trail(reading, evidence, measure(reading, *evidence))
 
     def problems(misfit: Misfit) -> tuple[str, ...]:
         return tuple(_problems(misfit, tolerance_m, tolerance_rad))
 
     plain = by_itself(reading, first.misfit, evidence.model)
-    best = first if plain is reading else _Trail(plain, measure(plain, *evidence))
+    best = first if plain is reading else _Trail(plain, evidence, measure(plain, *evidence))
     beam = [best]
     for _ in range(_DEPTH):
         if not problems(best.misfit):
             break
         found = [
-            _Trail(fault.reading, misfit, (*trail.faults, fault))
+            further
             for trail in beam
-            for fault in _tried(trail, evidence, dialects)
-            if (misfit := measure(fault.reading, *evidence)).cost < trail.misfit.cost - _WORTH
+            for fault in _tried(trail, dialects)
+            if (further := trail.without(fault)).misfit.cost < trail.misfit.cost - _WORTH
         ]
         beam = sorted(found, key=lambda trail: trail.misfit.cost)[:_BEAM]
         if beam and beam[0].misfit.cost < best.misfit.cost - _WORTH:
@@ -222,13 +229,11 @@ def _verdict(
     )
 
 
-def _tried(
-    trail: _Trail, evidence: Evidence, dialects: Callable[[], Sequence[Fault]]
-) -> Iterator[Fault]:
+def _tried(trail: _Trail, dialects: Callable[[], Sequence[Fault]]) -> Iterator[Fault]:
     if not trail.faults:
         yield from dialects()
     taken = {fault.problem for fault in trail.faults}
-    for fault in faults(trail.reading, evidence):
+    for fault in faults(trail.reading, trail.evidence):
         if fault.problem not in taken:
             yield fault
 
@@ -241,6 +246,9 @@ def _problems(misfit: Misfit, tolerance_m: float, tolerance_rad: float) -> Itera
         )
     if misfit.angle_rad > tolerance_rad:
         yield f"bodies are turned by {np.degrees(misfit.angle_rad):.3g} degrees at most"
+    if misfit.missing:
+        more = "more" if misfit.missing < 0 else "fewer"
+        yield f"there are {abs(misfit.missing)} frames {more} than were meant"
     for name, share in misfit.velocities.items():
         if share > CONSISTENT:
             yield f"{name} differ from the differences of positions by {100 * share:.3g} %"

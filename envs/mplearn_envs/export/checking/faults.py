@@ -20,7 +20,7 @@ from mplearn.recording import FloatArray, IntArray
 from ..format import Reading
 from ..robot_model import RobotModel
 from ..sidecar import Meant
-from .misfit import angles_between, postures, some
+from .misfit import angles_between, missing_of, postures, some
 
 _LENGTHS = {
     0.01: "in centimetres, not metres",
@@ -45,11 +45,13 @@ class Fault(NamedTuple):
             "joints permuted", "mirrored", "zero", "rate", "frames", "place", "axes", "velocities".
         problem: What is wrong with the file then, in a few words.
         reading: What the file says, with that taken back.
+        meant: What was meant by that, where it is less than all.
     """
 
     kind: str
     problem: str
     reading: Reading
+    meant: Meant | None = None
 
 
 class Evidence(NamedTuple):
@@ -251,18 +253,41 @@ def _frames(reading: Reading, evidence: Evidence) -> Iterator[Fault]:
         steps = np.diff(reading.times_s) * reading.rate_hz
         gaps.add((int(steps.argmax()) + 1, round(float(steps.max())) - 1))
     meant = evidence.meant
-    if meant is not None and abs(meant.rate_hz / reading.rate_hz - 1.0) < 1e-3:
-        missing = meant.n_frames - len(reading)
+    if meant is not None:
+        missing = missing_of(reading, meant)
+        yield from _ends(reading, meant, missing)
         if 0 < missing < len(reading):
             gaps.add((_gap(reading, evidence.model, meant, missing), missing))
     for after, missing in sorted(gaps):
         if missing > 0:
-            are = "frames are" if missing > 1 else "frame is"
             problem = (
-                f"{missing} {are} missing after frame {after - 1}, "
+                f"{_are(missing)} missing after frame {after - 1}, "
                 f"{(after - 1) / reading.rate_hz:.4g} s"
             )
             yield Fault("frames", problem, _filled(reading, after, missing))
+
+
+def _ends(reading: Reading, meant: Meant, missing: int) -> Iterator[Fault]:
+    """Yield that frames are missing at the beginning or the end: what is there has to fit alone."""
+    if missing <= 0:
+        return
+    for where, first in (("the beginning", missing), ("the end", 0)):
+        at = meant.times_s * reading.rate_hz - first
+        there = (at > -1e-6) & (at < len(reading) - 1 + 1e-6)
+        if there.sum() > 1:
+            part = replace(
+                meant,
+                n_frames=len(reading),
+                times_s=at[there] / reading.rate_hz,
+                pos=meant.pos[there],
+                quat=meant.quat[there],
+            )
+            problem = f"{_are(missing)} missing at {where}, {missing / reading.rate_hz:.4g} s"
+            yield Fault("frames", problem, reading, part)
+
+
+def _are(missing: int) -> str:
+    return f"{missing} frames are" if missing > 1 else "1 frame is"
 
 
 def _gap(reading: Reading, model: RobotModel, meant: Meant, missing: int) -> int:

@@ -41,6 +41,7 @@ class Misfit:
         tilt: Cosine between the base's axis and the vertical in the median frame.
         length: Largest difference of a quaternion's length from 1.
         speed: Largest velocity of a joint as a share of what the robot can do; NaN if not known.
+        missing: How many frames fewer there are than were meant, at that rate.
         compared: What the positions were compared with.
     """
 
@@ -56,6 +57,7 @@ class Misfit:
     tilt: float
     length: float
     speed: float
+    missing: int = 0
     compared: tuple[str, ...] = ()
     parts: dict[str, float] = field(default_factory=dict)
 
@@ -63,6 +65,12 @@ class Misfit:
     def cost(self) -> float:
         """How wrong all of it is, on a logarithmic scale; 0 where nothing is."""
         return float(sum(self.parts.values()))
+
+
+def missing_of(reading: Reading, meant: Meant) -> int:
+    """Return how many frames fewer there are than were meant; 0 where the rate is another."""
+    alike = abs(meant.rate_hz / reading.rate_hz - 1.0) < 1e-3
+    return meant.n_frames - len(reading) if alike else 0
 
 
 def postures(reading: Reading, model: RobotModel, frames: IntArray | slice) -> FloatArray:
@@ -137,6 +145,8 @@ def measure(reading: Reading, model: RobotModel, meant: Meant | None) -> Misfit:
         compared.append("what was meant")
         found, at = _then(reading, model, meant)
         worst.meant(parts, found, meant, at, model)
+    missing = 0 if meant is None else missing_of(reading, meant)
+    parts["frames"] = float(np.log1p(abs(missing)))
     velocities = _velocities(reading)
     for name, share in velocities.items():
         parts[name] = float(np.log1p(share / _VELOCITY))
@@ -165,6 +175,7 @@ def measure(reading: Reading, model: RobotModel, meant: Meant | None) -> Misfit:
         tilt,
         length,
         _speed(reading, model),
+        missing,
         tuple(compared),
         parts,
     )
