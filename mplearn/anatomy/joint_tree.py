@@ -7,10 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
+from ..mocap.placing.hanging import hanging, longest_way
 from ..recording import FloatArray, Skeleton
 
 TOGETHER = 0.006  # joints closer than this share of the skeleton's extent are one
-LOOSE, LOOSE_M = 0.5, 0.05  # how much a bone may stretch and still be one: of its length, and [m]
 LIKE, LIKE_FLAT = 0.2, 0.012  # how unlike two bones of a pair may be: relative, of the extent
 
 
@@ -40,14 +40,8 @@ class JointTree:
             skeleton: Its joints, without any that only show how a joint is turned.
             points: Where they are in some frames, shape (T, J, 3) [m].
         """
-        parents = np.array(skeleton.parents)
-        bones = _norm(points - points[:, np.maximum(parents, 0)])  # (T, J)
-        lengths = np.median(bones, axis=0)
-        give = np.ptp(np.quantile(bones, (0.05, 0.95), axis=0), axis=0)
-        # a joint that moves freely in its parent, as the hips in a root on the floor, hangs on none
-        parents = np.where((parents >= 0) & (give > LOOSE * lengths + LOOSE_M), -1, parents)
-        lengths[parents < 0] = 0.0
-        near = TOGETHER * _extent(parents, lengths)
+        parents, lengths = hanging(points, skeleton.parents)
+        near = TOGETHER * longest_way(parents, lengths)
         node_of: list[int] = []
         members: list[list[int]] = []
         for joint, parent in enumerate(parents):
@@ -153,16 +147,3 @@ def rest_positions(skeleton: Skeleton) -> FloatArray:
 def _norm(vectors: FloatArray) -> FloatArray:
     lengths: FloatArray = np.sqrt((vectors * vectors).sum(axis=-1))
     return lengths
-
-
-def _extent(parents: FloatArray, lengths: FloatArray) -> float:
-    """Return the length of the longest way along bones [m]."""
-    down = np.zeros(len(parents))
-    best = 0.0
-    for joint in range(len(parents) - 1, 0, -1):
-        parent = int(parents[joint])
-        if parent >= 0:
-            reach = down[joint] + lengths[joint]
-            best = max(best, down[parent] + reach)
-            down[parent] = max(down[parent], reach)
-    return best

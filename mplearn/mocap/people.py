@@ -7,16 +7,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 from itertools import product
 
-import numpy as np
-
 from ..option_names import option
 from ..recording import ReadReport, Recording, Skeleton, marker_channels
 from .markers.names import WORD_MARKS, shared_start
+from .placing.hanging import hanging, trees_of
 from .skeletons.kinematics import AXIS_MARK
 
 FEWEST_JOINTS = 12  # of a person's skeleton
 FEWEST_MARKERS = 10  # that people have in common; clusters on limbs are smaller
-LOOSE, LOOSE_M = 0.25, 0.02  # how much a bone may stretch and still be one: of its length, and [m]
 LEAST_SIZE = 0.5  # of the largest tree of joints: hands and props are smaller
 _SIDE = re.compile(r"left|right|lft|rgt|links|rechts|^[lr](?=[A-Z_ ]|$)", re.IGNORECASE)
 _LOOK = 100  # frames
@@ -92,21 +90,11 @@ def _by_tree(recording: Recording) -> Mapping[str, list[int]]:
     skeleton = recording.skeleton
     assert skeleton is not None
     some = recording.markers[:: max(1, len(recording) // _LOOK)]
-    parents = np.array(skeleton.parents)
-    bones = np.linalg.norm(some - some[:, np.maximum(parents, 0)], axis=2)  # (t, J)
-    with np.errstate(all="ignore"):
-        lengths = np.nanmedian(bones, axis=0)
-        give = np.ptp(np.nanquantile(bones, (0.05, 0.95), axis=0), axis=0)
-    roots: list[int] = []
-    for joint, parent in enumerate(parents.tolist()):
-        free = parent < 0 or give[joint] > LOOSE * lengths[joint] + LOOSE_M
-        roots.append(joint if free else roots[parent])
-    trees: dict[int, list[int]] = {}
-    for joint, root in enumerate(roots):
-        trees.setdefault(root, []).append(joint)
+    parents, lengths = hanging(some, skeleton.parents)
+    trees = trees_of(parents)
     real = {root: [k for k in tree if not _shows_axes(skeleton, k)] for root, tree in trees.items()}
     sizes = {
-        root: float(np.nan_to_num(lengths[tree[1:]]).sum())
+        root: float(lengths[tree].sum())
         for root, tree in real.items()
         if len(tree) >= FEWEST_JOINTS
     }

@@ -159,3 +159,28 @@ def test_arms_without_wrists_are_not_taken_for_arms(tmp_path, truth):
         recognise(without_joints(recording, "Hand"))
     found = recognise(without_joints(recording, "Neck"))
     assert any("there is no neck" in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize("place", [(0.5, 0.0), (6.0, -1.2), (-20.0, 5.0)], ids=str)
+def test_whoever_hangs_on_a_root_where_all_is_counted_from_is_nothing_but_a_person(
+    tmp_path, truth, place
+):
+    rig = Rig()
+    path = write_rig(tmp_path / "rig.bvh", truth.body, truth.postures[:60], 25.0, rig)
+    alone = open_recording(path, positions=True, hints=Hints(joint_axes=True))
+    text, rows = path.read_text().split("Frame Time: ")
+    tree, motion = text.replace("ROOT", "JOINT", 1).split("MOTION")
+    root = "HIERARCHY\nROOT Reference\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition"
+    sword = "JOINT Sword\n{\nOFFSET 300 100 700\nCHANNELS 0\n"
+    sword += "End Site\n{\nOFFSET 0 0 80\n}\n}\n}\nMOTION"
+    time, *rows = rows.strip().split("\n")
+    frames = np.array([row.split() for row in rows], dtype=float)
+    frames[:, [2, 0]] += np.array(place) / rig.unit_m  # z ahead, x aside
+    rows = ["0 0 0 " + " ".join(f"{x:.6f}" for x in frame) for frame in frames]
+    text = tree.replace("HIERARCHY", root) + sword + motion
+    path.write_text(text + "\n".join(["Frame Time: " + time, *rows, ""]))
+    recording = open_recording(path, positions=True, hints=Hints(joint_axes=True))
+    assert (recording.report.up, recording.report.unit_m) == (rig.up, rig.unit_m)
+    assert not recording.report.warnings
+    ours, theirs = (recognise(r).apply(r).markers for r in (recording, alone))
+    np.testing.assert_allclose(ours - theirs - [*place, 0.0], 0.0, atol=2e-3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from ...recording import FloatArray
 from ..files import bad_file
 from ..findings import Findings
 from ..reader import DIRECTIONS, Hints
+from .hanging import hanging, trees_of
 from .size import UNITS_M, Unit, find_unit, spread_of
 from .vertical import find_vertical
 
@@ -20,6 +22,7 @@ _FARTHEST_M = 100.0  # no capture volume is larger
 _SMALLEST_M = 0.02  # all markers of a body within less: not a body
 _MANY = 10  # markers; fewer may be a hand's
 _THIN_M = 1e-3  # no body is thinner
+_LOOK = 100  # frames
 _FEW = 3  # markers; about fewer the file alone can tell
 
 
@@ -105,6 +108,7 @@ def placed(
     hints: Hints,
     findings: Findings,
     sized: Unit | None = None,
+    parents: Sequence[int] | None = None,
 ) -> Placed:
     """Return a file's points in metres, z up, x forward where that is known, never mirrored.
 
@@ -120,6 +124,8 @@ def placed(
         hints: What the caller says.
         findings: Where to tell what was found.
         sized: The unit by the size of the person, where the caller knows better than `find_unit`.
+        parents: Index of each point's parent, -1 for a root, where they are a skeleton's joints:
+            its largest tree tells what is up.
 
     Raises:
         RecordingError: No person can be meant by the points.
@@ -136,10 +142,19 @@ def placed(
     metres = checked_markers(path, points if unit == 1.0 else points * unit, names)
     _warn_of_flat(metres, findings)
     usual = ("x", "y", "z") if sized else DIRECTIONS  # cameras have theirs as they hang
-    up = hints.up_axis or _settled_up(metres, names, rate_hz, space, findings, usual)
+    body = range(len(names)) if parents is None else _largest_tree(metres, parents)
+    up = hints.up_axis or _settled_up(
+        metres[:, body], tuple(names[k] for k in body), rate_hz, space, findings, usual
+    )
     turn = to_z_up(up, space.forward) if up == space.up else upright(up)
     turned = metres if np.array_equal(turn, np.eye(3)) else metres @ turn.T
     return Placed(turned, unit, up, turn)
+
+
+def _largest_tree(metres: FloatArray, parents: Sequence[int]) -> list[int]:
+    """Return the joints of the largest tree: not a root on the floor, or far away, nor props."""
+    kept, _ = hanging(metres[:: max(1, len(metres) // _LOOK)], parents)
+    return max(trees_of(kept).values(), key=len)
 
 
 def _warn_of_flat(metres: FloatArray, findings: Findings) -> None:

@@ -111,7 +111,7 @@ def skeletal_recording(
         hints = replace(
             hints, unit_m=hints.unit_m or space.unit_m, up_axis=hints.up_axis or space.up
         )
-    place = placed(path, local, names, motion.rate_hz, space, hints, findings, sized)
+    place = placed(path, local, names, motion.rate_hz, space, hints, findings, sized, parents)
     if not positions:
         channels, frames = angle_channels(path, motion, place.axes, place.unit_m)
     elif hints.joint_axes:

@@ -11,6 +11,7 @@ from ...option_names import option
 from ...recording import FloatArray
 from ..files import bad_file
 from ..findings import Findings
+from ..placing.hanging import near, trees_of
 from ..placing.size import Unit, likeliest_unit
 from ..reader import Hints
 
@@ -56,20 +57,16 @@ def _largest_rigid_part(
 ) -> tuple[list[int], list[int], FloatArray]:
     """Return the joints of the largest part whose bones keep their lengths, with its tree.
 
-    Some files hang the body on a root that stays on the floor: that is no bone.
+    Some files hang the body on a root that stays on the floor, or far away: that is no bone.
     """
-    part = list(range(len(parents)))
-    bones = np.zeros(len(parents))
-    for joint, parent in enumerate(parents):
-        if parent >= 0:
-            lengths = np.linalg.norm(points[:, joint] - points[:, parent], axis=1)
-            bones[joint] = np.median(lengths)
-            if np.ptp(lengths) <= _RIGID * bones[joint]:
-                part[joint] = part[parent]
-    largest = int(np.bincount(part).argmax())
-    joints = [joint for joint in range(len(parents)) if part[joint] == largest]
+    kept = np.array(parents)
+    lengths = np.linalg.norm(points - points[:, np.maximum(kept, 0)], axis=2)  # (t, J)
+    usual = np.median(lengths, axis=0)
+    kept[np.ptp(lengths, axis=0) > _RIGID * usual] = -1
+    kept, bones = near(kept, usual)
+    joints = max(trees_of(kept).values(), key=len)
     at = {joint: index for index, joint in enumerate(joints)}
-    return joints, [at.get(parents[joint], -1) for joint in joints], bones[joints]
+    return joints, [at.get(int(kept[joint]), -1) for joint in joints], bones[joints]
 
 
 def _has_trunk_and_limbs(parents: list[int], bones: FloatArray) -> bool:
