@@ -156,3 +156,49 @@ def test_boundaries_of_people_no_setting_was_chosen_on(name, person):
     score = score_boundaries(segments, session.labels, 100.0)
     assert score.f1 >= 0.9
     assert score.median_delay_s <= 0.2
+
+
+def there_and_back(rate_hz):
+    """Return motions up, back and a rest, each its own mirror image in time.
+
+    Also the frame of each top, and of each rest the first and the last frame.
+    """
+    length = round(rate_hz)
+    x = np.arange(1, length + 1) / length
+    up = x**3 * (10 - 15 * x + 6 * x**2)
+    rest = np.zeros(length)
+    frames = np.concatenate([rest, *[up, 1 - up, rest] * 6])
+    begins = length + 3 * length * np.arange(6)
+    rests = zip(begins[:-1] + 2 * length - 1, begins[1:] - 1, strict=True)
+    return frames[:, None], begins + length - 1, list(rests)
+
+
+def assert_no_lateness(late, what, within=1):
+    assert np.abs(late).max() < within, f"{what}: boundaries are {np.median(late):+g} frames late"
+
+
+@both
+@pytest.mark.parametrize("rate_hz", [25.0, 50.0, 100.0, 200.0])
+def test_no_boundary_is_a_frame_late_or_early(name, rate_hz):
+    """Of what is its own mirror image in time, boundaries are: at the top, around a rest."""
+    frames, tops, rests = there_and_back(rate_hz)
+    segments = make_segmenter(name, 1, rate_hz).segment(frames)
+    dips = [s.end for s in segments if s.cause == "dip"]
+    assert_no_lateness(np.subtract(dips, tops), f"{name} at {rate_hz:g} Hz, dips of the speed")
+    still = [(s.start, s.end - 1) for s in segments if s.still][1:-1]
+    middles = np.sum(still, axis=1) / 2 - np.sum(rests, axis=1) / 2
+    assert_no_lateness(middles, f"{name} at {rate_hz:g} Hz, rests")
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.7])
+def test_no_turn_is_frames_late_or_early(phase):
+    """What never rests is cut where it reverses along its longest axis."""
+    turn = 30  # frames from one reversal to the next
+    angles = np.pi * np.arange(1000) / turn + phase
+    frames = np.column_stack([np.sin(angles), 0.8 * np.cos(angles)])
+    segments = make_segmenter("kohlmorgen-lemm", 2, 50.0).segment(frames)
+    ends = np.array([s.end for s in segments if s.cause == "turn"][4:])  # the axis is known
+    assert len(ends) > 20
+    reversals = turn * (0.5 - phase / np.pi)
+    late = (ends - reversals + turn / 2) % turn - turn / 2
+    assert_no_lateness(late, "turns", within=2)
