@@ -11,7 +11,13 @@ from known_motions import bell_motions
 from mplearn.evaluation.boundaries import BoundaryScore, score_boundaries
 from mplearn.evaluation.executions import split_repetitions, without_gaps
 from mplearn.evaluation.sessions import make_session
-from mplearn.segmentation import ZeroVelocity, ZeroVelocityConfig, make_segmenter
+from mplearn.segmentation import (
+    KohlmorgenLemm,
+    KohlmorgenLemmConfig,
+    ZeroVelocity,
+    ZeroVelocityConfig,
+    make_segmenter,
+)
 
 both = pytest.mark.parametrize("name", ["kohlmorgen-lemm", "zero-velocity"])
 
@@ -202,3 +208,25 @@ def test_no_turn_is_frames_late_or_early(phase):
     reversals = turn * (0.5 - phase / np.pi)
     late = (ends - reversals + turn / 2) % turn - turn / 2
     assert_no_lateness(late, "turns", within=2)
+
+
+@pytest.mark.parametrize("exact", [False, True])
+@pytest.mark.parametrize("embedding", [1, 3])
+def test_no_change_of_state_is_frames_late_or_early(embedding, exact):
+    """Two clouds of postures by turns: which frame is of which is known."""
+    length = 100
+    sides = np.repeat([-1.0, 1.0] * 4, length)
+    noise = 0.05 * np.random.default_rng(0).normal(size=(len(sides), 2))
+    config = KohlmorgenLemmConfig(
+        density="posture",
+        embedding=embedding,
+        window_s=0.3,
+        fifo_s=5.0,
+        sigma=0.8,
+        exact=exact,
+        zero_velocity=ZeroVelocityConfig(max_length_s=30.0),
+    )
+    segments = KohlmorgenLemm(2, 50.0, config).segment(np.outer(sides, [1.0, -0.5]) + noise)
+    ends = [s.end for s in segments if s.cause == "state"]
+    assert len(ends) == 7
+    assert_no_lateness(np.subtract(ends, length * np.arange(1, 8)), "changes of state", within=2)
