@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from mplearn import Recording, open_recording
-from mplearn.errors import RecordingError
-from mplearn.mocap import Hints, Reader, register_reader
+from mplearn.mocap import Hints, Reader, bad_file, read_text, register_reader
+from mplearn.mocap.files import stem
+from mplearn.recording import marker_channels
 
 
 class JSONMarkers(Reader):
@@ -21,14 +22,13 @@ class JSONMarkers(Reader):
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         try:
-            content = json.loads(path.read_text(encoding="utf-8"))
+            content = json.loads(read_text(path))
             markers = {name: np.array(xyz, dtype=float) for name, xyz in content["markers"].items()}
             rate_hz = hints.rate_hz or float(content["rate"])
             frames = np.concatenate(list(markers.values()), axis=1)
         except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise RecordingError(f"{path}: no markers as expected ({error})") from error
-        channels = tuple(f"{name}.{axis}" for name in markers for axis in "xyz")
-        return Recording(frames, rate_hz, channels, name=path.stem)
+            raise bad_file(path, f"{type(error).__name__}: {error}", "markers by name") from error
+        return Recording(frames, rate_hz, marker_channels(tuple(markers)), name=stem(path))
 
 
 register_reader(JSONMarkers())  # from here on, open_recording and the readers of folders know it
