@@ -649,8 +649,8 @@ class MotionLearner:
     def _watch(self, frames: FloatArray) -> list[Event]:
         """Take frames of the stream, shape (T, D)."""
         if self.watching is None:
-            held, absurd = self._absurd.hold(frames)
-            return self._pass_on(held, absurd, ABSURD)
+            first = self._absurd.through_first(frames)
+            return self._hold(frames[:first]) + self._hold(frames[first:])
         observer = self.watching.observer
         frames = self.watching.arranged(frames)
         events: list[Event] = []
@@ -659,6 +659,14 @@ class MotionLearner:
             events += self._take(watched)
             frames = frames[watched.taken :]
         return events
+
+    def _hold(self, frames: FloatArray) -> list[Event]:
+        """Take frames of plain channels, shape (k, D), the absurd ones held at what was before."""
+        if self._absurd.is_first_absurd(frames):
+            self._begin_loss(ABSURD)
+            self._leave_open()
+        held, absurd = self._absurd.hold(frames)
+        return self._pass_on(held, absurd, ABSURD)
 
     def _take(self, watched: Watched) -> list[Event]:
         """Take what became of frames of markers."""

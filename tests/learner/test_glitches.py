@@ -4,6 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from mplearn import LearnerConfig, MotionLearner, Recording
 from mplearn.demonstrator import Demonstration
@@ -16,6 +18,8 @@ from mplearn.learner import (
     PrimitiveBorn,
     Recognised,
 )
+from mplearn.learner.absurd import BRIEF_S, AbsurdFrames
+from mplearn.learner.learner import ABSURD
 
 KNOWN, AT = 4000, 300  # frames learned undisturbed; where it is disturbed after that
 
@@ -200,6 +204,67 @@ def test_absurd_values_of_plain_channels_are_held_and_said(features: Recording, 
     assert said == [(700, 701), (1200, 1203)]
     assert len(recognised(events)) == len(recognised(before))
     assert poisoned.n_frames == clean.n_frames == 2500
+
+
+@pytest.mark.parametrize("at", [0, 3, 700])
+@pytest.mark.parametrize("long", [1, 5])
+def test_a_glitch_of_plain_channels_costs_what_it_hides(
+    features: Recording, at: int, long: int
+) -> None:
+    long = long if at else 1
+    part = features.frames[:2500]
+    wrong = part.copy()
+    wrong[at : at + long] *= 1000.0
+    clean, one, many = (MotionLearner(LearnerConfig(features.channels)) for _ in range(3))
+    before = clean.learn_many(part) + clean.end_stream()
+    first = [event for frame in wrong for event in one.learn_one(frame)]
+    assert many.learn_many(wrong) == first
+    assert many.state() == one.state()
+    events = first + one.end_stream()
+    said = [(e.start, e.end, e.reason) for e in events if isinstance(e, FramesLost)]
+    assert said == [(at, at + long, ABSURD)]
+    assert len(recognised(events)) >= len(recognised(before))
+    assert len(one.tree.leaves) == len(clean.tree.leaves)
+
+
+def test_a_first_frame_is_judged_by_the_second_also_over_a_save(features: Recording) -> None:
+    wrong = features.frames[:600].copy()
+    wrong[0] = 1e6
+    one = MotionLearner(LearnerConfig(features.channels))
+    assert one.learn_one(wrong[0]) == []
+    resumed = MotionLearner.from_state(one.state())
+    assert one.learn_many(wrong[1:]) == resumed.learn_many(wrong[1:])
+    assert one.state() == resumed.state()
+
+
+@given(
+    rate=st.sampled_from([20.0, 50.0, 200.0]),
+    seed=st.integers(0, 10**6),
+    n_channels=st.integers(1, 4),
+)
+def test_no_frame_of_smooth_motion_is_absurd_however_still_it_began(
+    rate: float, seed: int, n_channels: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    still = rng.normal(0, 0.01, (int(rate), n_channels))
+    t = np.arange(int(6 * rate)) / rate
+    pulse = 0.5 - 0.5 * np.cos(2 * np.pi * rng.uniform(0.3, 1.0, n_channels) * t[:, None])
+    frames = np.concatenate([still, pulse * rng.uniform(0.1, 2.0, n_channels)])
+    frames += rng.normal(0, 0.001, frames.shape)
+    absurd = AbsurdFrames(n_channels, rate)
+    assert not absurd.hold(frames)[1][5:].any()
+
+
+@pytest.mark.parametrize("rate", [20.0, 100.0])
+def test_a_step_that_lasts_is_believed_after_a_moment(rate: float) -> None:
+    t = np.arange(int(2 * rate)) / rate
+    frames = np.sin(2 * np.pi * t)[:, None]
+    moved = np.concatenate([frames, frames + 100.0])
+    held, wrong = AbsurdFrames(1, rate).hold(moved)
+    n = round(BRIEF_S * rate)
+    assert np.flatnonzero(wrong).tolist() == list(range(len(t), len(t) + n))
+    assert np.array_equal(held[~wrong], moved[~wrong])
+    assert (held[wrong] == frames[-1]).all()
 
 
 def test_a_bad_second_of_plain_channels_ends_no_recording(features: Recording) -> None:
