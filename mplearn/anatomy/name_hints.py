@@ -78,6 +78,11 @@ def says_leg(names: Sequence[str]) -> int:
     return (legs > arms) - (legs < arms)
 
 
+def says_neck(names: Sequence[str]) -> bool:
+    """Whether names are those of a neck."""
+    return any("neck" in name.lower() for name in names)
+
+
 def says_head(names: Sequence[str]) -> bool:
     """Whether names are those of a head and a neck."""
     return any(word in name.lower() for name in names for word in _HEAD)

@@ -12,6 +12,7 @@ from ..option_names import option
 from ..recording import FloatArray
 from .joint_tree import JointTree
 from .likeness import confidence
+from .name_hints import says_neck
 from .plan import LimbPair, Plan
 from .sides import limbs_left_first
 
@@ -23,6 +24,7 @@ _PEOPLE_M = (0.7, 2.3)  # statures
 _UNITS_M = (1.0, 0.01, 0.001, 0.0254 / 0.45, 0.0254, 0.3048, 0.1)  # the most usual first
 ABOVE_SHOULDERS = 0.03  # [m] on the human of 1.75 m: the base of the neck is higher
 NECK_RISE = 0.084
+SO_CALLED = 0.05  # [m] on that human: how much worse a neck may fit where it alone is called so
 _FLOOR_M, _FLAT_M = (-0.06, 0.13), 0.6  # of who lies: height of the lowest joint, and thickness
 CLEARLY_UP = 0.85  # cosine between an axis and the way from the ankles to the neck
 STRAIGHT = 0.9  # cosine of a leg's bend at which the zero pose still stands
@@ -151,7 +153,11 @@ class Person:
             return
         if head:
             necks = head[:2] if len(head) > 2 else head[:1]
-            self.neck = min(necks, key=lambda node: abs(rises[node] - NECK_RISE * rough))
+            off = {node: abs(rises[node] - NECK_RISE * rough) for node in necks}
+            called = [node for node in necks if says_neck(self.tree.names[node])]
+            self.neck = min(off, key=lambda node: off[node])
+            if len(called) == 1 and off[called[0]] < off[self.neck] + SO_CALLED * rough:
+                self.neck = called[0]
         elif rises[self.neck] < -ABOVE_SHOULDERS * rough:
             self._no_neck = True
             self.warnings.append(

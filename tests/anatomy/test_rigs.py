@@ -1,5 +1,6 @@
 """Any skeleton of one person is the same body: written in many dialects, read, recognised."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -8,11 +9,12 @@ from known_person import Truth
 from rigs import NAMES, RIGS, Rig, write_rig
 
 from mplearn.anatomy import recognise
+from mplearn.anatomy.joint_tree import rest_positions
 from mplearn.body import human_body
 from mplearn.demonstrator import Person, demonstrate
 from mplearn.errors import BodyError
 from mplearn.mocap import Hints, open_recording
-from mplearn.recording import Skeleton, marker_channels
+from mplearn.recording import Recording, Skeleton, marker_channels
 
 SEGMENTS = {
     "knee": ("shank", "hip"),
@@ -184,3 +186,24 @@ def test_whoever_hangs_on_a_root_where_all_is_counted_from_is_nothing_but_a_pers
     assert not recording.report.warnings
     ours, theirs = (recognise(r).apply(r).markers for r in (recording, alone))
     np.testing.assert_allclose(ours - theirs - [*place, 0.0], 0.0, atol=2e-3)
+
+
+LOW_NECK = """Hips - 0 0 0|Chest Hips 0 36 0|Neck Chest 0 15 0|Head Neck 0 8 1|Crown Head 0 15 0
+LArm Chest 18 12 0|LElbow LArm 27 0 0|LHand LElbow 25 0 0|LThumb LHand 9 0 0
+RArm Chest -18 12 0|RElbow RArm -27 0 0|RHand RElbow -25 0 0|RThumb RHand -9 0 0
+LLeg Hips 9 -3 0|LKnee LLeg 0 -42 0|LFoot LKnee 0 -41 0|LToe LFoot 0 -6 13
+RLeg Hips -9 -3 0|RKnee RLeg 0 -42 0|RFoot RKnee 0 -41 0|RToe RFoot 0 -6 13"""
+
+
+@pytest.mark.parametrize(("called", "found"), [("Neck", "Neck"), ("C7", "Head")])
+def test_of_two_joints_that_may_be_the_neck_it_is_the_one_that_alone_is_called_so(called, found):
+    rows = [row.split() for row in re.split(r"[|\n]", LOW_NECK.replace("Neck", called))]
+    names = tuple(name for name, *_ in rows)
+    parents = tuple(names.index(parent) if parent in names else -1 for _, parent, *_ in rows)
+    offsets = np.array([row[2:] for row in rows], dtype=float)[:, [2, 0, 1]] / 100
+    ends = tuple(name in ("Crown", "LThumb", "RThumb", "LToe", "RToe") for name in names)
+    skeleton = Skeleton(names, parents, offsets, ends)
+    places = rest_positions(skeleton) + np.array((0.0, 0.0, 0.92))
+    frames = np.tile(places.ravel(), (30, 1))
+    recording = Recording(frames, 30.0, marker_channels(names), "low neck", skeleton=skeleton)
+    assert dict(recognise(recording).parts)["neck"] == (found,)
