@@ -17,6 +17,7 @@ from ..recording import BoolArray, FloatArray
 
 BENT = 0.03  # how much of its length a bone may seem to lose by bending
 STRAIGHT_DEG, STIFF = 2.0, 3.0  # a joint that bends less is hardly a knee or a wrist: what it costs
+HELD = 0.1  # a joint that bends by less than this share of what another one does is held
 AT_ROOT = 4.0  # what it costs that both limbs begin at one point, as in a matchstick man
 SKIPPED, MOST_SKIPPED = 0.5, 3  # what a joint between ankle and ball costs, and how many there are
 STRANGE = 12.0  # what a limb costs that no person has
@@ -56,27 +57,32 @@ def fit_limb(chain: FloatArray, law: LimbLaw, fans: BoolArray) -> Limb:
     """
     n = chain.shape[1]
     bones = np.median(np.linalg.norm(np.diff(chain, axis=1), axis=2), axis=0)  # (n - 1,)
-    stiff = _never_bends(chain)
+    stiff, held = _never_bends(chain)
     along = np.concatenate(([0.0], np.cumsum(bones)))
     best = Limb((0, 1, 2), np.inf)
     for first, middle, last in combinations(range(n), 3):
         cost = _cost(chain, along, (first, middle, last), law)
         cost += AT_ROOT if first == 0 and n > 3 else 0.0
-        cost += STIFF * float(stiff[middle] + stiff[last])
+        cost += STIFF * float((stiff | held)[middle] + stiff[last])
         cost += STRANGE * float(fans[middle + 1 : last].any())
         if cost < best.cost:
             best = Limb((first, middle, last), cost)
     return best
 
 
-def _never_bends(chain: FloatArray) -> BoolArray:
-    """Return which joints of a chain are straight in every frame, shape (n,); not its ends."""
+def _never_bends(chain: FloatArray) -> tuple[BoolArray, BoolArray]:
+    """Return which joints of a chain are straight in every frame, and which as bent as in all.
+
+    Each of shape (n,), false for its ends; none is held where all are.
+    """
     bones = np.diff(chain, axis=1)
     bones /= np.maximum(np.linalg.norm(bones, axis=2, keepdims=True), 1e-9)
-    cosines = (bones[:, :-1] * bones[:, 1:]).sum(axis=2).min(axis=0)
-    stiff = np.zeros(chain.shape[1], dtype=np.bool_)
-    stiff[1:-1] = cosines > np.cos(np.radians(STRAIGHT_DEG))
-    return stiff
+    cosines = (bones[:, :-1] * bones[:, 1:]).sum(axis=2)  # (T, n - 2)
+    stiff, held = np.zeros((2, chain.shape[1]), dtype=np.bool_)
+    stiff[1:-1] = cosines.min(axis=0) > np.cos(np.radians(STRAIGHT_DEG))
+    bends = np.ptp(np.arccos(np.clip(cosines, -1.0, 1.0)), axis=0)
+    held[1:-1] = (bends < HELD * bends.max()) & (bends.max() > np.radians(STRAIGHT_DEG))
+    return stiff, held
 
 
 def _cost(

@@ -631,9 +631,28 @@ def test_g1_as_arrays(tmp_path: Path) -> None:
         recording = open_recording(tmp_path / name)
         assert (recording.channels, recording.rate_hz) == (plain.channels, 50.0)
         assert recording.frames == pytest.approx(plain.frames, abs=1e-7)
-    np.savez(tmp_path / "d.npz", **parts | {"dof_pos": values[:, 7:30]})
-    with pytest.raises(RecordingError, match=r"\(12, 23\)"):
+    np.savez(tmp_path / "d.npz", **parts | {"dof_pos": values[:, 7:29]})
+    with pytest.raises(RecordingError, match=r"\(12, 22\)"):
         open_recording(tmp_path / "d.npz")
+
+
+def test_g1_that_cannot_bend_waist_and_wrists(tmp_path: Path) -> None:
+    values = g1_values()
+    stiff = [7 + i for i in (13, 14, 20, 21, 27, 28)]  # as the maker counts: waist, wrists
+    values[:, stiff] = 0.0
+    plain = open_recording(write_g1_csv(tmp_path / "a.csv", values))
+    rows = np.delete(values, stiff, axis=1)
+    assert rows.shape[1] == 30
+    numbered = np.column_stack([np.arange(len(rows)), rows])
+    np.save(tmp_path / "b.npy", rows)
+    parts = {"root_pos": rows[:, :3], "root_rot": rows[:, 3:7], "dof_pos": rows[:, 7:]}
+    np.savez(tmp_path / "c.npz", fps=30, **parts)
+    paths = [tmp_path / "b.npy", tmp_path / "c.npz"]
+    paths += [write_g1_csv(tmp_path / f"d{i}.csv", each) for i, each in enumerate((rows, numbered))]
+    for path in paths:
+        with pytest.warns(RecordingWarning, match="waist_roll_joint, waist_pitch_joint"):
+            recording = open_recording(path)
+        assert recording.frames == pytest.approx(plain.frames, abs=1e-6)
 
 
 @pytest.mark.parametrize("form", ["npy", "nan", "blank"])

@@ -35,9 +35,10 @@ def hanging(points: FloatArray, parents: Sequence[int]) -> tuple[IntArray, Float
     kept = np.array(parents)
     bones = points - points[:, np.maximum(kept, 0)]
     bones = np.sqrt((bones * bones).sum(axis=2))  # (T, J)
-    with np.errstate(all="ignore"):
-        lengths = np.nan_to_num(np.nanmedian(bones, axis=0))
-        give = np.ptp(np.nanquantile(bones, (0.05, 0.95), axis=0), axis=0)
+    seen = ~np.isnan(bones).all(axis=0)  # what is never seen hangs where the file says
+    lengths, give = np.zeros((2, len(kept)))
+    low, lengths[seen], high = np.nanquantile(bones[:, seen], (0.05, 0.5, 0.95), axis=0)
+    give[seen] = high - low
     kept[(kept >= 0) & (give > LOOSE * lengths + LOOSE_M)] = -1
     return near(kept, lengths)
 

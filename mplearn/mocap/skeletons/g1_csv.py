@@ -2,11 +2,12 @@
 
 * 36 numbers a row, with a header or without: the pelvis' place [m], its orientation as a quaternion
   (x, y, z, w), and the 29 joints in order, 30 Hz; without a header there may be a frame's number or
-  time before them. Angles are radians, or degrees where names or their size say so;
+  time before them, or only 23 joints, as those have that cannot bend waist and wrists. Angles are
+  radians, or degrees where names or their size say so;
 * a header ``Frame, root_translateX, ..., root_rotateX, ..., left_hip_pitch_joint_dof, ...``:
   centimetres, degrees, the pelvis' rotations about the fixed axes x, y, z in turn, 120 Hz.
 
-Arrays (``.npy``) of the 36 numbers are read, too, and archives of ``root_pos``, ``root_rot`` and
+Arrays (``.npy``) of such rows are read, too, and archives of ``root_pos``, ``root_rot`` and
 ``dof_pos``, as tools that retarget motions write them.
 """
 
@@ -34,8 +35,10 @@ from .npz_file import NPZFile, finite, npy_shape, read_npy
 from .skeletal import Column, SkeletalMotion, skeletal_recording
 from .stature import unit_of_places
 
-_WIDTH = 7 + len(G1_JOINTS)
-_HEADERLESS = ("x", "y", "z", "qx", "qy", "qz", "qw", *G1_JOINTS)
+_POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
+_STIFF = re.compile("waist_(?:roll|pitch)|wrist_(?:pitch|yaw)")  # where there are 23 joints
+_OF_23 = tuple(name for name in G1_JOINTS if not _STIFF.search(name))
+_HEADERLESS = {len(_POSE) + len(joints): (*_POSE, *joints) for joints in (G1_JOINTS, _OF_23)}
 _ROOT = r"(?:(?:root|base|pelvis|floating_base)_?)?"
 _PLACE = re.compile(rf"{_ROOT}(?:(?:translate|translation|trans|pos|position)_?)?([xyz])")
 _QUATERNION = re.compile(rf"{_ROOT}(?:q|quat|quaternion|rot|orientation)_?([xyzw])")
@@ -48,7 +51,7 @@ _ENDINGS = re.compile(rf"(_joint|_dof|_pos|_angle|_{'|_'.join(_UNITS)})+$")
 _ARRAYS = ("root_pos", "root_rot", "dof_pos")  # of an archive
 _LOOK = 20  # rows that are looked at
 _MOST_BEFORE = 2  # columns before a pose: a frame's number, and its time
-_EXPECTED = "the pelvis' place and orientation, and the G1's 29 joints"
+_EXPECTED = "the pelvis' place and orientation, and the G1's 29 or 23 joints"
 
 _COLUMNS = (
     *(Column("pelvis", axis, False, True, name) for axis, name in enumerate(BASE[:3])),
@@ -67,17 +70,18 @@ class G1CSVReader(Reader):
     suffixes = (".csv", ".tsv", ".txt")
 
     def accepts(self, path: Path) -> bool:
-        """Whether the first row names half of the G1's joints, or holds 36 numbers as it would."""
+        """Whether the first row names half of the G1's joints, or holds numbers as it would."""
         lines = [line for line in head_text(path).splitlines() if line.strip()]
         if not lines:
             return False
         cells = _cells(lines[0])
         if sum(_joint(cell) is not None for cell in cells) >= len(G1_JOINTS) // 2:
             return True
-        if _plain_numbers(cells) is None or not _WIDTH <= len(cells) <= _WIDTH + _MOST_BEFORE:
+        width = _width(len(cells))
+        if _plain_numbers(cells) is None or not width:
             return False
         rows = [_plain_numbers(_cells(line)) for line in lines[:_LOOK]]
-        return _has_pose([row[-_WIDTH:] for row in rows if row is not None and len(row) >= _WIDTH])
+        return _has_pose([row[-width:] for row in rows if row is not None and len(row) >= width])
 
     def read(self, path: Path, hints: Hints, *, positions: bool) -> Recording:
         """Read angles, or where the robot's joints are; see `Reader.read`."""
@@ -92,8 +96,9 @@ class G1CSVReader(Reader):
             raise bad_file(path, "no frames", "a row for each")
         table = numbers(path, [row for _, row in rows], len(header), [i for i, _ in rows])
         if not named:
-            before = table[:, : max(len(header) - _WIDTH, 0)]
-            header = [*map(_counts, before.T), *_HEADERLESS]
+            names = _HEADERLESS[_width(len(header))]
+            before = table[:, : len(header) - len(names)]
+            header = [*map(_counts, before.T), *names]
         return _recording(path, table, header, None, hints, findings, positions=positions)
 
 
@@ -104,12 +109,13 @@ class G1ArrayReader(Reader):
     suffixes = (".npy", ".npz")
 
     def accepts(self, path: Path) -> bool:
-        """Whether it is an array of 36 numbers a row, as they would be, or an archive of such."""
+        """Whether it is an array of such rows, as they would be, or an archive of such."""
         try:
             if suffix(path) == ".npz":
                 return set(_ARRAYS) <= set(NPZFile(path).names)
             shape = npy_shape(path)
-            return shape[1:] == (_WIDTH,) and shape[0] > 0 and _has_pose(_array(path))
+            of_poses = len(shape) == 2 and shape[0] > 0 and shape[1] in _HEADERLESS
+            return of_poses and _has_pose(_array(path))
         except RecordingError:
             return False
 
@@ -121,26 +127,33 @@ class G1ArrayReader(Reader):
             archive = NPZFile(path)
             parts = [archive.numbers(name) for name in _ARRAYS]
             shapes = [each.shape for each in parts]
-            wanted = [(len(parts[0]), n) for n in (3, 4, len(G1_JOINTS))] if shapes[0] else []
-            if shapes != wanted or not shapes[0][0]:
+            wanted = [
+                [(len(parts[0]), n) for n in (3, 4, width - len(_POSE))] for width in _HEADERLESS
+            ]
+            if not parts[0].ndim or shapes not in wanted or not shapes[0][0]:
                 raise bad_file(path, f"{', '.join(_ARRAYS)} of shapes {shapes}", _EXPECTED)
             table, said_hz = np.concatenate(parts, axis=1), archive.rate_hz(len(parts[0]))
         else:
             table = _array(path)
-        header = list(_HEADERLESS)
+        header = list(_HEADERLESS[table.shape[1]])
         return _recording(path, table, header, said_hz, hints, findings, positions=positions)
 
 
 def _array(path: Path) -> FloatArray:
-    """Return the rows of an array of poses, shape (T, 36)."""
+    """Return the rows of an array of poses, shape (T, 36) or (T, 30)."""
     table = finite(path, "the array", read_npy(path))
-    if table.ndim != 2 or table.shape[1] != _WIDTH or not len(table):
+    if table.ndim != 2 or table.shape[1] not in _HEADERLESS or not len(table):
         raise bad_file(path, f"an array of shape {table.shape}", _EXPECTED)
     return table
 
 
+def _width(n_cells: int) -> int:
+    """Return how many numbers a pose has in rows of so many; 0 where none has."""
+    return next((w for w in _HEADERLESS if w <= n_cells <= w + _MOST_BEFORE), 0)
+
+
 def _has_pose(rows: Iterable[FloatArray]) -> bool:
-    """Whether the first 36 numbers that tell it are a pose: what is missing (NaN) tells nothing.
+    """Whether the first row that tells it is a pose: what is missing (NaN) tells nothing.
 
     The quaternion is one, and no angle is too large.
     """
