@@ -441,6 +441,25 @@ def test_smpl_archive_that_expands_without_end(tmp_path: Path) -> None:
         open_recording(path)
 
 
+@pytest.mark.parametrize("root", ["subject", "frames"])
+def test_mvnx_without_a_list_of_segments(tmp_path: Path, root: str) -> None:
+    path = write_mvnx(tmp_path / "a.mvnx", holds=("orientation", "position"))
+    whole = open_recording(path, positions=True)
+    text = re.sub(r"<(segments|joints)>.*?</\1>", "", path.read_text(), flags=re.DOTALL)
+    if root == "frames":
+        (text,) = re.findall("<frames.*</frames>", text, flags=re.DOTALL)
+    path.write_text(text)
+    with pytest.warns(RecordingWarning, match="the 23 of MVN"):
+        recording = open_recording(path, positions=True)
+    assert recording.rate_hz == pytest.approx(whole.rate_hz, rel=0.01)
+    for name in recording.marker_names:
+        at, place = (r.markers[:, r.marker_names.index(name)] for r in (recording, whole))
+        np.testing.assert_allclose(at, place, atol=2e-3)
+    path.write_text(text.replace("</position>", " 1</position>"))
+    with pytest.raises(RecordingError, match="0 segments"):
+        open_recording(path)
+
+
 # --- G1
 
 SIDE = {"left": 1.0, "right": -1.0}

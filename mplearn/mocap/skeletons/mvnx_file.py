@@ -23,6 +23,11 @@ _EXPECTED = "an MVNX file: mvnx, subject, segments, frames"
 _CUT_OFF = (3, 5)  # errors of expat: no element found, unclosed token
 _MOST_MISSING = 10  # times as many frames as there are
 _LARGEST = 1e12  # of a rate [1/s] and of times [ms]
+_ARM, _LEG = ("Shoulder", "UpperArm", "ForeArm", "Hand"), ("UpperLeg", "LowerLeg", "Foot", "Toe")
+_USUAL_SEGMENTS = (  # of MVN, in its order, where a file lists none
+    *("Pelvis", "L5", "L3", "T12", "T8", "Neck", "Head"),
+    *(side + part for limb in (_ARM, _LEG) for side in ("Right", "Left") for part in limb),
+)
 
 
 @dataclass(eq=False)
@@ -72,6 +77,10 @@ def read_mvnx(path: Path, text: str, findings: Findings) -> list[MVNXFile]:
             raise bad_file(path, f"damaged XML ({error})", _EXPECTED) from error
         streams.last.leave_out_last()
         findings.warn(f"the file is cut off: {streams.numbers} frames before that are read")
+    for each in streams.subjects:
+        if not each.file.segments and each.has_usual_segments:
+            each.file.segments.extend(_USUAL_SEGMENTS)
+            findings.warn("no segments are listed: they are taken for the 23 of MVN, in its order")
     whole = [each for each in streams.subjects if each.file.segments and each.numbers]
     if not whole:
         first = streams.subjects[0] if streams.subjects else _Stream(path)
@@ -186,7 +195,8 @@ class _Streams:
         raise bad_file(self.path, "a document type, which may declare entities", "none, as in MVNX")
 
     def start(self, name: str, attributes: dict[str, str]) -> None:
-        if name.rpartition(":")[2] == "subject":
+        plain = name.rpartition(":")[2]
+        if plain == "subject" or (plain == "frames" and self.last is None):  # frames alone
             self.subjects.append(_Stream(self.path))
         if self.last is not None:
             self.last.start(name, attributes)
@@ -216,6 +226,17 @@ class _Stream:
         self._joint: list[str] = []
         self._frame = ""  # type of the frame that is open
         self._parts: list[str] | None = None
+
+    @property
+    def has_usual_segments(self) -> bool:
+        """Whether frames have as many numbers as they have of MVN's segments."""
+        counts = {
+            len(text.split()) / _MEASURED[name]
+            for name in ("position", "orientation")
+            for text in self.measured[name][:1]
+            if text
+        }
+        return counts == {len(_USUAL_SEGMENTS)}
 
     def leave_out_last(self) -> None:
         """Forget the frame that was begun last, of which a part may be missing."""
