@@ -2,6 +2,7 @@
 
 import argparse
 import ast
+import builtins
 import importlib
 import importlib.util
 import re
@@ -141,6 +142,24 @@ def test_what_python_blocks_import_is_there(page: str, block: str) -> None:
         elif isinstance(node, ast.Import):
             for each in node.names:
                 importlib.import_module(each.name)
+
+
+#: What a reader of a page has, or is told of in its text.
+OF_THE_READER = {
+    "README.md": {"learner", "segment"},
+    "docs/how-to/robot.md": {"attention", "segments"},
+}
+
+
+@pytest.mark.parametrize("page", sorted({page for page, _ in blocks()} - {"docs/structure.md"}))
+def test_python_blocks_of_a_page_say_where_each_name_is_from(page: str) -> None:
+    known = {*dir(builtins), *OF_THE_READER.get(page, ())}
+    for block in (block for of, block in blocks() if of == page):
+        nodes = list(ast.walk(ast.parse(block)))
+        known |= {n.asname or n.name.split(".")[0] for n in nodes if isinstance(n, ast.alias)}
+        named = [node for node in nodes if isinstance(node, ast.Name)]
+        known |= {node.id for node in named if isinstance(node.ctx, ast.Store)}
+        assert {node.id for node in named} <= known
 
 
 def names() -> list[tuple[str, str]]:
