@@ -97,10 +97,14 @@ def landmarks_of(labels: tuple[str, ...], naming: Naming) -> dict[str, tuple[str
         naming: How they are named; see `naming_of`.
     """
     sided, middle = map(_lookup, _TABLES[naming])
-    cut = are_cut(labels)
+    cut, lateral = are_cut(labels), _lateral(labels)
     found: dict[str, tuple[str, ...]] = {}
     for label in labels:
-        ways = [(stem, side, sided if side else middle) for stem, side in read_label(label)]
+        ways = [
+            (stem, side, sided if side else middle)
+            for stem, side in read_label(label)
+            if not (side == "l" and stem.endswith(label[-3:-1].lower()) and label in lateral)
+        ]
         ways.sort(key=lambda way: bool(way[1]))  # "Rear" is no right ear
         exact = [_sided(table[stem], side) for stem, side, table in ways if stem in table]
         if exact and not (cut and len(label) == CUT and not label.isalnum()):
@@ -117,6 +121,18 @@ def landmarks_of(labels: tuple[str, ...], naming: Naming) -> dict[str, tuple[str
                 begun.sort(key=lambda found: found[0])
                 found[label] = tuple(dict.fromkeys(chain(*(names for _, names in begun))))
     return found
+
+
+def _lateral(labels: tuple[str, ...]) -> frozenset[str]:
+    """Return labels whose last letter, l, is no side: ``ARMl`` is beside ``ARMm``, not ``ARMr``."""
+    small = {label.lower() for label in labels}
+    return frozenset(
+        label
+        for label in labels
+        if label[-1:] in ("l", "L")
+        and label[:-1].lower() + "m" in small
+        and label[:-1].lower() + "r" not in small
+    )
 
 
 def are_cut(labels: tuple[str, ...]) -> bool:

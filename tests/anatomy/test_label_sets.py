@@ -8,6 +8,7 @@ import pytest
 from label_sets import KEY_POINTS, SETS, labelled
 
 from mplearn.anatomy import as_bodies, recognise
+from mplearn.anatomy.labels import landmarks_of
 from mplearn.body.marker_sets.marker_set import WATCHED_SHARE
 from mplearn.errors import BodyError
 from mplearn.learner import FramesLost, LearnerConfig, MotionLearner, SegmentClosed
@@ -179,3 +180,11 @@ def test_takes_of_quite_different_systems_are_learned_together(truth):
         events = [event for part in learner.learn_recording(recording, 50) for event in part]
         assert not [event for event in events if isinstance(event, FramesLost)]
         assert [event for event in events if isinstance(event, SegmentClosed)]
+
+
+def test_a_last_letter_that_says_lateral_is_no_side():
+    labels = ("ARMl", "ARMm", "LELBl", "LELBm", "ASISl", "ASISr", "KNEl", "KNEm", "KNEr")
+    found = landmarks_of(labels, "skin")
+    assert "ARMl" not in found  # of either arm
+    assert found["LELBl"] == ("elbow_outer_l",) and found["LELBm"] == ("elbow_inner_l",)
+    assert found["ASISl"] == ("iliac_front_l",) and found["KNEl"] == ("knee_outer_l",)
