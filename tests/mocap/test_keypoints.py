@@ -212,6 +212,54 @@ def test_sleap_has_a_row_for_each_frame_and_track(tmp_path: Path) -> None:
     assert np.isfinite(take.frames).all()  # one frame is bridged
 
 
+@pytest.mark.parametrize("tracked", [True, False])
+def test_a_row_may_hold_all_animals_wherever_each_stands_in_it(
+    tmp_path: Path, tracked: bool
+) -> None:
+    """As sleap-io's CSV of frames does: a place in the row is no animal where tracks are said."""
+    both = {"anna": mouse(4.0) * [1, -1], "ben": mouse(4.0) * [1, -1] + 40.0}
+    rows, apart = [], []
+    for k in range(200):
+        order = ["anna", "ben"] if k < 100 or not tracked else ["ben", "anna"]
+        if k >= 190:
+            order.remove("ben")
+        row: dict[str, object] = {"frame_idx": k}
+        for place, name in enumerate(order):
+            at = {
+                f"{point}.{axis}": both[name][k, p, a] + 0.01 * k * (name == "ben")
+                for p, point in enumerate(NAMES)
+                for a, axis in enumerate("xy")
+            }
+            track = {"track": name} if tracked else {}
+            row |= {f"inst{place}.{key}": value for key, value in (track | at).items()}
+            apart.append({"frame_idx": k, "track": name if tracked else f"inst{place}", **at})
+        rows.append(row)
+    pandas.DataFrame(rows).to_csv(tmp_path / "frames.csv", index=False)
+    pandas.DataFrame(apart).to_csv(tmp_path / "instances.csv", index=False)
+    found, expected = (
+        open_recordings(tmp_path / f"{name}.csv", hints=Hints(rate_hz=RATE_HZ))
+        for name in ("frames", "instances")
+    )
+    assert [each.person for each in found] == (["anna", "ben"] if tracked else ["inst0", "inst1"])
+    for one, other in zip(found, expected, strict=True):
+        assert one.channels == other.channels
+        np.testing.assert_array_equal(one.frames, other.frames)
+
+
+def test_a_row_may_be_named_like_its_picture(tmp_path: Path) -> None:
+    deeplabcut(tmp_path / "mouse.csv", 40 * mouse(4.0) + 300)
+    heads = (tmp_path / "mouse.csv").read_text().splitlines()
+    named = [f"labeled-data/mouse/img{line}" for line in heads[3:]]
+    named = [line.replace(",", ".png,", 1) for line in named]
+    (tmp_path / "named.csv").write_text("\n".join([*heads[:3], *named, ""]))
+    one, other = (
+        open_recording(tmp_path / f"{name}.csv", hints=Hints(rate_hz=RATE_HZ))
+        for name in ("mouse", "named")
+    )
+    assert len(one) == len(other)
+    np.testing.assert_array_equal(one.frames, other.frames)
+
+
 HEADS = [
     ["scorer", *["net"] * 12],
     ["bodyparts", *[name for name in KEYPOINTS for _ in range(3)]],

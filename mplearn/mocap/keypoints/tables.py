@@ -1,7 +1,8 @@
 """Tables of key points: of DeepLabCut [Mathis2018], of SLEAP [Pereira2022], and their like, as CSV.
 
-Names stand in rows of heads above the columns, in one row (``nose.x, nose.y, nose.score``), or a
-row is one point (``frame_idx, track, node, x, y, score``).
+Names stand in rows of heads above the columns, in one row (``nose.x, nose.y, nose.score``, or
+``inst0.nose.x`` where a row holds all animals), or a row is one point (``frame_idx, track, node, x,
+y, score``).
 """
 
 from __future__ import annotations
@@ -39,6 +40,8 @@ _HEADS = ("scorer", "individuals", "bodyparts", "coords")  # as they stand, the 
 _FRAMES = ("frame_idx", "frame")
 _TRACKS = ("track", "instance", "individual", "animal")
 _NODES = ("node", "bodypart", "keypoint")
+_INSTANCE = re.compile(r"(inst(?:ance)?_?\d+)[._](.+)", re.IGNORECASE)  # of several in a row
+_PICTURE = re.compile(r".*?(\d+)\.\w+")  # a file whose name ends with the frame's number
 _LOOK = 6  # rows in which heads are looked for
 _FEWEST = 3  # points that a table must name to be taken for one of key points
 
@@ -71,7 +74,10 @@ class DeepLabCutReader(AnimalReader):
         width = len(coords)
         animals = (*heads.get("individuals", ()), *[""] * width)[:width]
         body = [(n, row) for n, row in rows[at + 1 :] if any(row[1:])]  # below the index' name
-        table = numbers(path, [row for _, row in body], width, [n for n, _ in body])
+        cells = [
+            [_PICTURE.sub(r"\1", row[0]) if "/" in row[0] else row[0], *row[1:]] for _, row in body
+        ]
+        table = numbers(path, cells, width, [n for n, _ in body])
         table = by_frame(path, table[:, 0], table)
         columns: dict[str, dict[str, dict[str, int]]] = {}
         for k in range(1, width):
@@ -218,7 +224,35 @@ def _named_rows(path: Path, findings: Findings) -> tuple[_Head, list[int], list[
     for n, row in rows[1:]:
         if len(row) != width:
             raise bad_file(path, f"line {n} has {len(row)} columns", f"{width}, as the names")
+    if head.frame is not None and (slots := _instances(rows[0][1])):
+        rows = _one_a_row(rows, head.frame, slots)
+        head = _Head.of(rows[0][1])
     return head, [n for n, _ in rows[1:]], [row for _, row in rows[1:]]
+
+
+def _instances(row: Sequence[str]) -> dict[str, dict[str, int]]:
+    """Return the columns of each instance of which a row holds several, by what they are."""
+    slots: dict[str, dict[str, int]] = {}
+    for k, name in enumerate(row):
+        if match := _INSTANCE.fullmatch(name):
+            slots.setdefault(match[1], {})[match[2]] = k
+    return slots
+
+
+def _one_a_row(
+    rows: list[tuple[int, list[str]]], frame: int, slots: dict[str, dict[str, int]]
+) -> list[tuple[int, list[str]]]:
+    """Return a table with a row for each instance: who it is says its track, if not its place."""
+    named = dict.fromkeys(name for own in slots.values() for name in own)
+    names = [name for name in named if name.lower() not in _TRACKS]
+    found = [(rows[0][0], [_FRAMES[0], _TRACKS[0], *names])]
+    for n, row in rows[1:]:
+        for slot, columns in slots.items():
+            cells = [row[columns[name]] if name in columns else "" for name in names]
+            track = next((row[k] for name, k in columns.items() if name.lower() in _TRACKS), "")
+            if any(cells):
+                found.append((n, [row[frame], track or slot, *cells]))
+    return found
 
 
 def _by_node(
