@@ -23,6 +23,14 @@ PATH = Path(__file__).parent / "default.mplearn"
 SEED = 1
 N_MOTIONS = 200
 BALANCE = 0.5  # all primitives are shown about equally often
+RULES = replace(
+    TreeConfig(),
+    sequence_share=0.0,
+    ignore_fragments=False,
+    drop_fragments=False,
+    max_born=math.inf,
+)
+"""Of births, when the embedded libraries were learned: they stay what they were."""
 
 
 def build_default() -> PrimitiveLibrary:
@@ -30,15 +38,7 @@ def build_default() -> PrimitiveLibrary:
     script = markov_script(N_MOTIONS, np.random.default_rng(SEED), balance=BALANCE)
     demonstration = demonstrate(script, SEED)
     recording = demonstration.recording
-    # The rules of version 0, here and in the next lines.
-    rules = replace(
-        TreeConfig(),
-        sequence_share=0.0,
-        ignore_fragments=False,
-        drop_fragments=False,
-        max_born=math.inf,
-    )
-    config = LearnerConfig(recording.channels, recording.rate_hz, scaffolding=False, tree=rules)
+    config = LearnerConfig(recording.channels, recording.rate_hz, scaffolding=False, tree=RULES)
     learner = MotionLearner(config)
     votes: defaultdict[int, Counter[str]] = defaultdict(Counter)
     for event in (*learner.learn_many(recording.frames), *learner.end_stream()):

@@ -16,7 +16,6 @@ environment begins at once.
 from __future__ import annotations
 
 import json
-import math
 from collections import Counter, defaultdict
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
@@ -37,7 +36,7 @@ from mplearn.demonstrator import (
 from mplearn.learner import Recognised, SegmentClosed
 from mplearn.library import PrimitiveLibrary
 from mplearn.recording import LabelledSegment, Segment
-from mplearn.tree import TreeConfig
+from mplearn_envs.data.build import RULES
 from mplearn_envs.mechanics.reference import rest_reference
 from mplearn_envs.robot import humanoid
 from mplearn_envs.skills.repertoire import Repertoire
@@ -90,15 +89,7 @@ def taught(people: Collection[int], n_motions: int = N_SHOWN) -> MotionLearner:
     learner: MotionLearner | None = None
     for person in people:
         recording = shown_by(person, n_motions).recording
-        # The rules of version 1, here and in the next lines.
-        rules = replace(
-            TreeConfig(),
-            sequence_share=0.0,
-            ignore_fragments=False,
-            drop_fragments=False,
-            max_born=math.inf,
-        )
-        config = LearnerConfig(recording.channels, RATE_HZ, scaffolding=False, tree=rules)
+        config = LearnerConfig(recording.channels, RATE_HZ, scaffolding=False, tree=RULES)
         learner = learner or MotionLearner(config)
         for _ in learner.learn_recording(recording, at_once=len(recording.frames)):
             pass

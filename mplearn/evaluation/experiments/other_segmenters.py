@@ -28,6 +28,10 @@ RATE_HZ = 30.0
 
 _HISTORY = 10  # windows that FLOSS remembers
 FLOSS_REGIME = 0.45  # of the corrected arc curve: stumpy's own example draws regimes below it
+_ITERATIONS = 50  # of Gibbs sampling, and what follows: keypoint-MoSeq's settings
+_LATENT, _LAGS = 10, 3
+_TRANSITIONS = {"gamma": 1e3, "alpha": 5.7, "kappa": 1e6, "num_states": 100}
+_AUTOREGRESSION = {"nlags": _LAGS, "S_0_scale": 0.01, "K_0_scale": 10.0}
 
 
 def ours(frames: FloatArray, rate_hz: float) -> list[int]:
@@ -77,6 +81,27 @@ def floss(frames: FloatArray, rate_hz: float) -> list[int]:
     return found
 
 
+def moseq(frames: FloatArray, _: float) -> list[int]:
+    """Return where the syllable of MoSeq's autoregressive HMM changes.
+
+    Of the whitened principal components, with the settings that keypoint-MoSeq has for it.
+    """
+    import_module("jax").config.update("jax_enable_x64", True)
+    numbers: Any = import_module("jax.numpy")
+    library: Any = import_module("jax_moseq.models.arhmm")
+    centred = frames - frames.mean(axis=0)
+    modes, sizes, _axes = np.linalg.svd(centred, full_matrices=False)
+    width = min(_LATENT, int((sizes > 1e-9 * sizes[0]).sum()))
+    latent = np.sqrt(len(frames)) * modes[None, :, :width]
+    data = {"x": numbers.asarray(latent), "mask": numbers.ones(latent.shape[:2])}
+    settings = dict(_AUTOREGRESSION, latent_dim=width)
+    model = library.init_model(data, trans_hypparams=_TRANSITIONS, ar_hypparams=settings)
+    for _iteration in range(_ITERATIONS):
+        model = library.resample_model(data, **model)
+    states = np.asarray(model["states"]["z"])[0]
+    return (np.flatnonzero(np.diff(states)) + 1 + _LAGS).tolist()
+
+
 PEERS: Mapping[str, tuple[str, bool, Callable[[FloatArray, float], list[int]]]] = MappingProxyType(
     {
         "ours": ("", True, ours),
@@ -85,6 +110,7 @@ PEERS: Mapping[str, tuple[str, bool, Callable[[FloatArray, float], list[int]]]] 
         "PELT, noise 1 %": ("ruptures", False, partial(pelt, noise=1e-2)),
         "claspy, ClaSP": ("claspy", False, clasp),
         "stumpy, FLOSS": ("stumpy", True, floss),
+        "MoSeq, AR-HMM": ("jax_moseq", False, moseq),
     }
 )
 """By name: the library, whether it is on-line, and its cuts of frames at a rate."""

@@ -25,7 +25,7 @@ from ..observing import observe
 from ..ownership import frame_labels
 from ..partitions import agreement
 from ..table import Table, percent
-from .other_segmenters import PEERS
+from .other_segmenters import PEERS, moseq
 
 ACTIVITY_HZ = 10.0
 """Rate at which activities are looked for by other libraries: kernels grow as its square [1/s]."""
@@ -62,6 +62,10 @@ def _clasp(postures: FloatArray, rate_hz: float, classes: int, changes: int) -> 
     return _grouped(postures, [*map(int, found), len(postures)], classes)
 
 
+def _moseq(postures: FloatArray, rate_hz: float, classes: int, changes: int) -> IntArray:
+    return _grouped(postures, [*moseq(postures, rate_hz), len(postures)], classes)
+
+
 def _grouped(postures: FloatArray, ends: Iterable[int], classes: int) -> IntArray:
     """Return the class of each frame: stretches by the mean and spread of their postures, Ward."""
     edges = [0, *sorted({int(end) for end in ends if end > 0})]
@@ -81,6 +85,7 @@ METHODS: dict[str, tuple[str, str, Partition]] = {
     "PELT, noise 10 % + Ward": ("ruptures", "number of classes", partial(_pelt, noise=0.1)),
     "PELT, noise 1 % + Ward": ("ruptures", "number of classes", partial(_pelt, noise=1e-2)),
     "claspy, ClaSP + Ward": ("claspy", "number of classes", _clasp),
+    "MoSeq, AR-HMM + Ward": ("jax_moseq", "number of classes", _moseq),
 }
 """By name: the library, what it is told of the truth, and how it works."""
 
@@ -106,7 +111,8 @@ def activity_peers_table(recordings: Iterable[Recording]) -> Table:
         "points, so their stretches are grouped by Ward's method into the true number of classes. "
         "PELT has the penalty of the Bayesian information criterion, with all variance, or a share "
         "of it, for that of noise, the kernel is Gaussian with "
-        "ruptures' own width, ClaSP has its defaults. Change points match within 1 %. Time is the "
+        "ruptures' own width, ClaSP has its defaults, MoSeq's autoregressive HMM those of "
+        "keypoint-MoSeq. Change points match within 1 %. Time is the "
         "processor's, without importing; memory is the most that was allocated on the way."
     )
     columns = (
