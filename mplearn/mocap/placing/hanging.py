@@ -9,7 +9,7 @@ import numpy as np
 from ...recording import FloatArray, IntArray
 
 LOOSE, LOOSE_M = 0.5, 0.05  # how much a bone may stretch and still be one: of its length, and [m]
-FAR = 1.0  # how long it may be: of the longest way along all the others
+FAR = 0.75  # how long it may be: of the longest way along all the others
 
 
 def hanging(points: FloatArray, parents: Sequence[int]) -> tuple[IntArray, FloatArray]:
