@@ -7,11 +7,12 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FrameError, InvalidValueError
 from ..recording import FloatArray, Segment
-from ..state import Count, State
+from ..state import LARGEST, Count, State, require
 
 AT_ONCE = 256  # frames of a recording that are handed on together
 
@@ -157,6 +158,71 @@ class Segmenter(ABC):
             taken += n
         closed.extend(self.flush())
         return closed
+
+
+def as_frames(given: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """Return numbers of a shape, (D,) a frame or (-1, D) any frames.
+
+    Raises:
+        FrameError: They have another shape, or are no numbers.
+
+    Example:
+        >>> as_frames([1, 2], (3,))
+        Traceback (most recent call last):
+        mplearn.errors.FrameError: a frame must have shape (3,), not (2,)
+    """
+    width = shape[-1]
+    try:
+        frames = np.ascontiguousarray(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise FrameError(f"a frame must be {width} numbers: {error}") from None
+    if frames.ndim == len(shape) and frames.shape[-1] == width:
+        return frames
+    if len(shape) == 1:
+        raise FrameError(f"a frame must have shape ({width},), not {frames.shape}")
+    raise FrameError(f"frames must have shape (T, {width}), not {frames.shape}")
+
+
+def require_finite(frame: FloatArray) -> None:
+    """Check a frame, shape (D,).
+
+    Raises:
+        FrameError: Channels are not finite.
+
+    Example:
+        >>> import numpy as np
+        >>> require_finite(np.array([0.0, np.nan]))
+        Traceback (most recent call last):
+        mplearn.errors.FrameError: 1 of 2 channels are not finite (the first is channel 1: nan); ...
+    """
+    bad = np.flatnonzero(~np.isfinite(frame))
+    if len(bad):
+        raise FrameError(
+            f"{len(bad)} of {len(frame)} channels are not finite (the first is channel "
+            f"{bad[0]}: {frame[bad[0]]}); fill gaps before segmenting"
+        )
+
+
+def check_array(value: Any, own: Any, place: str) -> None:
+    """Check that a stored array is like one's own.
+
+    Raises:
+        StateError: It has another shape or type, or numbers out of range.
+
+    Example:
+        >>> import numpy as np
+        >>> check_array(np.zeros(2), np.zeros(3), "place")
+        Traceback (most recent call last):
+        mplearn.errors.StateError: place: must have shape (3,) of float64, not (2,) of float64
+    """
+    require(
+        value.dtype == own.dtype and value.shape == own.shape,
+        place,
+        f"must have shape {own.shape} of {own.dtype}, not {value.shape} of {value.dtype}",
+    )
+    least = -1 if own.dtype.kind == "i" else -LARGEST
+    fine = bool(((value >= least) & (value <= LARGEST)).all())  # NaN fails too
+    require(fine, place, f"must hold numbers in [{least:g}, {LARGEST:g}]")
 
 
 def frames_of(seconds: float, rate_hz: float) -> int:

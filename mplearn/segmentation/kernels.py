@@ -8,6 +8,8 @@ from typing import NamedTuple
 from ..maths.compiling import njit
 from ..recording import FloatArray
 
+ROUNDING = 4e-15  # of a place, by which a filter may go on moving for ever
+
 
 class Smooth(NamedTuple):
     """What the filter keeps of each channel, and what it made of the newest frame; each (D,).
@@ -45,6 +47,8 @@ def smooth_velocity(frame: FloatArray, c: FloatArray, smooth: Smooth, first: boo
         c: ``b0, b1, b2, a1, a2`` of the filter and the frame rate [1/s], shape (6,).
         smooth: What the filter keeps; receives the filtered frame and its velocity.
         first: Whether this is the first frame; the filter starts as if it had always been there.
+
+    Where frames are identical the filter may go on in a cycle of the last bits: that is rest.
     """
     b0, b1, b2, a1, a2, rate = c[0], c[1], c[2], c[3], c[4], c[5]
     delay_1, delay_2, place, velocity, weights = smooth
@@ -58,7 +62,7 @@ def smooth_velocity(frame: FloatArray, c: FloatArray, smooth: Smooth, first: boo
         y = b0 * x + delay_1[i]
         delay_1[i] = b1 * x - a1 * y + delay_2[i]
         delay_2[i] = b2 * x - a2 * y
-        v = (y - place[i]) * rate
+        v = (y - place[i]) * rate if abs(y - place[i]) > ROUNDING * abs(y) else 0.0
         place[i] = y
         velocity[i] = v
         total += weights[i] * v * v

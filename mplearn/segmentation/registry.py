@@ -10,18 +10,22 @@ from ..plugins import join_installed
 from .base import Segmenter
 from .kinematic_centroid import KinematicCentroid
 from .kohlmorgen_lemm import KohlmorgenLemm, KohlmorgenLemmConfig
+from .upsampled import upsampled
 from .zero_velocity import ZeroVelocity
 
 ENTRY_POINTS = "mplearn.segmenters"
 """Group of the entry points by which an installed package brings segmenters of its own."""
 
+
+def _over_postures(n_channels: int, rate_hz: float) -> Segmenter:
+    return KohlmorgenLemm(n_channels, rate_hz, KohlmorgenLemmConfig.posture())
+
+
 SEGMENTERS: dict[str, Callable[[int, float], Segmenter]] = {
-    "kinematic-centroid": KinematicCentroid,
-    "kohlmorgen-lemm": KohlmorgenLemm,
-    "kohlmorgen-lemm-posture": lambda n_channels, rate_hz: KohlmorgenLemm(
-        n_channels, rate_hz, KohlmorgenLemmConfig.posture()
-    ),
-    "zero-velocity": ZeroVelocity,
+    "kinematic-centroid": upsampled(KinematicCentroid),
+    "kohlmorgen-lemm": upsampled(KohlmorgenLemm),
+    "kohlmorgen-lemm-posture": upsampled(_over_postures),
+    "zero-velocity": upsampled(ZeroVelocity),
 }
 
 
@@ -47,7 +51,7 @@ def register_segmenter(name: str, make: Callable[[int, float], Segmenter]) -> No
 
 
 def make_segmenter(name: str, n_channels: int, rate_hz: float) -> Segmenter:
-    """Build a segmenter with its default settings.
+    """Build a segmenter with its default settings; of a slow stream it is `Upsampled`.
 
     Args:
         name: One of `SEGMENTERS`, or of those that were registered.

@@ -10,11 +10,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..errors import FrameError, InvalidValueError
+from ..errors import InvalidValueError
 from ..maths.filters import butterworth
 from ..recording import CAUSES, FloatArray, Segment
-from ..state import LARGEST, require, validated
-from .base import Segmenter, SegmenterState
+from ..state import require, validated
+from .base import Segmenter, SegmenterState, as_frames, check_array, require_finite
 from .kernels import Smooth
 from .speed import (
     CUT,
@@ -97,16 +97,12 @@ class SpeedSegmenter(Segmenter):
         Raises:
             FrameError: The frame has the wrong width, or is not finite; nothing has changed then.
         """
-        frame = self._numbers(frame)
-        if frame.shape != (self.n_channels,):
-            raise FrameError(f"a frame must have shape ({self.n_channels},), not {frame.shape}")
+        frame = as_frames(frame, (self.n_channels,))
         return self._advanced(frame[None])[1]
 
     def advance(self, frames: FloatArray) -> tuple[int, list[Segment]]:
         """Take frames until one closes segments; see `Segmenter.advance`."""
-        frames = self._numbers(frames)
-        if frames.ndim != 2 or frames.shape[1] != self.n_channels:
-            raise FrameError(f"frames must have shape (T, {self.n_channels}), not {frames.shape}")
+        frames = as_frames(frames, (-1, self.n_channels))
         return self._advanced(frames)
 
     def _advanced(self, frames: FloatArray) -> tuple[int, list[Segment]]:
@@ -114,19 +110,8 @@ class SpeedSegmenter(Segmenter):
         if n == 0:
             return taken, []
         if n < 0 and taken == 0:
-            frame = frames[0]
-            bad = np.flatnonzero(~np.isfinite(frame))
-            raise FrameError(
-                f"{len(bad)} of {self.n_channels} channels are not finite (the first is channel "
-                f"{bad[0]}: {frame[bad[0]]}); fill gaps before segmenting"
-            )
+            require_finite(frames[0])
         return taken, self._closed(n)
-
-    def _numbers(self, given: FloatArray) -> FloatArray:
-        try:
-            return np.ascontiguousarray(given, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise FrameError(f"a frame must be {self.n_channels} numbers: {error}") from None
 
     def _closed(self, n: int) -> list[Segment]:
         """Return the first so many segments of `_out`; none where n is -1."""
@@ -204,7 +189,7 @@ class SpeedSegmenter(Segmenter):
         require(not lacking, "arrays", f"lacks {sorted(lacking)}")
         require(not strange, "arrays", f"knows no {sorted(strange)}")
         for name, column in wanted.items():
-            _check(state.arrays[name], column, f"arrays.{name}")
+            check_array(state.arrays[name], column, f"arrays.{name}")
             column[...] = state.arrays[name]
         frames = int(loaded["state"]["frames"][0])
         require(frames == state.n_frames, "n_frames", f"must be {frames}, not {state.n_frames}")
@@ -250,15 +235,3 @@ def _columns(name: str, array: Any) -> dict[str, Any]:
     if array.dtype.names is None:
         return {name: array}
     return {f"{name}.{each}": array[each] for each in array.dtype.names}
-
-
-def _check(value: Any, own: Any, place: str) -> None:
-    """Check that a stored array is like one's own."""
-    require(
-        value.dtype == own.dtype and value.shape == own.shape,
-        place,
-        f"must have shape {own.shape} of {own.dtype}, not {value.shape} of {value.dtype}",
-    )
-    least = -1 if own.dtype.kind == "i" else -LARGEST
-    fine = bool(((value >= least) & (value <= LARGEST)).all())  # NaN fails too
-    require(fine, place, f"must hold numbers in [{least:g}, {LARGEST:g}]")

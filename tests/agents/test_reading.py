@@ -20,7 +20,7 @@ from mplearn_agents.learning.watched import learn
 
 @pytest.fixture(scope="module")
 def motion() -> Recording:
-    return demonstrate(["BAR", "BAL"], 5, rate_hz=50.0).recording
+    return demonstrate(["BAR", "BAL"], 2, rate_hz=50.0).recording
 
 
 def write(path: Path, recording: Recording, factor: float = 1.0, every: int = 1) -> Path:

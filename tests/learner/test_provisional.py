@@ -103,7 +103,7 @@ BELL = (x := np.linspace(0, 1, 50)) ** 3 * (10 - 15 * x + 6 * x**2)
 
 
 def test_a_primitive_of_parts_is_forgotten_as_such_and_its_transitions_with_it():
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(1)
     frames, n_cut = [], 3  # by then no primitive is provisional
     for k in range(14):
         frames += [arc([0.3] if k < n_cut else [], rng), walk(POSTURES, [1, *range(2, 9), 0], k)]

@@ -105,8 +105,8 @@ def test_a_minute_without_measurements_is_as_if_it_had_not_been(name):
 
 
 def test_a_million_identical_frames_take_no_memory():
-    segmenter = make_segmenter("kohlmorgen-lemm", 2, 20.0)
-    size = {name: array.nbytes for name, array in segmenter._arrays.items()}
+    segmenter = make_segmenter("kohlmorgen-lemm", 2, 100.0)
+    size = {name: array.nbytes for name, array in segmenter.state().arrays.items()}
     frames, closed = np.tile([1.0, 2.0], (10_000, 1)), []
     for left in [len(frames)] * 100:
         while left:
@@ -114,7 +114,7 @@ def test_a_million_identical_frames_take_no_memory():
             closed += segments
             left -= taken
     assert closed and all(s.still for s in closed)
-    assert {name: array.nbytes for name, array in segmenter._arrays.items()} == size
+    assert {name: array.nbytes for name, array in segmenter.state().arrays.items()} == size
 
 
 @pytest.mark.parametrize("name", CUTTERS)
