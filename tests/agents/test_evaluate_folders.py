@@ -73,6 +73,7 @@ def test_markers_without_labels_show_inverse_kinematics():
     markers.__dict__["recordings"] = (shown,)
     assert list(evaluations_for(markers)) == [
         "rhythm",
+        "rates",
         "loops",
         "glitches",
         "peers",

@@ -27,6 +27,13 @@ def rhythm(setting: Setting) -> Iterator[Table]:
         yield table
 
 
+def rates(setting: Setting) -> Iterator[Table]:
+    """Whether the same motion is cut at the same times at 20 to 250 frames a second."""
+    from mplearn.evaluation.experiments import frame_rate_table
+
+    yield frame_rate_table(setting.described)
+
+
 def loops(setting: Setting) -> Iterator[Table]:
     """A minute of each take played three times in a loop."""
     from mplearn.evaluation.experiments import loop_table
@@ -60,6 +67,7 @@ def activities(setting: Setting) -> Iterator[Table]:
 EVALUATIONS = {
     "exercises": exercises,
     "rhythm": rhythm,
+    "rates": rates,
     "loops": loops,
     "glitches": glitches,
     "peers": peers,

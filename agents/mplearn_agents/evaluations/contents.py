@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from .activities import rhythm
+from .activities import rates, rhythm
 from .setting import Setting
 
 if TYPE_CHECKING:
@@ -19,4 +19,4 @@ def contents(setting: Setting) -> Iterator[Table]:
     yield content_table(setting.bodies)
 
 
-EVALUATIONS = {"contents": contents, "rhythm": rhythm}
+EVALUATIONS = {"contents": contents, "rhythm": rhythm, "rates": rates}

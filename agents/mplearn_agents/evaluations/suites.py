@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, TypeAlias
 
 from .activities import EVALUATIONS as ACTIVITIES
-from .activities import glitches, loops, peers, rhythm
+from .activities import glitches, loops, peers, rates, rhythm
 from .contents import EVALUATIONS as CONTENTS
 from .people import EVALUATIONS as PEOPLE
 from .people import inverse_kinematics
@@ -35,6 +35,7 @@ OF_LABELS: Mapping[LabelKind, Mapping[str, Evaluation]] = {
 #: Experiments on people without labels.
 UNLABELLED: Mapping[str, Evaluation] = {
     "rhythm": rhythm,
+    "rates": rates,
     "loops": loops,
     "glitches": glitches,
     "peers": peers,

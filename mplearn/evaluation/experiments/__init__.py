@@ -7,6 +7,7 @@ from .boundaries import boundary_table as boundary_table
 from .execution_quality import quality_table as quality_table
 from .exercises import exercise_table as exercise_table
 from .factorial import factorial_table as factorial_table
+from .frame_rates import frame_rate_table as frame_rate_table
 from .generation import generation_table as generation_table
 from .group_tests import group_test_table as group_test_table
 from .inverse_kinematics import joint_error_table as joint_error_table
