@@ -6,6 +6,7 @@ import signal
 import sqlite3
 import tempfile
 import warnings
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -149,9 +150,11 @@ def test_what_cannot_be_is_said_in_a_line(
     assert "no store" in refused(capsys, "store", "check", tmp_path / "c.db")
     assert main(["store", "check", str(tmp_path / "b.db")]) == 1
     assert "b.db is damaged" in capsys.readouterr().out
-    middle = store.stat().st_size // 2
-    damaged = store.read_bytes()[:middle] + bytes(2000) + store.read_bytes()[middle + 2000 :]
-    (tmp_path / "d.db").write_bytes(damaged)
+    with closing(sqlite3.connect(store)) as connection:  # no page of it is free
+        connection.execute("VACUUM INTO ?", [str(tmp_path / "d.db")])
+    whole = (tmp_path / "d.db").read_bytes()
+    middle = len(whole) // 2
+    (tmp_path / "d.db").write_bytes(whole[:middle] + bytes(2000) + whole[middle + 2000 :])
     assert main(["store", "check", str(tmp_path / "d.db")]) == 1
     told = capsys.readouterr().out
     assert "d.db is damaged" in told and "\\n" not in told and told.count("\n") == 1
