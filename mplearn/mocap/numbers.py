@@ -17,7 +17,22 @@ from .findings import Findings
 MISSING = frozenset(
     (
         *("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "nil", "*", ".", "?"),
-        *("missing", "undefined", "#value!", "#div/0!", "#num!", "#ref!", "#name?", "#null!"),
+        *(
+            "inf",
+            "+inf",
+            "-inf",
+            "infinity",
+            "+infinity",
+            "-infinity",
+            "missing",
+            "undefined",
+            "#value!",
+            "#div/0!",
+            "#num!",
+            "#ref!",
+            "#name?",
+            "#null!",
+        ),
     )
 )
 """How tables write, in lower case, that there is no number."""
@@ -28,7 +43,9 @@ _THOUSANDS = re.compile(
     r"[-+]?[1-9]\d{0,2}([,.'\u2019\u00a0\u202f ])\d{3}(?:\1\d{3})*(?!\1)[.,]\d+"
 )
 _LONGEST = 400  # characters of a cell; no number has more digits
-_NINES = re.compile(r"-?9{4,}(?:\.[09]*)?")
+_NINES = re.compile(r"-?(?:9{4,}(?:\.[09]*)?|9{3}\.9+)")
+_LIMITS = (-32768.0, 32767.0)  # of short integers
+_NOWHERE = 1e6  # as FLT_MAX, -1e30: no unit of length leads there
 
 
 def says_missing(cell: str) -> bool:
@@ -57,7 +74,7 @@ def plain_number(cell: str) -> str:
 def not_seen(points: FloatArray) -> BoolArray:
     """Return where tables say that a marker was not seen, for points (..., 3).
 
-    All three are zero, -1, or nines.
+    All three are zero, -1, nines, a limit of short integers, or one number beyond a million.
 
     Example:
         >>> not_seen(np.array([[0.0, 0.0, 0.0], [-9999.0, -9999.0, -9999.0], [0.0, 0.0, 9999.0]]))
@@ -67,7 +84,7 @@ def not_seen(points: FloatArray) -> BoolArray:
     gone: BoolArray = same & ((points[..., 0] == 0.0) | (points[..., 0] == -1.0))
     far = same & (np.abs(points[..., 0]) >= 999.9)
     for value in np.unique(points[far][..., 0]).tolist():
-        if _NINES.fullmatch(repr(value)):
+        if abs(value) >= _NOWHERE or value in _LIMITS or _NINES.fullmatch(repr(value)):
             gone |= same & (points[..., 0] == value)
     return gone
 
@@ -95,7 +112,7 @@ def number(path: Path, cell: str, where: str) -> float:
     """Return a finite number, or NaN where it is missing: an empty cell, or one of `MISSING`.
 
     Raises:
-        RecordingError: The cell is not a number, or not finite.
+        RecordingError: The cell is not a number, or too large for one.
     """
     if says_missing(cell):
         return np.nan
@@ -107,7 +124,7 @@ def number(path: Path, cell: str, where: str) -> float:
     except ValueError:
         raise bad_file(path, f"{where} holds {cell[:40]!r}", "a number") from None
     if np.isinf(value):
-        raise bad_file(path, f"{where} is infinite", "a finite number, or nan where it is missing")
+        raise bad_file(path, f"{where} is too large", "a number, or nan where it is missing")
     return value
 
 
@@ -242,15 +259,7 @@ def measured_rows(
         tell = findings.warn if n_cut == n_rows else findings.note
         tell(f"{n_cut} of {n_rows} rows end early; what they would hold is missing")
     width = n_columns if columns is None else len(columns)
-    table = np.frombuffer(values, np.float64).reshape(n_rows, width).copy()
-    if np.isinf(table).any():
-        row_, column = (int(i) for i in np.argwhere(np.isinf(table))[0])
-        raise bad_file(
-            path,
-            f"line {lines[row_]}, column {column + 1} is infinite",
-            "a finite number, or nan where it is missing",
-        )
-    return table
+    return np.frombuffer(values, np.float64).reshape(n_rows, width).copy()
 
 
 def _row(path: Path, cells: list[str], line: int) -> list[float]:
@@ -258,7 +267,7 @@ def _row(path: Path, cells: list[str], line: int) -> list[float]:
         row = [float(cell) if cell else np.nan for cell in cells]
     except ValueError:
         row = None
-    if row is None or any("_" in cell for cell in cells):
+    if row is None or np.inf in row or -np.inf in row or any("_" in cell for cell in cells):
         return [
             number(path, cell, f"line {line}, column {column + 1}")
             for column, cell in enumerate(cells)

@@ -258,7 +258,15 @@ def test_mediapipe_by_number_under_any_name(tmp_path: Path, form: str) -> None:
 
 @pytest.mark.parametrize(
     "form",
-    ["markers.{m}.{a}", "{m}Pos{A}", "{m}_world_{a}", "Anna_{m}_{a}", "('{m}', '{a}')", "{m}->{a}"],
+    [
+        "markers.{m}.{a}",
+        "{m}Pos{A}",
+        "{m}T{A}",
+        "{m}_world_{a}",
+        "Anna_{m}_{a}",
+        "('{m}', '{a}')",
+        "{m}->{a}",
+    ],
 )
 def test_words_that_all_names_share_fall_away(form: str, standing: Recording) -> None:
     names = standing.marker_names

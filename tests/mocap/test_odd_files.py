@@ -101,6 +101,7 @@ def check(path: Path, points: np.ndarray, names: tuple[str, ...], says: str = ""
 MISSING = [
     *("nan", "NaN", "-1.#IND", "1.#QNAN", "-nan", "nan(ind)", "-nan(ind)", "N/A", "*", ".", "-"),
     *("null", "?", "missing", "#VALUE!", "#DIV/0!", "-9999.0", "9999999", "0.0000", "-1"),
+    *("inf", "-inf", "Infinity", "-999.999", "-32768", "3.4028235e+38", "-1e30"),
 ]
 
 

@@ -332,7 +332,8 @@ def _undecorated(names: list[str]) -> list[str]:
     ways = (
         (r"([^\W_]+)[\W_]+(.+)", 1, 2),
         (r"(.+?)[\W_]+([^\W_]+)", 2, 1),
-        (r"(.*?[^\W_])(Pos|Position|Coord)", 2, 1),
+        (r"(.*?[^\W_])(Pos|Position|Coord|Trans)", 2, 1),
+        (r"(.*?[^\W_])(T)", 2, 1),  # LFHDTX
         (r"(['\"])(.+)\1", 0, 2),
     )
     for pattern, word, rest in ways:
@@ -341,9 +342,15 @@ def _undecorated(names: list[str]) -> list[str]:
         short = [match[rest] for match in matches]
         shared = not word or (len(words) == 1 and _may_go(words.pop(), short))
         differ = len(names) >= 3 and len(short) == len(set(short)) == len(names)
+        if word and pattern.endswith("(T)"):  # a single letter must hide what is known
+            shared = shared and _n_known(short) > _n_known(names)
         if shared and differ and not all(name.isdigit() for name in short):  # T_1 is a vertebra
             names = short
     return names
+
+
+def _n_known(names: list[str]) -> int:
+    return sum(bool(place_of(name).part) for name in names)
 
 
 def _may_go(word: str, rest: list[str]) -> bool:

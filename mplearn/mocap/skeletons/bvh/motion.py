@@ -161,7 +161,7 @@ def _flat_by_line(
             if len(known) < len(split):
                 raise bad_file(path, f"{where} holds {cell[:40]!r}", "a number")
             if np.isinf(known).any():
-                raise bad_file(path, f"{where} is infinite", "a finite number")
+                raise bad_file(path, f"{where} is too large", "a number")
             values += known
         else:
             if behind:

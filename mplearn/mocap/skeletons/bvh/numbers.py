@@ -12,7 +12,7 @@ _UNSIGNED = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eEdD][-+]?\d+)?"  # in one way only: no
 _NUMBER = re.compile(rf"[-+]?{_UNSIGNED}")
 _GLUED = re.compile(rf"[-+]?{_UNSIGNED}(?:[-+]{_UNSIGNED})+")
 _MISSING = re.compile(
-    r"[-+]?(?:nan(?:\(.*\))?|\d+\.?#(?:qnan|ind|snan)\d*|null|none)", re.IGNORECASE
+    r"[-+]?(?:nan(?:\(.*\))?|\d+\.?#(?:qnan|ind|snan)\d*|inf(?:inity)?|null|none)", re.IGNORECASE
 )
 _LONGEST = 400  # characters of a cell; no number has more digits
 
