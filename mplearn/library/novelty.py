@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..maths.compiling import njit
 from ..recording import FloatArray, IntArray
 from ..tree.nodes.search import nearest_others
 
@@ -81,14 +82,12 @@ class MotionNovelty:
     def _hold(self, ids: IntArray, apart: FloatArray) -> None:
         order = np.argsort(ids)
         self._ids, apart = ids[order], apart[order]
-        seen = ~np.isnan(apart)
-        n, total = seen.sum(axis=1), np.where(seen, apart, 0.0).sum(axis=1)
+        total, n = _sums(apart)
         some = n > 0
         shared = float(np.mean(total[some] / n[some])) if some.any() else 0.0
         self._shared = max(shared, 1e-12)
-        self._usual = self._scale(total, n)
-        left = np.maximum(n - 1, 0)[:, None]
-        self._ranks = (apart / self._scale(total[:, None] - apart, left))[seen]
+        self._usual = (total + _SHARED * self._shared) / (n + _SHARED)
+        self._ranks = _ranks(apart, total, n, self._shared)
 
     def score(self, distances: Iterable[tuple[int, float]]) -> AnomalyScore:
         """Score a motion.
@@ -107,8 +106,30 @@ class MotionNovelty:
         k = int(np.searchsorted(self._ids, id))
         return float(self._usual[k]) if id in self._ids[k : k + 1] else self._shared
 
-    def _scale(self, total: FloatArray, n: IntArray) -> FloatArray:
-        return np.asarray((total + _SHARED * self._shared) / (n + _SHARED))
+
+@njit(cache=True)
+def _sums(apart: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return the sum of each row (n, K) but for NaN, and of how many, shape (n,) each."""
+    total, n = np.zeros(len(apart)), np.zeros(len(apart), np.int64)
+    for i, row in enumerate(apart):
+        for value in row:
+            if not np.isnan(value):
+                total[i] += value
+                n[i] += 1
+    return total, n
+
+
+@njit(cache=True)
+def _ranks(apart: FloatArray, total: FloatArray, n: IntArray, shared: float) -> FloatArray:
+    """Return each distance that is no NaN over what is usual without it, row after row."""
+    ranks, k = np.empty(n.sum()), 0
+    for i, row in enumerate(apart):
+        for value in row:
+            if not np.isnan(value):
+                usual = (total[i] - value + _SHARED * shared) / (n[i] - 1 + _SHARED)
+                ranks[k] = value / usual
+                k += 1
+    return ranks
 
 
 def novelty_of(recogniser: Recogniser) -> MotionNovelty:

@@ -196,7 +196,7 @@ def settle_fragments(structure: Structure, number: int, longest: int) -> None:
         return
     if sum(map(structure.length_of, pair)) > longest:
         return
-    if _sure_of(structure, _joined(structure, [number - 1])[0], 1.0) is not None:
+    if _sure_of(structure, _joined(structure, [number - 1]), 1.0) != [None]:
         root.settled |= pair.intersection(root.members)
 
 
@@ -228,23 +228,33 @@ def _fragments(structure: Structure, node: Node, members: Sequence[int]) -> set[
         for first in (number - 1, number)
         if other not in (first, first + 1) and {first, first + 1} <= memory.frames.keys()
     ]
+    asked: dict[int, Exemplar] = {}  # what goes on without a rest, by its first segment
     wholes = _joined(structure, [first for _, _, first in parts])
     for (number, other, first), whole in zip(parts, wholes, strict=True):
         alone, together = (bank.distances(one, [other])[0] for one in (bank[number], whole))
-        if together < _NEARER * alone or (
-            memory.goes_on(first) and _sure_of(structure, whole, _WELL_INSIDE) is not None
-        ):
-            found |= {first, first + 1}.intersection(node.members)
+        if together < _NEARER * alone:
+            found |= {first, first + 1}
+        elif memory.goes_on(first):
+            asked[first] = whole
+    for first, home in zip(
+        asked, _sure_of(structure, list(asked.values()), _WELL_INSIDE), strict=True
+    ):
+        if home is not None:
+            found |= {first, first + 1}
+    return found.intersection(node.members)
+
+
+def _sure_of(structure: Structure, wholes: Sequence[Exemplar], most: float) -> list[int | None]:
+    """Return the sure primitive that each segment lies in, at most so far out, 1 being its radius.
+
+    It is None where there is none.
+    """
+    found: list[int | None] = []
+    for matches in structure.index.search_each(wholes, structure.memory.bank):
+        home = structure.nodes[matches[0].node] if matches and matches[0].ratio <= most else None
+        sure = home and home.is_leaf and home.n_placed >= structure.config.confirmed
+        found.append(home.id if home and sure else None)
     return found
-
-
-def _sure_of(structure: Structure, whole: Exemplar, most: float) -> int | None:
-    """Return the sure primitive that a segment lies in, at most so far out, 1 being its radius."""
-    best = next(iter(structure.index.search(whole, structure.memory.bank)), None)
-    if best is None or best.ratio > most:
-        return None
-    home = structure.nodes[best.node]
-    return home.id if home.is_leaf and home.n_placed >= structure.config.confirmed else None
 
 
 def _joined(structure: Structure, firsts: Sequence[int]) -> list[Exemplar]:
@@ -360,7 +370,7 @@ def _wholes(structure: Structure, number: int, longest: int) -> list[_Whole]:
     firsts = [first for first in (number - 1, number) if memory.goes_on(first)]
     lengths = [structure.length_of(first) + structure.length_of(first + 1) for first in firsts]
     for model, length in zip(_joined(structure, firsts), lengths, strict=True):
-        home = _sure_of(structure, model, 1.0) if length <= longest else None
+        home = _sure_of(structure, [model], 1.0)[0] if length <= longest else None
         if home is not None:
             found.append(_Whole(home, model, length))
     return found

@@ -25,14 +25,21 @@ def test_the_nearest_means_are_those_of_brute_force(width: int) -> None:
     assert (np.isinf(found) | np.isclose(found, far)).all()
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_few_means_are_looked_at_in_full_and_the_nearest_are_found(seed: int) -> None:
+@pytest.mark.parametrize(
+    ("seed", "away", "size"),
+    [(0, 0.0, 1.0), (1, 0.0, 1.0), (2, 0.0, 1.0), (3, 3e3, 1.0), (4, 1e8, 1.0), (5, 0.0, 1e22)],
+)
+def test_few_means_are_looked_at_in_full_and_the_nearest_are_found(
+    seed: int, away: float, size: float
+) -> None:
+    """Also far from zero, and where squares are too large for single precision."""
     rng, config = np.random.default_rng(seed), TreeConfig(n_candidates=5)
     bank = ExemplarBank(config, 3, np.full(3, 0.01))
     index = NodeIndex(config, bank)
     for number in range(700):  # more than a block of slots
         noise = rng.normal(0, rng.choice([0.05, 1.0]), (config.normalisation.n_points, 3))
-        bank.add(number, bank.model(noise + rng.normal(0, 1, 3) * (number % 7)))
+        frames = size * (noise + rng.normal(0, 1, 3) * (number % 7)) + away
+        bank.add(number, bank.model(frames))
         index.enter((number + 1, 0, True, 1.0), [number], bank)
     index.drop(300)
     copy = bank.model(bank[20].columns.T)  # as near as can be

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,14 +17,16 @@ class SlotArrays:
 
     Args:
         shapes: Shape of each array of a slot.
+        short: Which of them are of single precision.
 
     Attributes:
         blocks: The arrays of `BLOCK` slots each, stacked.
         n_slots: Slots that were ever taken.
     """
 
-    def __init__(self, *shapes: tuple[int, ...]) -> None:
+    def __init__(self, *shapes: tuple[int, ...], short: Collection[int] = ()) -> None:
         self.shapes = shapes
+        self.short = frozenset(short)
         self.blocks: list[tuple[FloatArray, ...]] = []
         self.n_slots = 0
         self._free: list[int] = []
@@ -33,7 +35,7 @@ class SlotArrays:
 
     def fork(self) -> SlotArrays:
         """Return slots that hold the same, and go on apart; blocks are copied when one changes."""
-        twin = SlotArrays(*self.shapes)
+        twin = SlotArrays(*self.shapes, short=self.short)
         twin.blocks, twin.n_slots, twin._free = list(self.blocks), self.n_slots, list(self._free)
         twin._lent, self._lent = set(range(len(self.blocks))), set(range(len(self.blocks)))
         return twin
@@ -58,7 +60,12 @@ class SlotArrays:
 
     def _make_room(self) -> None:
         if not self._free and self.n_slots == BLOCK * len(self.blocks):
-            self.blocks.append(tuple(np.zeros((BLOCK, *shape)) for shape in self.shapes))
+            kinds = (np.float32 if k in self.short else np.float64 for k in range(len(self.shapes)))
+            self.blocks.append(
+                tuple(
+                    np.zeros((BLOCK, *s), kind) for s, kind in zip(self.shapes, kinds, strict=True)
+                )
+            )
 
     def release(self, slot: int) -> None:
         """Make a slot free."""

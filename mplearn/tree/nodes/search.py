@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,7 @@ class IndexState(State):
         require_no_cycle(parents, lambda id: f"parents[{list(parents).index(id)}]")
 
 
+_Short: TypeAlias = NDArray[np.float32]
 _NOWHERE = (ROOT,)
 _ROOM = 16  # nodes that there is room for at first; twice as many, at least, when it is full
 _YOUNG = 3  # exemplars of a leaf up to which little is known of how much executions vary
@@ -111,7 +112,7 @@ class NodeIndex:
         n_values = bank.n_channels * len(self._waves)
         n_slow = bank.n_channels * self._waves.shape[1]
         # mean, `nearest_others`, the mean's slow part
-        self._of_node = SlotArrays((n_values,), (config.max_exemplars,), (n_slow,))
+        self._of_node = SlotArrays((n_values,), (config.max_exemplars,), (n_slow,), short=(2,))
 
     @property
     def _known(self) -> NDArray[np.void]:
@@ -321,41 +322,62 @@ class NodeIndex:
         if not self._ids:
             return Sight([], np.zeros(0))
         if self.config.n_candidates:
-            return self._compare(exemplar, bank, self._candidates(exemplar, bank))
+            (places,) = self._candidates([exemplar], bank)
+            return self._compare(exemplar, bank, places)
         return self._descend(exemplar, bank)
+
+    def search_each(self, exemplars: Sequence[Exemplar], bank: ExemplarBank) -> list[list[Match]]:
+        """Return what `search` does for each of some segments, which is quicker together."""
+        if not exemplars or not self._ids or not self.config.n_candidates:
+            return [self.search(each, bank) for each in exemplars]
+        near = self._candidates(exemplars, bank)
+        return [
+            self._compare(each, bank, places).matches
+            for each, places in zip(exemplars, near, strict=True)
+        ]
 
     def others(self, exemplar: Exemplar, bank: ExemplarBank, but: int) -> list[Match]:
         """Return the leaves that a segment is near to, best first, but for one of them."""
-        near = self._candidates(exemplar, bank)
+        (near,) = self._candidates([exemplar], bank)
         return self._compare(exemplar, bank, near[self.ids[near] != but]).matches
 
     def near(self, exemplar: Exemplar, bank: ExemplarBank) -> list[int]:
         """Return the ids of the leaves that a segment may belong to, in order."""
-        found: list[int] = self.ids[self._candidates(exemplar, bank)].tolist()
+        (near,) = self._candidates([exemplar], bank)
+        found: list[int] = self.ids[near].tolist()
         return found
 
-    def _candidates(self, exemplar: Exemplar, bank: ExemplarBank) -> IntArray:
-        """Return the places of the leaves nearest by mean trajectory; of all if that is asked.
+    def _candidates(self, exemplars: Sequence[Exemplar], bank: ExemplarBank) -> list[IntArray]:
+        """Return the places of the leaves nearest to each of some segments by mean trajectory.
 
-        No mean is nearer than its slow part is, which is short: few means are looked at in full.
+        All leaves if that is asked. No mean is nearer than its slow part is, which is short, and in
+        single precision: few means are looked at in full.
         """
         if not self.config.n_candidates:
-            return np.flatnonzero(self.leaves)
+            return [np.flatnonzero(self.leaves)] * len(exemplars)
         if len(self._ids) <= self.config.n_candidates:
-            return np.arange(len(self._ids))
-        profile, n = bank.profile(exemplar), self.config.n_candidates
-        slow = self._slow(profile)
-        by_slot = np.concatenate(
-            [_all_squared_offsets(parts, slow) for _, _, parts in self._of_node.used()]
-        )
-        at_least = by_slot[self._known["slot"]]
+            return [np.arange(len(self._ids))] * len(exemplars)
+        profiles = [bank.profile(each) for each in exemplars]
+        slow = np.array([self._slow(each) for each in profiles])
+        by_slot, end = np.empty((len(profiles), self._of_node.n_slots), np.float32), 0
+        for _, _, parts in self._of_node.used():
+            _all_squared_offsets(cast(_Short, parts), slow, by_slot[:, end : end + len(parts)])
+            end += len(parts)
+        at_least = by_slot[:, self._known["slot"]].astype(np.float64)
+        at_least[~np.isfinite(at_least).all(axis=1)] = 0.0  # too large: all are looked at
+        return [self._nearest(*each) for each in zip(profiles, slow, at_least, strict=True)]
+
+    def _nearest(self, profile: FloatArray, slow: _Short, at_least: FloatArray) -> IntArray:
+        """Return the places of the means that are nearest to a profile, in order of their ids."""
+        n = self.config.n_candidates
         nearness, best, first = (
             np.full(len(at_least), np.inf),
             np.full(n, np.inf),
             _least(at_least, n),
         )
         self._measure(nearness, first, profile, best)
-        most = best[-1] + _ROUNDING * (best[-1] + slow @ slow)
+        size = float(np.square(slow, dtype=np.float64).sum())
+        most = best[-1] + _ROUNDING * (len(slow) * best[-1] + 16 * size)
         near = at_least <= most
         near[first] = False
         self._measure(nearness, np.flatnonzero(near), profile, best)
@@ -369,9 +391,11 @@ class NodeIndex:
         for (means, _, _), rows, here in self._of_node.parted(self._known["slot"][places]):
             nearness[places[here]] = _squared_offsets(means, rows, profile, best)
 
-    def _slow(self, profile: FloatArray) -> FloatArray:
+    def _slow(self, profile: FloatArray) -> _Short:
         """Return the slow part of a profile, shape (D * P,) to (D * W,)."""
-        return np.asarray((profile.reshape(-1, len(self._waves)) @ self._waves).ravel())
+        waves = (profile.reshape(-1, len(self._waves)) @ self._waves).ravel()
+        with np.errstate(over="ignore"):
+            return np.asarray(waves, np.float32)
 
     def _compare(self, exemplar: Exemplar, bank: ExemplarBank, places: IntArray) -> Sight:
         row = bank.distances(exemplar, [m for k in places.tolist() for m in self.members[k]])
@@ -483,7 +507,7 @@ def _mean_extents(bank: ExemplarBank, groups: Sequence[Sequence[int]]) -> FloatA
 
 
 _N_WAVES = 6  # that motions, and two of them in one, mostly consist of
-_ROUNDING = 1e-9
+_ROUNDING = 2.0**-24  # of each sum of so many squares, and of the squares' numbers
 
 
 @cache
@@ -495,19 +519,18 @@ def _slow_waves(n_points: int) -> FloatArray:
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})
-def _all_squared_offsets(means: FloatArray, profile: FloatArray) -> FloatArray:
-    """Return the squared distance of means (n, F) to a profile (F,), shape (n,).
+def _all_squared_offsets(means: _Short, profiles: _Short, out: _Short) -> None:
+    """Write the squared distances of means (n, F) to profiles (k, F) to ``out``, shape (k, n).
 
-    It is right but for rounding: sums are taken in any order, which is much faster.
+    They are right but for rounding: sums are taken in any order, which is much faster.
     """
-    out = np.empty(len(means))
-    for k in range(means.shape[0]):
-        total = 0.0
-        for f in range(means.shape[1]):
-            offset = means[k, f] - profile[f]
-            total += offset * offset
-        out[k] = total
-    return out
+    for i in range(means.shape[0]):
+        for k in range(profiles.shape[0]):
+            total = np.float32(0.0)
+            for f in range(means.shape[1]):
+                offset = means[i, f] - profiles[k, f]
+                total += offset * offset
+            out[k, i] = total
 
 
 @njit(cache=True)
