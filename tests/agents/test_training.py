@@ -7,7 +7,8 @@ import pytest
 from standing_library import standing_library
 
 from mplearn.errors import InvalidValueError
-from mplearn.library import PrimitiveLibrary
+from mplearn.hmm import fit
+from mplearn.library import Primitive, PrimitiveLibrary
 from mplearn_agents.cli import main
 from mplearn_agents.rl import ProjectIllegal, TrainedPolicy, TrainingConfig
 from mplearn_agents.rl.config import VERSION
@@ -81,6 +82,22 @@ def test_an_agent_is_refused_on_another_library_of_the_same_ids(folder, config):
     path = replace(library, primitives=swapped).save(folder / "swapped.mplearn")
     env = make_environment(replace(config, library=str(path)))
     with pytest.raises(InvalidValueError, match=r"another library: the primitives \[3, 4, 5, 6\]"):
+        agent.require_fit(env)
+
+
+def test_an_agent_is_refused_where_motions_differ_between_equal_ends(folder, config):
+    library = PrimitiveLibrary.load(config.library)
+    first, *others = library.primitives
+    elbow = np.array([name == "elbow_l" for name in library.channels])
+    assert elbow.any()
+    arches = [1.2 * np.sin(np.linspace(0, np.pi, len(each)))[:, None] for each in first.exemplars]
+    motions = [each - elbow * arch for each, arch in zip(first.exemplars, arches, strict=True)]
+    hmm = fit(motions, 10, variance_floor=1e-4)
+    bent = Primitive.from_exemplars(first.id, hmm, motions, first.rate_hz, name=first.name)
+    path = replace(library, primitives=(bent, *others)).save(folder / "bent.mplearn")
+    agent = TrainedPolicy.load(folder / "whole")
+    env = make_environment(replace(config, library=str(path)))
+    with pytest.raises(InvalidValueError, match=rf"another library: the primitives \[{first.id}\]"):
         agent.require_fit(env)
 
 

@@ -15,7 +15,7 @@ from mplearn_envs.environment.options import ActionOptions
 
 VERSION = 3  # of agents: changes with networks, what they see, and what tasks show
 USUAL_SPEED = (1.0,)  # as the only one
-Ends: TypeAlias = list[list[float]]  # the tracked coordinates where a motion begins and ends
+Course: TypeAlias = list[list[float]]  # tracked coordinates from where a motion begins to its end
 EnvVersion: TypeAlias = Literal["v0", "v1"]
 AlgorithmName: TypeAlias = Literal["maskable-ppo", "ppo", "dqn"]
 
@@ -114,15 +114,15 @@ class TrainingConfig:
             out["actions"] = {**out.get("actions", {}), "speeds": self.speeds}
         return out
 
-    def save(self, path: Path, slots: Mapping[int, int], ends: Mapping[int, Ends]) -> None:
-        """Write this as JSON, with the slot and the ends of each primitive that the agent knows."""
+    def save(self, path: Path, slots: Mapping[int, int], courses: Mapping[int, Course]) -> None:
+        """Write this as JSON, with the slot and the course of each primitive that it knows."""
         values = {"version": VERSION, **asdict(self)}
         values["slots"] = {str(id): slot for id, slot in slots.items()}
-        values["ends"] = {str(id): both for id, both in ends.items()}
+        values["courses"] = {str(id): course for id, course in courses.items()}
         path.write_text(json.dumps(values, indent=2) + "\n", "utf-8")
 
     @classmethod
-    def load(cls, path: Path) -> tuple[TrainingConfig, dict[int, int], dict[int, Ends]]:
+    def load(cls, path: Path) -> tuple[TrainingConfig, dict[int, int], dict[int, Course]]:
         """Return what `save` wrote.
 
         Raises:
@@ -137,8 +137,9 @@ class TrainingConfig:
                     f"version {VERSION}, whose networks differ: train it again"
                 )
             slots = {int(id): int(slot) for id, slot in values.pop("slots").items()}
-            ends = {int(id): both for id, both in values.pop("ends", {}).items()}
-            return cls(**values), slots, ends
+            ends = values.pop("ends", {})  # of agents of before
+            courses = {int(id): each for id, each in values.pop("courses", ends).items()}
+            return cls(**values), slots, courses
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             if isinstance(error, MPLearnError):
                 raise

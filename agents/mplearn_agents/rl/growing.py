@@ -15,7 +15,7 @@ from mplearn.errors import InvalidValueError
 from .algorithms import new_model
 from .encoding import capacity_of
 from .features import features_of
-from .trained import TrainedPolicy, ends_of, same_motion
+from .trained import TrainedPolicy, courses_of, same_motion
 
 
 def grow(agent: TrainedPolicy, env: gymnasium.Env[Any, Any]) -> TrainedPolicy:
@@ -44,11 +44,11 @@ def grow(agent: TrainedPolicy, env: gymnasium.Env[Any, Any]) -> TrainedPolicy:
             f"{int(env.action_space.n) // now}"  # type: ignore[attr-defined]
         )
     slots: dict[int, int] = dict(env.unwrapped.repertoire.slots)  # type: ignore[attr-defined]
-    ends = ends_of(env)
+    courses = courses_of(env)
     moved = {0: 0} | {
         agent.slots[id]: slots[id]
         for id in agent.slots
-        if id in slots and same_motion(agent.ends.get(id, ends[id]), ends[id])
+        if id in slots and same_motion(agent.courses.get(id, courses[id]), courses[id])
     }
     model = new_model(agent.config, DummyVecEnv([lambda: env]), agent.scaling)
     known: dict[str, Tensor] = agent.model.policy.state_dict()
@@ -66,7 +66,7 @@ def grow(agent: TrainedPolicy, env: gymnasium.Env[Any, Any]) -> TrainedPolicy:
                 _copy_actions(old, new, actions)
             elif not name.startswith(("features_extractor.", "pi_features", "vf_features")):
                 new.copy_(old)
-    return TrainedPolicy(model, agent.config, slots, agent.deterministic, ends)
+    return TrainedPolicy(model, agent.config, slots, agent.deterministic, courses)
 
 
 def _columns(old: Any, new: Any, moved: Mapping[int, int]) -> dict[int, int]:

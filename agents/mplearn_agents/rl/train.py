@@ -21,7 +21,7 @@ from mplearn.extras import require
 from .config import TrainingConfig
 from .encoding import measure_scaling
 from .projection import ProjectIllegal
-from .trained import CONFIG, POLICY, TrainedPolicy, ends_of
+from .trained import CONFIG, POLICY, TrainedPolicy, courses_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -91,8 +91,8 @@ def train(
     inner: Any = tested.unwrapped
     slots = dict(inner.repertoire.slots)
     out.mkdir(parents=True, exist_ok=True)
-    ends = ends_of(tested)
-    config.save(out / CONFIG, slots, ends)
+    courses = courses_of(tested)
+    config.save(out / CONFIG, slots, courses)
     if done:
         model = load_model(config.algorithm, out / _CHECKPOINT.format(done), envs)
     else:
@@ -102,7 +102,7 @@ def train(
             start.require_fit(tested)
             model.policy.load_state_dict(start.model.policy.state_dict())
     model.set_logger(configure(str(out / "log" / f"from-{done:09d}"), ["csv", "tensorboard"]))
-    policy = TrainedPolicy(model, config, slots, ends=ends)
+    policy = TrainedPolicy(model, config, slots, courses=courses)
     progress = ShowProgress(config, console)
     evaluation = Evaluation(policy, tested, config, out / "evaluation.csv")
     rollout = rollout_steps(config)

@@ -11,15 +11,17 @@ import numpy as np
 
 from mplearn.errors import InvalidValueError
 from mplearn.extras import require
+from mplearn.recording import IntArray
 from mplearn_agents.policies import Policy, legal_actions
 from mplearn_envs.skills.repertoire import ENTRY_GAP
 
-from .config import Ends, TrainingConfig
+from .config import Course, TrainingConfig
 from .encoding import Scaling
 from .projection import project
 
 POLICY = "policy.zip"
 CONFIG = "training.json"
+_POSTURES = 5  # of a motion
 
 
 class TrainedPolicy(Policy):
@@ -30,8 +32,8 @@ class TrainedPolicy(Policy):
         config: How it is trained.
         slots: Slot of each primitive that it knows, by id.
         deterministic: Whether to take the best action, or to draw one.
-        ends: Where the motion of each primitive that it knows begins and ends, see `ends_of`; None
-            where that is not known.
+        courses: How the motion of each primitive that it knows goes, see `courses_of`; None where
+            that is not known.
     """
 
     def __init__(
@@ -40,13 +42,13 @@ class TrainedPolicy(Policy):
         config: TrainingConfig,
         slots: Mapping[int, int],
         deterministic: bool = True,
-        ends: Mapping[int, Ends] | None = None,
+        courses: Mapping[int, Course] | None = None,
     ) -> None:
         self.model = model
         self.config = config
         self.slots = dict(slots)
         self.deterministic = deterministic
-        self.ends = dict(ends or {})
+        self.courses = dict(courses or {})
 
     @classmethod
     def load(cls, folder: str | Path, deterministic: bool = True) -> TrainedPolicy:
@@ -60,11 +62,11 @@ class TrainedPolicy(Policy):
         from .algorithms import load_model
 
         folder = Path(folder)
-        config, slots, ends = TrainingConfig.load(folder / CONFIG)
+        config, slots, courses = TrainingConfig.load(folder / CONFIG)
         if not (folder / POLICY).is_file():
             raise InvalidValueError(f"{folder} holds no {POLICY}: the training has not ended")
         model = load_model(config.algorithm, folder / POLICY)
-        return cls(model, config, slots, deterministic, ends)
+        return cls(model, config, slots, deterministic, courses)
 
     @property
     def scaling(self) -> Scaling:
@@ -90,12 +92,12 @@ class TrainedPolicy(Policy):
                 f"the agent was trained on another library: the primitives {other} are new, gone, "
                 "or in other slots; take it along with mplearn_agents.rl.growing.grow"
             )
-        here = ends_of(env)
-        moved = [id for id, both in self.ends.items() if not same_motion(both, here[id])]
+        here = courses_of(env)
+        moved = [id for id, course in self.courses.items() if not same_motion(course, here[id])]
         if moved:
             raise InvalidValueError(
                 f"the agent was trained on another library: the primitives {moved} have the same "
-                "ids here, but begin or end in other postures; train an agent on this one"
+                "ids here, but lead through other postures; train an agent on this one"
             )
 
     def reset(self, seed: int | None = None) -> None:
@@ -112,14 +114,28 @@ class TrainedPolicy(Policy):
         return project(int(action), mask)
 
 
-def ends_of(env: gymnasium.Env[Any, Any]) -> dict[int, Ends]:
-    """Return where the motion of each primitive of an environment begins and ends, by id."""
+def courses_of(env: gymnasium.Env[Any, Any]) -> dict[int, Course]:
+    """Return how the motion of each primitive of an environment goes, by id.
+
+    Where it begins, a quarter, half and three quarters later, and where it ends.
+    """
     repertoire = env.unwrapped.repertoire  # type: ignore[attr-defined]
+    motions = {id: repertoire.skills[id].motion.frames for id in repertoire.ids}
     return {
-        id: repertoire.skills[id].motion.frames[[0, -1]].round(3).tolist() for id in repertoire.ids
+        id: frames[_at(len(frames), _POSTURES)].round(3).tolist() for id, frames in motions.items()
     }
 
 
-def same_motion(ours: Ends, theirs: Ends) -> bool:
-    """Return whether two motions begin and end in about the same postures."""
-    return bool(np.abs(np.subtract(ours, theirs)).max() <= ENTRY_GAP)
+def same_motion(ours: Course, theirs: Course) -> bool:
+    """Return whether two motions lead through about the same postures.
+
+    Of a motion of which less is known, those that are.
+    """
+    few = min(len(ours), len(theirs))
+    some, others = (np.asarray(each)[_at(len(each), few)] for each in (ours, theirs))
+    return bool(np.abs(some - others).max() <= ENTRY_GAP)
+
+
+def _at(length: int, count: int) -> IntArray:
+    """Return so many places, evenly from the first to the last."""
+    return np.rint(np.linspace(0, length - 1, count)).astype(np.int64)
