@@ -49,7 +49,18 @@ class _Version(argparse.Action):
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that refuses bad values in one line."""
+    """A parser that refuses bad values in one line, and takes ``--up -y`` as ``--up=-y``."""
+
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        words: list[str] = []
+        for word in sys.argv[1:] if args is None else args:
+            if words and words[-1] == "--up" and re.fullmatch("-[xyz]", word):
+                words[-1] = f"--up={word}"
+            else:
+                words.append(word)
+        return super().parse_known_args(words, namespace)
 
     def error(self, message: str) -> NoReturn:
         value = _OF_AN_OPTION.match(message)

@@ -11,7 +11,8 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
+from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,10 +22,11 @@ from rich.table import Table
 from mplearn import open_recording
 from mplearn.errors import RecordingError
 from mplearn.library import PrimitiveLibrary
-from mplearn.mocap import open_takes
+from mplearn.mocap import Hints, command_line, open_takes
+from mplearn.option_names import option as option_of
 from mplearn_agents import cli
 from mplearn_agents.cli import build_parser, command_modules, main
-from mplearn_agents.recordings.reading import shown_reading
+from mplearn_agents.recordings.reading import hints_of, shown_reading
 from mplearn_agents.terminal import console as consoles
 from mplearn_agents.terminal.console import InertConsole
 from mplearn_agents.terminal.inert import InertStream, inert_output, printable
@@ -572,3 +574,36 @@ def test_reading_many_takes_shows_how_far_it_is(tmp_path):
         assert ("reading" in shown.getvalue() and "4 of 4" in shown.getvalue()) == terminal
     with pytest.raises(RecordingError, match="torn"):
         open_takes(tmp_path, strict=True, through=lambda names: reversed(list(names)))
+
+
+HINTS = {
+    "rate_hz": (("--rate", "90"), 90.0),
+    "unit_m": (("--unit", "in"), 0.0254),
+    "up_axis": (("--up", "-y"), "-y"),
+    "skeleton": (("--skeleton", "a.asf"), Path("a.asf")),
+    "angle_unit": (("--angles", "radians"), "radians"),
+    "mirrored": (("--mirrored",), True),
+    "level": (("--level",), True),
+}  # of each attribute of `Hints`: an option, and what it says
+
+
+@pytest.mark.parametrize("words", [("learn", "x"), ("inspect", "x"), ("recognise", "l", "x")])
+def test_the_command_line_takes_the_hints_that_python_takes(words):
+    """None is left out on either side, and messages name the option that there is."""
+    asked = {each.name for each in fields(Hints)} - {"joint_axes"}  # of what is drawn, no hint
+    assert asked == HINTS.keys()
+    parser = build_parser(words)
+    bare = vars(parser.parse_args(words))
+    for name, (words_of, value) in HINTS.items():
+        args = parser.parse_args([*words, *words_of])
+        assert hints_of(args) == replace(Hints(), **{name: value})
+        with command_line():
+            assert option_of(name) == words_of[0]
+        assert {key for key in bare if vars(args)[key] != bare[key]} == {words_of[0].strip("-")}
+    (group,) = (
+        each
+        for each in parser._subparsers._group_actions[0].choices[words[0]]._action_groups
+        if each.title == "what the files do not say, or say wrongly"
+    )
+    known = {words_of[0] for words_of, _ in HINTS.values()} | {"--map"}
+    assert {action.option_strings[0] for action in group._group_actions} == known
