@@ -16,6 +16,9 @@ from mplearn.recording import FloatArray
 from .motion import RobotMotion
 from .robot_model import RobotModel
 
+LARGEST = 1e9  # of a number that a file may say: what lies beyond is damage
+_SHORTEST = 1e-6  # length of a quaternion
+
 
 @dataclass(frozen=True, eq=False)
 class Reading:
@@ -90,12 +93,14 @@ class Reading:
                     f"{path}: {field.name} is of shape {value.shape}, but robot {model.name!r} "
                     f"with {n} joints and {n_bodies} bodies needs {shapes[field.name]}"
                 )
-            if not np.isfinite(value).all():
-                frame = int(np.argwhere(~np.isfinite(value))[0][0])
-                raise RecordingError(f"{path}: {field.name} is not a number in frame {frame}")
+            far = ~(np.abs(value) <= LARGEST)  # NaN, too
+            if far.any():
+                frame = int(np.argwhere(far)[0][0])
+                what = "not a number" if np.isnan(value[far]).any() else "too large"
+                raise RecordingError(f"{path}: {field.name} is {what} in frame {frame}")
         for name in ("root_quat", "body_quat"):
             value = getattr(self, name)
-            if value is not None and not (np.linalg.norm(value, axis=-1) > 0).all():
+            if value is not None and not (np.linalg.norm(value, axis=-1) > _SHORTEST).all():
                 raise RecordingError(f"{path}: {name} holds a quaternion of length zero")
         return self
 

@@ -229,6 +229,40 @@ def test_our_own_reader_reads_the_bvh_as_the_robot_moves(
     assert np.abs(read[:, where] - bodies.pos).max() < 1e-5
 
 
+@pytest.mark.parametrize("name", ["dm_humanoid", "cmu_humanoid"])
+def test_hinges_beside_the_origins_of_their_bodies_move_them_in_every_format(
+    name: str, tmp_path: Path
+) -> None:
+    """dm_control's humanoid bends its knees 2 cm beside its shanks' origins."""
+    model = RobotModel.of(make_robot(name))
+    beside = np.abs(model.model.jnt_pos[1:]).max()
+    assert (beside > 0.01) == (name == "dm_humanoid")
+    rng = np.random.default_rng(0)
+    limits = np.clip(model.limits, -0.7, 0.7)
+    t = np.linspace(0.0, 3.0, 60)[:, None]
+    share = 0.5 + 0.5 * np.sin(2 * np.pi * rng.uniform(0.2, 0.6, len(limits)) * t)
+    turns = np.array([[1.0, 0.0, 0.0, 0.0]]) + 0.2 * np.sin(t * [[0.5, 0.7, 1.1, 1.3]])
+    motion = RobotMotion(
+        "swings",
+        model.joint_names,
+        50.0,
+        np.hstack([t, 0.1 * t, 1.0 + 0.0 * t]),
+        turns / np.linalg.norm(turns, axis=1, keepdims=True),
+        limits[:, 0] + share * (limits[:, 1] - limits[:, 0]),
+    )
+    bodies = model.forward(motion.root_pos, motion.root_quat, motion.joint_pos)
+    path = tmp_path / "swings.bvh"
+    format_of("bvh").write(path, [motion], model)
+    (reading,) = format_of("bvh").read(path, model)
+    assert reading.body_pos is not None
+    assert np.abs(reading.body_pos - bodies.pos).max() < 1e-6
+    recording = open_recording(path, positions=True, hints=Hints(unit_m=0.01, up_axis="y"))
+    names = [channel.removesuffix(".x") for channel in recording.channels[::3]]
+    read = recording.frames.reshape(len(recording), -1, 3)
+    where = [names.index(each) for each in model.body_names]
+    assert np.abs(read[:, where] - bodies.pos).max() < 1e-5
+
+
 def test_a_motion_as_it_was_shown_is_that_of_the_body_that_it_was_learned_in() -> None:
     library = LibrarySource(None).now()
     path = ("march, right leg raise", "bow down", "bow down")
@@ -397,6 +431,34 @@ def test_a_lerobot_data_set_has_an_episode_a_motion_and_a_task_a_primitive(tmp_p
     (other / "mine").write_text("x")
     with pytest.raises(InvalidValueError, match="something else in it"):
         export(done.motions, model, format_of("lerobot"), other)
+
+
+def test_a_data_set_whose_descriptions_are_damaged_is_not_in_order(tmp_path: Path) -> None:
+    """LeRobot's own class reads them all."""
+    pytest.importorskip("pyarrow")
+    done = perform(standing_library(("wave", "arms up", "squat")), humanoid())
+    model = RobotModel.of(humanoid())
+    (path,) = export(done.motions, model, format_of("lerobot"), tmp_path / "set")
+    assert all(each.in_order for each in check(path, model))
+    rng = np.random.default_rng(0)
+    for file in sorted(each for each in path.rglob("*") if each.is_file()):
+        whole = file.read_bytes()
+        for cut in rng.integers(0, len(whole), 4).tolist():
+            file.write_bytes(whole[:cut])
+            with pytest.raises(RecordingError, match="no LeRobot data set"):
+                check(path, model)
+        file.write_bytes(whole)
+    for place, key, value in [
+        ("meta/info.json", "total_frames", 3),
+        ("meta/info.json", "total_tasks", 9),
+        ("meta/info.json", "codebase_version", "v2.1"),
+        ("meta/stats.json", "action", {"min": [0.0], "max": [0.0], "mean": [0.0], "std": [1.0]}),
+    ]:
+        whole = (path / place).read_bytes()
+        (path / place).write_text(json.dumps(json.loads(whole) | {key: value}))
+        with pytest.raises(RecordingError, match=place):
+            check(path, model)
+        (path / place).write_bytes(whole)
 
 
 def test_lerobots_own_class_opens_the_data_set(tmp_path: Path) -> None:

@@ -2,12 +2,14 @@
 
 Each body is a joint with its own rotation, so a tool that knows no hinges shows the robot as it is.
 As in most files of the kind: centimetres, y up, z ahead, angles in degrees, and in the pose without
-rotations (all angles zero) every joint's axes are the world's.
+rotations (all angles zero) every joint's axes are the world's. Where a body's hinge lies beside its
+origin, as in dm_control's humanoid, the origin moves in the body that carries it: that joint has
+position channels, too, which say where it lies and not how far from its offset.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +29,7 @@ from ..motion import RobotMotion
 from ..robot_model import RobotModel
 
 _CM = 100.0
+_STILL = 1e-5  # by how much the place of a joint that has none differs from its offset [cm]
 _ORDER = "ZYX"
 _UPRIGHT = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])  # x, y, z: y is up
 
@@ -44,16 +47,24 @@ class BVH(Format):
         order = _depth_first(model)
         bodies = model.forward(motion.root_pos, motion.root_quat, motion.joint_pos)
         turn = _turns(model, bodies.quat)
-        columns = [_CM * bodies.pos[:, 0] @ _UPRIGHT.T]
+        places, moving = _CM * bodies.pos @ _UPRIGHT.T, set()
+        columns = []
         for b in order:
             p = model.parents[b]
-            local = turn[:, b] if p < 0 else np.swapaxes(turn[:, p], 1, 2) @ turn[:, b]
+            local, place = turn[:, b], places[:, b]
+            if p >= 0:
+                back = np.swapaxes(turn[:, p], 1, 2)
+                local = back @ turn[:, b]
+                place = np.einsum("tij,tj->ti", back, places[:, b] - places[:, p])
+            if p < 0 or np.abs(place - _offset(model, b)).max() > _STILL:
+                columns.append(place)
+                moving.add(b)
             angles = continuous_euler(_ORDER, matrix_to_euler(_ORDER, local))
             exact = matrix_to_euler(_ORDER, local)  # near gimbal lock, where the path is not exact
             off = np.abs(euler_to_matrix(_ORDER, angles) - local).max(axis=(1, 2)) > 1e-7
             angles[off] = exact[off]
             columns.append(np.degrees(angles))
-        lines = ["HIERARCHY", *_hierarchy(model), "MOTION", f"Frames: {len(motion)}"]
+        lines = ["HIERARCHY", *_hierarchy(model, moving), "MOTION", f"Frames: {len(motion)}"]
         lines.append(f"Frame Time: {1.0 / motion.rate_hz:.9g}")
         with path.open("w", encoding="utf-8") as file:
             file.write("\n".join(lines) + "\n")
@@ -128,8 +139,14 @@ def _depth_first(model: RobotModel) -> list[int]:
     return out
 
 
-def _hierarchy(model: RobotModel) -> list[str]:
-    places = _CM * model.at_zero.pos[0] @ _UPRIGHT.T
+def _offset(model: RobotModel, b: int) -> FloatArray:
+    """Return where a body lies in the one that carries it with all angles zero [cm], shape (3,)."""
+    p, places = int(model.parents[b]), model.at_zero.pos[0]
+    return np.zeros(3) if p < 0 else _CM * (places[b] - places[p]) @ _UPRIGHT.T
+
+
+def _hierarchy(model: RobotModel, moving: Collection[int]) -> list[str]:
+    """Return the joints; those of some bodies have position channels."""
     rest = quaternion_to_matrix(model.at_zero.quat[0])
     children = set(model.parents.tolist())
     turns = " ".join(f"{axis}rotation" for axis in _ORDER)
@@ -141,12 +158,11 @@ def _hierarchy(model: RobotModel) -> list[str]:
             open_.pop()
             out.append("\t" * len(open_) + "}")
         tab = "\t" * len(open_)
-        offset = np.zeros(3) if p < 0 else places[b] - places[p]
-        moves = "6 Xposition Yposition Zposition " if p < 0 else "3 "
+        moves = "6 Xposition Yposition Zposition " if b in moving else "3 "
         out += [
             f"{tab}{'ROOT' if p < 0 else 'JOINT'} {model.body_names[b]}",
             f"{tab}{{",
-            f"{tab}\tOFFSET {_row(offset)}",
+            f"{tab}\tOFFSET {_row(_offset(model, b))}",
             f"{tab}\tCHANNELS {moves}{turns}",
         ]
         open_.append(b)

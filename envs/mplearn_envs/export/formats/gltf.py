@@ -20,7 +20,7 @@ from mplearn.maths.rotations import (
 )
 from mplearn.recording import FloatArray
 
-from ..format import Dialect, Format, Reading, in_order
+from ..format import LARGEST, Dialect, Format, Reading, in_order
 from ..motion import RobotMotion, continuous_quaternions
 from ..robot_model import RobotModel
 from .glb import CORNERS, VERTICES, Document, numbers, read_glb
@@ -91,6 +91,8 @@ def _reading(
         names = [str(node.get("name", "")) for node in content["nodes"]]
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise RecordingError(f"{path}: no animation of a robot: {error!r}") from error
+    if not (np.abs(pos) <= LARGEST).all() or not np.isfinite(turn).all():  # NaN, too
+        raise RecordingError(f"{path}: no animation of a robot: it leads beyond all numbers")
     places = in_order(path, "node", names, model.body_names)
     pos = pos[:, places] @ upright
     quat = matrix_to_quaternion(upright.T @ turn[:, places])

@@ -127,7 +127,13 @@ class LeRobot(Format):
             episodes = np.unique(columns["episode_index"])
             if len(episodes) != info["total_episodes"]:
                 raise ValueError(f"{len(episodes)} episodes, info says {info['total_episodes']}")
-        except (OSError, ValueError, KeyError, TypeError) as error:
+            data = require("pyarrow", "export").concat_tables(tables)
+            _require_features(info, data)
+            _require_tasks(info, parquet.read_table(path / _TASKS), data)
+            rows = [parquet.read_table(file) for file in sorted(path.glob("meta/episodes/*/*"))]
+            _require_episodes(rows, columns["episode_index"])
+            _require_statistics(json.loads((path / _STATS).read_text("utf-8")), data)
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
             raise RecordingError(f"{path}: no LeRobot data set: {error!r}") from error
         out = []
         for episode in episodes:
@@ -140,6 +146,63 @@ class LeRobot(Format):
     def accepts(self, path: Path) -> bool:
         """Whether it is a folder with a data set's description."""
         return (path / _INFO).is_file()
+
+
+def _require_features(info: dict[str, Any], data: Any) -> None:
+    """Check that a data set is of this version, and its columns are those that are described."""
+    version = info["codebase_version"]
+    if not str(version).startswith("v3."):
+        raise ValueError(f"{_INFO}: version {version!r}, not {_VERSION!r}")
+    if info["total_frames"] != len(data):
+        raise ValueError(f"{_INFO}: {info['total_frames']} frames, {len(data)} are there")
+    stored = {key: each for key, each in info["features"].items() if each["dtype"] != "video"}
+    if stored.keys() != set(data.column_names):
+        raise ValueError(f"{_INFO}: columns {sorted(stored)}, not {sorted(data.column_names)}")
+    for key, each in stored.items():
+        width = np.array(data[key][:1].to_pylist()).size
+        if each["dtype"] not in ("image", "string") and int(np.prod(each["shape"])) != width:
+            raise ValueError(f"{_INFO}: {key} has shape {each['shape']}, and {width} components")
+
+
+def _require_tasks(info: dict[str, Any], tasks: Any, data: Any) -> None:
+    """Check that each frame's task is one of those that are named."""
+    numbers = tasks["task_index"].to_pylist()
+    used = set(data["task_index"].to_pylist())
+    if info["total_tasks"] != len(numbers):
+        raise ValueError(f"{_INFO}: {info['total_tasks']} tasks, {_TASKS} has {len(numbers)}")
+    if sorted(numbers) != list(range(len(numbers))) or not used <= set(numbers):
+        raise ValueError(f"{_TASKS}: tasks {sorted(numbers)}, used are {sorted(used)}")
+    names = next(tasks[name] for name in tasks.column_names if name != "task_index").to_pylist()
+    if not all(isinstance(name, str) for name in names):
+        raise ValueError(f"{_TASKS}: a task has no name")
+
+
+def _require_episodes(rows: Sequence[Any], episode_of: FloatArray) -> None:
+    """Check that episodes lie where they are said to, one after the other."""
+    numbers, counts = np.unique(episode_of, return_counts=True)
+    ends = np.cumsum(counts)
+    wanted = [numbers, counts, ends - counts, ends]
+    keys = ("episode_index", "length", "dataset_from_index", "dataset_to_index")
+    for key, values in zip(keys, wanted, strict=True):
+        said = [value for table in rows for value in table[key].to_pylist()]
+        if said != values.tolist():
+            raise ValueError(f"meta/episodes: {key} {said}, not {values.astype(int).tolist()}")
+
+
+def _require_statistics(statistics: dict[str, Any], data: Any) -> None:
+    """Check the statistics that networks scale by."""
+    for key in set(data.column_names) & statistics.keys():
+        values = np.array(data[key].to_pylist(), dtype=np.float64).reshape(len(data), -1)
+        least, most = values.min(axis=0), values.max(axis=0)
+        close = 1e-3 * np.maximum(most - least, 1e-3)
+        found = {"min": least, "max": most, "mean": values.mean(axis=0), "std": values.std(axis=0)}
+        for what, right in found.items():
+            said = np.asarray(statistics[key][what], dtype=np.float64).reshape(-1)
+            if said.shape != right.shape or not (np.abs(said - right) <= close).all():
+                raise ValueError(f"{_STATS}: {what} of {key} is {said.tolist()}")
+    lacking = {_STATE, _ACTION} - statistics.keys()
+    if lacking:
+        raise ValueError(f"{_STATS}: nothing about {sorted(lacking)}")
 
 
 def _tasks(motion: RobotMotion) -> list[str]:
