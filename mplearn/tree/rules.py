@@ -222,16 +222,17 @@ def _fragments(structure: Structure, node: Node, members: Sequence[int]) -> set[
     ):
         return found
     memory, bank = structure.memory, structure.memory.bank
+    alone = node.matrix[tuple(map(node.members.index, members))]
     parts = [
-        (number, other, first)
+        (other, first)
         for number, other in permutations(members)
         for first in (number - 1, number)
         if other not in (first, first + 1) and {first, first + 1} <= memory.frames.keys()
     ]
     asked: dict[int, Exemplar] = {}  # what goes on without a rest, by its first segment
-    wholes = _joined(structure, [first for _, _, first in parts])
-    for (number, other, first), whole in zip(parts, wholes, strict=True):
-        alone, together = (bank.distances(one, [other])[0] for one in (bank[number], whole))
+    wholes = _joined(structure, [first for _, first in parts])
+    for (other, first), whole in zip(parts, wholes, strict=True):
+        together = bank.distances(whole, [other])[0]
         if together < _NEARER * alone:
             found |= {first, first + 1}
         elif memory.goes_on(first):
