@@ -12,5 +12,6 @@ from .registry import register_segmenter as register_segmenter
 from .registry import require_segmenter as require_segmenter
 from .speed import ZeroVelocityConfig as ZeroVelocityConfig
 from .turns import TurnConfig as TurnConfig
-from .upsampled import Upsampled as Upsampled
+from .upsampling import Upsampled as Upsampled
+from .upsampling import upsampled as upsampled
 from .zero_velocity import ZeroVelocity as ZeroVelocity

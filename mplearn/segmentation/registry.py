@@ -10,7 +10,7 @@ from ..plugins import join_installed
 from .base import Segmenter
 from .kinematic_centroid import KinematicCentroid
 from .kohlmorgen_lemm import KohlmorgenLemm, KohlmorgenLemmConfig
-from .upsampled import upsampled
+from .upsampling import upsampled
 from .zero_velocity import ZeroVelocity
 
 ENTRY_POINTS = "mplearn.segmenters"

@@ -11,7 +11,7 @@ from mplearn.errors import StateError
 from mplearn.evaluation.experiments import frame_rate_table
 from mplearn.mocap import open_recordings
 from mplearn.segmentation import KohlmorgenLemm, ZeroVelocity, make_segmenter
-from mplearn.segmentation.upsampled import LEAST_HZ, Upsampled
+from mplearn.segmentation.upsampling import LEAST_HZ, Upsampled
 
 
 def wandering(n_frames, rate_hz, seed=0, n_channels=4):
