@@ -186,7 +186,8 @@ def test_who_goes_with_much_still_asked_goes_quietly(server, caplog):
     while server.hub.clients and time.monotonic() < end:
         time.sleep(0.02)
     logger.removeHandler(caplog.handler)
-    assert not server.hub.clients and not caplog.records
+    ours = [each for each in caplog.records if each.name != "websockets.client"]  # it was cut off
+    assert not server.hub.clients and not ours
 
 
 def test_who_reads_slowly_gets_the_latest_and_costs_no_memory(server):
